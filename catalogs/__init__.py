@@ -1,0 +1,1 @@
+"""Built-in catalogs: platforms, sensors, timestamping methods, clocks, shared hardware."""

@@ -1,0 +1,1 @@
+"""Layout of the HTML reports (Jinja2 templates, style, script)."""

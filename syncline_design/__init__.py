@@ -1,0 +1,17 @@
+"""syncline-design: choose, verify and diagnose sensor payloads and their time synchronisation.
+
+Conventions, said once for the whole package
+--------------------------------------------
+- Plain floats are SI: metre, second, radian, kilogram, watt; suffixes say so where a value
+  travels (`_m`, `_s`, `_rad`, `_mps`, `_radps`).
+- Frames: n is north-east-down (NED), b is body forward-right-down (FRD).  `R_nb` takes body
+  vectors to NED and is built from yaw-pitch-roll (ZYX) Euler angles.
+- Bearing: `n = [cos(az) cos(el), sin(az) cos(el), -sin(el)]`.
+- Timestamp error: a measurement stamped t was valid at t + mu.  `latency = -mu`, positive when
+  the data are older than their stamp.
+- Arrays: rows first; vectors are (n, 3), rotations (n, 3, 3).
+"""
+
+__version__ = "0.1.0"
+
+__all__ = ["__version__"]

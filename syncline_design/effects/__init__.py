@@ -1,0 +1,19 @@
+"""Physical effects, one file each; presence in this folder is registration."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from syncline_design.effects.base import Effect
+
+NOT_EFFECTS = frozenset({"base", "kinematics"})
+
+
+@cache
+def registry() -> dict[str, Effect]:
+    """Every effect by name, sorted; each module of this folder holds one `EFFECT`."""
+    names = sorted(m.name for m in iter_modules(__path__) if m.name not in NOT_EFFECTS)
+    effects = [import_module(f"{__name__}.{name}").EFFECT for name in names]
+    return {effect.name: effect for effect in effects}

@@ -1,0 +1,61 @@
+"""Rows to the vectors that effects are made of: b, q, V, W of the dictionary."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from syncline_design.effects.base import Array, StageRows
+
+
+def bearing(azimuth_rad: Array, elevation_rad: Array) -> Array:
+    """Unit vectors n = [cos az cos el, sin az cos el, -sin el], shape (n, 3).
+
+    Source: the paper's bearing vector (before eq. bear_posvec).
+    """
+    cos_el = np.cos(elevation_rad)
+    return np.stack(
+        [np.cos(azimuth_rad) * cos_el, np.sin(azimuth_rad) * cos_el, -np.sin(elevation_rad)],
+        axis=-1,
+    )
+
+
+def rotate(rotation: Array, vector: Array) -> Array:
+    """R v row by row: (n, 3, 3) times (n, 3) or (3,) gives (n, 3)."""
+    turned: Array = np.einsum("nij,nj->ni", rotation, np.broadcast_to(vector, rotation.shape[:2]))
+    return turned
+
+
+def ranging_vector(rows: StageRows) -> Array:
+    """b = r n [m], body axes, (n, 3)."""
+    return rows.range_m[:, None] * bearing(rows.azimuth_rad, rows.elevation_rad)
+
+
+def antenna_to_object(rows: StageRows) -> Array:
+    """q = l + b with l = l_L - l_G [m], body axes, (n, 3)."""
+    return rows.ranging_m - rows.antenna_m + ranging_vector(rows)
+
+
+def antenna_velocity(rows: StageRows) -> Array:
+    """V = R (v + w x l_G) [m/s], NED, (n, 3); the paper's eq. meas_gnss."""
+    lever = np.broadcast_to(rows.antenna_m, rows.velocity_mps.shape)
+    return rotate(rows.rotation, rows.velocity_mps + np.cross(rows.rate_radps, lever))
+
+
+def sweep_velocity(rows: StageRows) -> Array:
+    """W = R (w x q) [m/s], NED, (n, 3); the paper's eq. meas_ins times the lever q."""
+    return rotate(rows.rotation, np.cross(rows.rate_radps, antenna_to_object(rows)))
+
+
+def down_axis_sweep(rows: StageRows) -> Array:
+    """z x R q [m per rad of heading], NED, z down, (n, 3)."""
+    return np.cross(np.array([0.0, 0.0, 1.0]), rotate(rows.rotation, antenna_to_object(rows)))
+
+
+def column(value: float, rows: StageRows) -> Array:
+    """A constant as (n,) rows."""
+    return np.full(len(rows), value)
+
+
+def row_vector(x: float, y: float, z: float) -> Array:
+    """A constant vector as one (1, 3) row, for broadcasting."""
+    return np.array([[x, y, z]])

@@ -1,0 +1,50 @@
+"""A constant added to every range."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from syncline_design.effects.base import (
+    Array,
+    Contribution,
+    Departures,
+    Effect,
+    Parameter,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.effects.kinematics import bearing, column, rotate
+from syncline_design.model.system import Stage
+
+
+def _depart(
+    rows: StageRows, values: Values, sensor: Target, _: np.random.Generator | None
+) -> Departures:
+    """measured r = true r + bias [m]."""
+    return Departures(range_m=column(values["bias_m"], rows))
+
+
+def _sensitivity(rows: StageRows, sensor: Target) -> Array:
+    """d error / d bias = R n; (n, 3, 1)."""
+    return rotate(rows.rotation, bearing(rows.azimuth_rad, rows.elevation_rad))[:, :, None]
+
+
+def _contribute(_: Stage, values: Values, __: Target) -> Contribution:
+    """|bias|."""
+    return Contribution(systematic_m=abs(values["bias_m"]))
+
+
+EFFECT = Effect(
+    name="range_bias",
+    sensors=("ranging",),
+    kind="deterministic",
+    parameters=(Parameter("bias_m", 1e-3, 20.0, "m"),),
+    sentence="ranges are {bias_m} too long",
+    confused_with="range_scale",
+    separated_by="a spread of ranges",
+    source="paper, eq. bear_posvec; measured = true + bias",
+    depart=_depart,
+    sensitivity=_sensitivity,
+    contribute=_contribute,
+)

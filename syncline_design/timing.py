@@ -1,0 +1,95 @@
+"""Timestamp error of one sensor under one timestamping method, and its bound.
+
+mu is the paper's synchronisation error [s]: a measurement stamped t was valid at t + mu
+(eq. state_space_y).  `latency = -mu`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+DEFAULT_COVERAGE_FACTOR = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Uniform:
+    """mu uniform on [low_s, high_s]."""
+
+    low_s: float
+    high_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Normal:
+    """mu normal with mean_s and std_s."""
+
+    mean_s: float
+    std_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Constant:
+    """mu fixed at value_s."""
+
+    value_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Empirical:
+    """mu drawn from measured values_s with equal weight."""
+
+    values_s: tuple[float, ...]
+
+
+Distribution = Uniform | Normal | Constant | Empirical
+
+
+@dataclass(frozen=True, slots=True)
+class TimingError:
+    """A timestamp error mu: its distribution and, if its mean is calibrated out, what remains.
+
+    `calibrated_s` None: mu follows the distribution as it stands.  Otherwise the known mean is
+    removed and a constant of unknown sign, at most `calibrated_s`, remains (about 2 ms is what
+    practice reaches).
+    """
+
+    distribution: Distribution
+    calibrated_s: float | None = None
+
+
+NO_ERROR = TimingError(Constant(0.0))
+
+
+def mean(distribution: Distribution) -> float:
+    """Mean of mu [s]."""
+    match distribution:
+        case Uniform(low, high):
+            return 0.5 * (low + high)
+        case Normal(mu, _):
+            return mu
+        case Constant(value):
+            return value
+        case Empirical(values):
+            return math.fsum(values) / len(values)
+
+
+def bound(error: TimingError, coverage_factor: float = DEFAULT_COVERAGE_FACTOR) -> float:
+    """Bound tau_i [s] of |mu|.
+
+    |mean| + k std for a normal error (k: coverage factor), the larger absolute end for a uniform
+    one, |value| for a constant one, the largest absolute value of an empirical one.  With the mean
+    calibrated out, the bound of the centred error plus what remains of the mean.
+    """
+    shift = 0.0 if error.calibrated_s is None else mean(error.distribution)
+    remains = 0.0 if error.calibrated_s is None else error.calibrated_s
+    match error.distribution:
+        case Uniform(low, high):
+            spread = max(abs(low - shift), abs(high - shift))
+        case Normal(mu, std):
+            spread = abs(mu - shift) + coverage_factor * std
+        case Constant(value):
+            spread = abs(value - shift)
+        case Empirical(values):
+            spread = max(abs(value - shift) for value in values)
+    return spread + remains
