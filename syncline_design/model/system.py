@@ -1,0 +1,96 @@
+"""A fully resolved system: every sensor chosen, every figure in SI.
+
+This is what the Syncline, the simulator, the effects and the diagnosis all take.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from syncline_design.timing import NO_ERROR, TimingError
+
+RoleName = Literal["position", "attitude", "ranging"]
+ROLES: tuple[RoleName, ...] = ("position", "attitude", "ranging")
+UTC = "utc"
+
+
+@dataclass(frozen=True, slots=True)
+class Platform:
+    """How a vehicle moves: v_max [m/s], omega_max [rad/s], range d [m], largest lever arm b [m]."""
+
+    v_max_mps: float
+    omega_max_radps: float
+    distance_m: float
+    baseline_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """One chosen sensor.
+
+    sigma: standard deviations; position (north, east, down) [m]; attitude (roll, pitch, yaw)
+    [rad]; ranging (range [m], azimuth [rad], elevation [rad]).
+    timing: timestamp error mu against its timeline.
+    timeline: "utc", or "host:VEHICLE" for the vehicle's host clock.
+    lever_arm_m: body vector [m], None when the spec gives none.  Position: l_G, from the
+    reference point to the antenna; ranging: l_L, from the reference point to the ranging sensor.
+    type: the catalog's free type word (gnss, ins, lidar, usbl, mbes ...).
+    """
+
+    id: str
+    role: RoleName
+    sigma: tuple[float, float, float]
+    timing: TimingError
+    timeline: str = UTC
+    lever_arm_m: tuple[float, float, float] | None = None
+    type: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """One vehicle that georeferences something; in a chain the object carries the next stage.
+
+    position is None from the second stage on: there the chain before yields the position, and
+    `transponder_lever_arm_m` is the body vector [m] from the reference point to the transponder.
+    """
+
+    name: str
+    vehicle: str
+    platform: Platform
+    position: Sensor | None
+    attitude: Sensor | None
+    ranging: Sensor | None
+    transponder_lever_arm_m: tuple[float, float, float] | None = None
+
+    def sensors(self) -> tuple[Sensor, ...]:
+        """Sensors the stage has, in the order position, attitude, ranging."""
+        return tuple(s for s in (self.position, self.attitude, self.ranging) if s is not None)
+
+
+@dataclass(frozen=True, slots=True)
+class EffectEntry:
+    """A known systematic effect of a system: its name, where it acts, its parameters in SI."""
+
+    effect: str
+    sensor: str
+    stage: str
+    parameters: tuple[tuple[str, float | str], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class System:
+    """Stages of a chain, first to last, with the host clocks' offsets against UTC.
+
+    clock_offsets: (timeline, error of that timeline against UTC); a timeline not listed is taken
+    as common with UTC (offset 0).
+    """
+
+    stages: tuple[Stage, ...]
+    coverage_factor: float = 3.0
+    clock_offsets: tuple[tuple[str, TimingError], ...] = ()
+    effects: tuple[EffectEntry, ...] = ()
+
+    def clock_offset(self, timeline: str) -> TimingError:
+        """Offset of a timeline against UTC; zero when none is declared."""
+        return dict(self.clock_offsets).get(timeline, NO_ERROR)
