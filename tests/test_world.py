@@ -1,0 +1,532 @@
+"""The hidden world against hand computation: a test bed that is wrong would prove nothing."""
+
+from __future__ import annotations
+
+import ast
+import csv
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path as FilePath
+
+import numpy as np
+import pymap3d
+import pytest
+import yaml
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from tests.world import (
+    CHAIN,
+    CONSTRUCTIONS,
+    DISCRETE,
+    MOTIONS,
+    SILENT,
+    STOCHASTIC,
+    Hidden,
+    Noise,
+    Scenario,
+    hidden,
+    make_log,
+    scenario,
+)
+from tests.world.bound import cramer_rao, whitened
+from tests.world.geodesy import to_geodetic
+from tests.world.motions import Sensors
+from tests.world.noise import gauss_markov, unit_draws
+from tests.world.scenarios import Carrier
+from tests.world.sensing import lagged_track
+from tests.world.trajectory import GRAVITY_MPS2, Path, fit, grid
+
+Array = NDArray[np.float64]
+DEGREE = np.pi / 180.0
+SPEED_MPS = 8.0
+
+
+def track(
+    place: Callable[[Array], list[Array]],
+    yaw: Callable[[Array], Array] | None = None,
+    **tilt: float,
+) -> Path:
+    time_s = grid(120.0)
+    zero = np.zeros_like(time_s)
+    heading = zero if yaw is None else yaw(time_s)
+    angles = [heading, zero + tilt.get("pitch", 0.0), zero + tilt.get("roll", 0.0)]
+    return fit(time_s, np.column_stack(place(time_s)), np.column_stack(angles))
+
+
+def north_bound(**tilt: float) -> Path:
+    return track(lambda t: [SPEED_MPS * t, 0 * t, 0 * t], **tilt)
+
+
+def standing(**tilt: float) -> Path:
+    return track(lambda t: [0 * t, 0 * t, 0 * t], **tilt)
+
+
+def run_of(path: Path, target: list[float], kind: str = "georeference") -> Scenario:
+    """A carrier without arms that sights one target, twice a second."""
+    sensors = Sensors(antenna_arm_m=(0.0, 0.0, 0.0), ranging_arm_m=(0.0, 0.0, 0.0))
+    if kind == "position":
+        sensors = replace(sensors, ranging=None, attitude_rad=None)
+    carrier = Carrier("rig", path, sensors, 10.0, 1.0, 10.0)
+    stamps = np.arange(200) * 0.5
+    sighted = np.zeros(200, np.int64)
+    return Scenario("rig", 3, kind, 100.0, 2.0, stamps, (carrier,), np.array([target]), sighted)
+
+
+def caused(run: Scenario, *effects: Hidden) -> Array:
+    return make_log(run, effects, SILENT).error()
+
+
+def close(found: Array, expected: list[float], within: float = 1e-9) -> None:
+    np.testing.assert_allclose(found, np.broadcast_to(expected, found.shape), atol=within)
+
+
+def test_the_world_shares_no_code_with_the_package() -> None:
+    for file in (FilePath(__file__).parent / "world").glob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            if isinstance(node, ast.ImportFrom):
+                names.append(node.module or "")
+            assert not any(name.startswith("syncline_design") for name in names), file
+
+
+@pytest.mark.parametrize("name", [*MOTIONS, CHAIN])
+def test_without_effects_and_noise_the_few_line_georeference_is_exact(name: str) -> None:
+    log = make_log(scenario(name, 5, 60.0), (), SILENT)
+    c, run = log.columns, log.run
+    stage = "vessel_" if name == CHAIN else ""
+
+    def turn(prefix: str) -> Rotation:
+        angles = [c[f"{prefix}{axis}_deg"] for axis in ("yaw", "pitch", "roll")]
+        return Rotation.from_euler("ZYX", np.column_stack(angles), degrees=True)
+
+    def sight(prefix: str) -> Array:
+        az, el = (np.radians(c[f"{prefix}{n}_deg"]) for n in ("azimuth", "elevation"))
+        way = [np.cos(az) * np.cos(el), np.sin(az) * np.cos(el), -np.sin(el)]
+        return np.column_stack(way) * c[f"{prefix}range_m"][:, None]
+
+    place = np.column_stack([c[f"{stage}position_{axis}_m"] for axis in ("north", "east", "down")])
+    for carrier in run.carriers:
+        prefix = f"{carrier.name}_" if name == CHAIN else ""
+        sensors = carrier.sensors
+        arms = np.array(sensors.ranging_arm_m) - np.array(sensors.antenna_arm_m)
+        place = place + turn(prefix).apply(arms + sight(prefix))
+    target = np.column_stack([c[f"target_{axis}_m"] for axis in ("north", "east", "down")])
+    assert np.abs(place - target).max() < 1e-6
+    assert np.abs(log.error()).max() < 1e-6
+
+
+def test_attitude_latency_of_10_ms_at_90_degrees_a_second_and_10_m_is_15_7_cm() -> None:
+    run = run_of(track(lambda t: [0 * t] * 3, lambda t: 0.5 * np.pi * t), [10.0, 0.0, 0.0])
+    error = caused(run, hidden("latency", "attitude", latency_s=0.01))
+    chord = 2.0 * 10.0 * np.sin(0.5 * 0.01 * 0.5 * np.pi)
+    np.testing.assert_allclose(np.linalg.norm(error, axis=1), chord, atol=1e-7)
+    assert chord == pytest.approx(0.157, abs=1e-3)
+    # an old attitude points left of where a right-turning vehicle now looks: at +x, towards -y
+    assert np.all(error[:, 1] < 0.0)
+
+
+CLOSED_FORMS: dict[str, tuple[Path, list[float], Hidden, list[float]]] = {
+    "old positions lie behind": (
+        north_bound(),
+        [400.0, 0.0, 3.0],
+        hidden("latency", "position", latency_s=0.05),
+        [-SPEED_MPS * 0.05, 0.0, 0.0],
+    ),
+    "old ranges put the target ahead": (
+        north_bound(),
+        [400.0, 0.0, 3.0],
+        hidden("latency", "ranging", latency_s=0.05),
+        [SPEED_MPS * 0.05, 0.0, 0.0],
+    ),
+    "stamps one second ahead": (
+        north_bound(),
+        [400.0, 0.0, 3.0],
+        hidden("integer_second_slip", "position", seconds=1.0),
+        [-SPEED_MPS, 0.0, 0.0],
+    ),
+    "a lag on a ramp": (
+        north_bound(),
+        [400.0, 0.0, 3.0],
+        hidden("filter_lag", "position", time_constant_s=0.2),
+        [-SPEED_MPS * 0.2, 0.0, 0.0],
+    ),
+    "an antenna further forward, heading north": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("lever_arm", "position", x_m=0.1, y_m=0.2, z_m=-0.3),
+        [0.1, 0.2, -0.3],
+    ),
+    "a scanner further forward sees the target nearer": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("lever_arm", "ranging", x_m=0.1, y_m=0.0, z_m=0.0),
+        [-0.1, 0.0, 0.0],
+    ),
+    "a scanner turned right sees the target on its left": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("boresight", "ranging", x_rad=0.0, y_rad=0.0, z_rad=0.02),
+        [10.0 * np.cos(0.02) - 10.0, -10.0 * np.sin(0.02), 0.0],
+    ),
+    "an INS turned right reports more heading": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("mounting", "attitude", x_rad=0.0, y_rad=0.0, z_rad=0.02),
+        [10.0 * np.cos(0.02) - 10.0, 10.0 * np.sin(0.02), 0.0],
+    ),
+    "heading bias": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("heading_bias", "attitude", bias_rad=0.02),
+        [10.0 * np.cos(0.02) - 10.0, 10.0 * np.sin(0.02), 0.0],
+    ),
+    "hard iron, heading north: the cosine part": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("heading_hard_iron", "attitude", sin_rad=0.5, cos_rad=0.02),
+        [10.0 * np.cos(0.02) - 10.0, 10.0 * np.sin(0.02), 0.0],
+    ),
+    "azimuth bias": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("azimuth_bias", "ranging", bias_rad=0.02),
+        [10.0 * np.cos(0.02) - 10.0, 10.0 * np.sin(0.02), 0.0],
+    ),
+    "elevation bias looks up": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("elevation_bias", "ranging", bias_rad=0.02),
+        [10.0 * np.cos(0.02) - 10.0, 0.0, -10.0 * np.sin(0.02)],
+    ),
+    "range bias": (
+        standing(),
+        [0.0, 10.0, 0.0],
+        hidden("range_bias", "ranging", bias_m=0.3),
+        [0.0, 0.3, 0.0],
+    ),
+    "range scale": (
+        standing(),
+        [0.0, 10.0, 0.0],
+        hidden("range_scale", "ranging", scale=0.01),
+        [0.0, 0.1, 0.0],
+    ),
+    "sound speed taken one per cent too high": (
+        standing(),
+        [0.0, 0.0, 50.0],
+        hidden("sound_speed", "ranging", relative_error=0.01),
+        [0.0, 0.0, 0.5],
+    ),
+    "a transponder that answers 1 ms late": (
+        standing(),
+        [0.0, 0.0, 50.0],
+        hidden("turnaround_delay", "ranging", delay_s=1e-3),
+        [0.0, 0.0, 0.75],
+    ),
+    "a beam a quarter of a scan later": (
+        track(lambda t: [0 * t, SPEED_MPS * t, 0 * t], lambda t: 0 * t),
+        [0.0, 2000.0, 0.0],  # to the right, azimuth 90 degrees
+        hidden("scan_distortion", "ranging", period_s=0.1),
+        [0.0, -SPEED_MPS * 0.1 / 4.0, 0.0],
+    ),
+    "heave read a metre to starboard while rolled": (
+        standing(roll=10.0 * DEGREE),
+        [10.0, 0.0, 0.0],
+        hidden("induced_heave", "position", x_m=0.0, y_m=1.0, z_m=0.0),
+        [0.0, 0.0, np.sin(10.0 * DEGREE)],
+    ),
+    "survey shifted north": (
+        standing(),
+        [10.0, 0.0, 0.0],
+        hidden("datum_offset", "target", north_m=0.3, east_m=0.0, down_m=-0.1),
+        [-0.3, 0.0, 0.1],
+    ),
+    "survey grid too large": (
+        standing(),
+        [1000.0, 0.0, 0.0],
+        hidden("grid_scale", "target", scale=1e-4),
+        [-0.1, 0.0, 0.0],
+    ),
+    "survey grid turned from north to east": (
+        standing(),
+        [1000.0, 0.0, 0.0],
+        hidden("grid_convergence", "target", rotation_rad=1e-3),
+        [1000.0 - 1000.0 * np.cos(1e-3), -1000.0 * np.sin(1e-3), 0.0],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CLOSED_FORMS)
+def test_closed_forms(case: str) -> None:
+    path, target, effect, expected = CLOSED_FORMS[case]
+    close(caused(run_of(path, target), effect), expected, within=2e-6)
+
+
+def test_lever_arm_turns_with_the_vehicle() -> None:
+    run = run_of(standing_east(), [0.0, 10.0, 0.0])
+    effect = hidden("lever_arm", "position", x_m=0.1, y_m=0.2, z_m=0.0)
+    close(caused(run, effect), [-0.2, 0.1, 0.0])
+
+
+def standing_east() -> Path:
+    return track(lambda t: [0 * t] * 3, lambda t: 0 * t + 0.5 * np.pi)
+
+
+def test_clock_drift_and_step_grow_as_said() -> None:
+    run = run_of(north_bound(), [400.0, 0.0, 3.0])
+    drift = caused(run, hidden("clock_drift", "position", rate=50e-6))[:, 0]
+    age_s = run.stamps_s * 50e-6 / (1.0 + 50e-6)  # the stamps are the fast clock's
+    np.testing.assert_allclose(drift, -SPEED_MPS * age_s, atol=1e-9)
+    step = caused(run, hidden("timestamp_step", "position", step_s=0.1, time_s=40.0))[:, 0]
+    np.testing.assert_allclose(step, np.where(run.stamps_s >= 40.0, -0.8, 0.0), atol=1e-9)
+
+
+def test_heading_drift_grows_from_the_first_stamp() -> None:
+    run = run_of(standing(), [10.0, 0.0, 0.0])
+    error = caused(run, hidden("heading_drift", "attitude", rate_radps=1e-4))
+    np.testing.assert_allclose(error[:, 1], 10.0 * np.sin(1e-4 * run.stamps_s), atol=1e-9)
+
+
+def test_a_pendulum_in_a_vehicle_that_speeds_up_reports_nose_up() -> None:
+    run = run_of(track(lambda t: [0.5 * t**2, 0 * t, 0 * t]), [3000.0, 0.0, 0.0])
+    log = make_log(run, (hidden("acceleration_tilt", "attitude", gain=1.0),), SILENT)
+    expected = np.degrees(np.arctan(1.0 / GRAVITY_MPS2))
+    np.testing.assert_allclose(log.columns["pitch_deg"], expected, atol=1e-6)
+    np.testing.assert_allclose(log.columns["roll_deg"], 0.0, atol=1e-9)
+
+
+def test_flexure_moves_the_scanner_with_acceleration() -> None:
+    run = run_of(track(lambda t: [0.5 * t**2, 0 * t, 0 * t]), [9000.0, 0.0, 0.0])
+    error = caused(run, hidden("flexure", "ranging", x=0.02, y=0.0, z=0.0))
+    close(error, [-0.02, 0.0, 0.0], within=1e-6)
+
+
+def test_lag_of_a_sine_has_the_gain_and_phase_of_a_low_pass() -> None:
+    frequency, lag_s = 1.5, 0.3
+    path = track(lambda t: [np.sin(frequency * t), 0 * t, 0 * t])
+    time_s = np.linspace(10.0, 90.0, 500)
+    found = lagged_track(path, np.zeros(3), time_s, lag_s, 0.005)[:, 0]
+    gain = 1.0 / np.hypot(1.0, frequency * lag_s)
+    expected = gain * np.sin(frequency * time_s - np.arctan(frequency * lag_s))
+    np.testing.assert_allclose(found, expected, atol=2e-5)
+
+
+def test_conventions_are_what_they_are_called() -> None:
+    run = scenario("car_stops", 2, 60.0)
+    plain = make_log(run, (), SILENT).columns
+
+    def with_convention(sensor: str, convention: str) -> dict[str, Array]:
+        effect = hidden("frame_convention", sensor, convention=convention)
+        return make_log(run, (effect,), SILENT).columns
+
+    enu = with_convention("position", "enu")
+    np.testing.assert_array_equal(enu["position_north_m"], plain["position_east_m"])
+    np.testing.assert_array_equal(enu["position_down_m"], -plain["position_down_m"])
+    radians = with_convention("attitude", "radians")
+    np.testing.assert_allclose(radians["roll_deg"], np.radians(plain["roll_deg"]), atol=1e-12)
+    sign = with_convention("ranging", "elevation_sign")
+    np.testing.assert_array_equal(sign["elevation_deg"], -plain["elevation_deg"])
+
+
+EXAMPLES: dict[str, dict[str, float | str]] = {
+    "latency": {"latency_s": 0.05},
+    "clock_drift": {"rate": 1e-4},
+    "timestamp_step": {"step_s": 0.05, "time_s": 30.0},
+    "integer_second_slip": {"seconds": 1.0},
+    "timestamp_jitter": {"std_s": 0.005},
+    "packetised_timestamps": {"interval_s": 0.02},
+    "filter_lag": {"time_constant_s": 0.2},
+    "lever_arm": {"x_m": 0.1, "y_m": 0.1, "z_m": 0.1},
+    "boresight": {"x_rad": 0.01, "y_rad": 0.01, "z_rad": 0.01},
+    "mounting": {"x_rad": 0.01, "y_rad": 0.01, "z_rad": 0.01},
+    "range_bias": {"bias_m": 0.1},
+    "range_scale": {"scale": 0.01},
+    "azimuth_bias": {"bias_rad": 0.01},
+    "elevation_bias": {"bias_rad": 0.01},
+    "heading_bias": {"bias_rad": 0.01},
+    "heading_hard_iron": {"sin_rad": 0.01, "cos_rad": 0.01},
+    "heading_drift": {"rate_radps": 1e-4},
+    "acceleration_tilt": {"gain": 0.2},
+    "flexure": {"x": 0.01, "y": 0.01, "z": 0.01},
+    "noise_understated": {"factor": 2.0},
+    "correlated_noise": {"std_m": 0.05, "time_constant_s": 20.0},
+    "heavy_tails": {"degrees_of_freedom": 3.0},
+    "datum_offset": {"north_m": 0.1, "east_m": 0.1, "down_m": 0.1},
+    "height_drift": {"std_m": 0.05, "time_constant_s": 60.0},
+    "grid_scale": {"scale": 1e-3},
+    "grid_convergence": {"rotation_rad": 1e-3},
+    "frame_convention": {"convention": "radians"},
+    "scan_distortion": {"period_s": 0.1},
+    "sound_speed": {"relative_error": 0.01},
+    "turnaround_delay": {"delay_s": 1e-4},
+    "induced_heave": {"x_m": 0.3, "y_m": 0.3, "z_m": 0.3},
+}
+
+
+@pytest.mark.parametrize(("effect", "sensor"), CONSTRUCTIONS)
+def test_every_effect_changes_its_log_and_has_a_bound(effect: str, sensor: str) -> None:
+    run = scenario("vessel_figure_eights", 4, 60.0, 5.0)
+    parameters = dict(EXAMPLES[effect])
+    if (effect, sensor) == ("frame_convention", "position"):
+        parameters = {"convention": "enu"}
+    fault = hidden(effect, sensor, **parameters)
+    change = make_log(run, (fault,)).error() - make_log(run).error()
+    assert np.sqrt(np.mean(change**2)) > 1e-3
+    if effect not in STOCHASTIC | DISCRETE:
+        bounds = cramer_rao(run, (fault,), Noise())
+        assert all(np.isfinite(b) and b > 0.0 for b in bounds.values())
+
+
+def test_bound_of_a_latency_at_constant_speed_is_sigma_over_v_root_n() -> None:
+    run = run_of(north_bound(), [400.0, 0.0, 3.0], kind="position")
+    carrier = run.carriers[0]
+    sensors = replace(carrier.sensors, position_m=(0.02, 0.02, 0.02))
+    run = replace(run, carriers=(replace(carrier, sensors=sensors),))
+    noise = Noise(reference_m=0.0, reference_rad=0.0)
+    bound = cramer_rao(run, (hidden("latency", "position", latency_s=0.01),), noise)
+    assert bound[0, "latency_s"] == pytest.approx(0.02 / (SPEED_MPS * np.sqrt(200)), rel=1e-6)
+
+
+def test_whitening_agrees_with_the_dense_covariance() -> None:
+    rng = np.random.default_rng(8)
+    stamps = np.sort(rng.uniform(0.0, 30.0, 40))
+    factors = rng.standard_normal((40, 3, 3)) * 0.1
+    white = factors @ factors.transpose(0, 2, 1) + 0.01 * np.eye(3)
+    wander = [(np.array([0.2, 0.3, 0.4]), 5.0), (np.array([0.0, 0.0, 0.5]), 40.0)]
+    signal = rng.standard_normal((40, 3, 2))
+    dense = np.zeros((40, 3, 40, 3))
+    for row in range(40):
+        dense[row, :, row, :] += white[row]
+    for std, time_s in wander:
+        decay = np.exp(-np.abs(stamps[:, None] - stamps) / time_s)
+        for axis in range(3):
+            dense[:, axis, :, axis] += std[axis] ** 2 * decay
+    flat = signal.reshape(120, 2)
+    expected = flat.T @ np.linalg.solve(dense.reshape(120, 120), flat)
+    found = whitened(stamps, white, wander, signal).reshape(120, 2)
+    np.testing.assert_allclose(found.T @ found, expected, rtol=1e-9)
+
+
+def test_bound_is_reached_by_a_fit_to_the_very_log() -> None:
+    """Spread of 60 one-parameter fits over the bound; 5-sigma interval of a standard deviation."""
+    fits = []
+    for seed in range(60):
+        run = scenario("car_stops", seed, 60.0, 5.0)
+        effect = hidden("latency", "position", latency_s=0.0)
+        bound = cramer_rao(run, (effect,), Noise())[0, "latency_s"]
+        log = make_log(run)
+        from tests.world.bound import all_faults, row_covariance, slopes
+
+        slope = slopes(run, (effect,), [(0, "latency_s")])
+        covariance = row_covariance(run, all_faults(run, ()), Noise())
+        both = np.concatenate([slope, log.error()[:, :, None]], axis=2)
+        white = whitened(run.stamps_s, covariance, [], both).reshape(-1, 2)
+        fits.append(float(white[:, 0] @ white[:, 1] / (white[:, 0] @ white[:, 0])) / bound)
+    assert abs(np.std(fits) - 1.0) < 5.0 / np.sqrt(2 * 60)
+    assert abs(np.mean(fits)) < 5.0 / np.sqrt(60)
+
+
+@pytest.mark.parametrize("family", ["normal", "student", "uniform", "laplace"])
+def test_noise_has_unit_variance(family: str) -> None:
+    draws = unit_draws(np.random.default_rng(1), family, (400_000,))
+    spread = np.std(draws**2) / np.sqrt(draws.size)
+    assert abs(np.mean(draws**2) - 1.0) < 5.0 * spread  # wrong once in 1.7 million
+
+
+def test_gauss_markov_noise_forgets_at_its_time_constant() -> None:
+    stamps = np.arange(200_000) * 0.5
+    walk = gauss_markov(np.random.default_rng(2), stamps, np.array([0.3]), 5.0)[:, 0] / 0.3
+    independent = stamps.size * 0.5 / (2 * 5.0)  # rows over the integrated correlation
+    assert abs(np.mean(walk**2) - 1.0) < 5.0 * np.sqrt(2.0 / independent)
+    kept = np.mean(walk[10:] * walk[:-10])
+    assert abs(kept - np.exp(-1.0)) < 5.0 * np.sqrt(2.0 / independent)
+
+
+def test_position_noise_of_a_log_has_the_size_of_the_spec_with_and_without_wander() -> None:
+    """Five-sigma intervals; correlated noise counts one sample per two time constants."""
+    for share in (0.0, 0.6):
+        noise = Noise(wander_share=share, wander_time_s=2.0, reference_m=0.0)
+        run = scenario("car_stops", 3, 600.0, 5.0, kind="position")
+        noisy, silent = make_log(run, (), noise), make_log(run, (), SILENT)
+        north = noisy.columns["position_north_m"] - silent.columns["position_north_m"]
+        stated = run.carriers[0].sensors.position_m
+        assert stated is not None
+        independent = 3000 if share == 0.0 else 150
+        assert abs(np.var(north) / stated[0] ** 2 - 1.0) < 5.0 * np.sqrt(2.0 / independent)
+
+
+def test_jitter_and_packets_have_the_spread_they_claim() -> None:
+    run = run_of(north_bound(), [400.0, 0.0, 3.0])
+    run = replace(run, stamps_s=np.linspace(0, 100, 20_000), sighted=np.zeros(20_000, np.int64))
+    jitter = caused(run, hidden("timestamp_jitter", "position", std_s=0.01))[:, 0]
+    assert np.std(jitter) == pytest.approx(SPEED_MPS * 0.01, rel=5.0 / np.sqrt(40_000))
+    packets = caused(run, hidden("packetised_timestamps", "position", interval_s=0.02))[:, 0]
+    assert -packets.max() >= 0.0
+    assert np.mean(packets) == pytest.approx(-SPEED_MPS * 0.01, rel=0.02)
+    assert np.std(packets) / -np.mean(packets) == pytest.approx(1 / np.sqrt(3.0), rel=0.03)
+
+
+def test_geodesy_agrees_with_pymap3d() -> None:
+    rng = np.random.default_rng(4)
+    place = rng.uniform(-2000.0, 2000.0, (50, 3))
+    origin = (63.4, 10.4, 55.0)
+    found = to_geodetic(place, origin)
+    expected = np.column_stack(pymap3d.ned2geodetic(*place.T, *origin))
+    np.testing.assert_allclose(found[:, :2], expected[:, :2], atol=1e-11)
+    np.testing.assert_allclose(found[:, 2], expected[:, 2], atol=1e-6)
+
+
+def test_wgs84_log_is_the_local_one(tmp_path: FilePath) -> None:
+    log = make_log(scenario("car_stops", 6, 20.0))
+    file = log.to_csv(tmp_path / "log.csv", geodetic=(63.4, 10.4, 55.0))
+    with file.open(encoding="utf-8") as lines:
+        rows = list(csv.DictReader(lines))
+    read = {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
+    assert not any(name.endswith("north_m") for name in read)
+    for prefix, name in (("", "position_"), ("target_", "target_")):
+        shown = [read[f"{prefix}{key}"] for key in ("latitude_deg", "longitude_deg", "height_m")]
+        local = np.column_stack(pymap3d.geodetic2ned(*shown, 63.4, 10.4, 55.0))
+        for column, axis in zip(local.T, ("north", "east", "down"), strict=True):
+            start = log.columns[f"position_{axis}_m"][0]
+            np.testing.assert_allclose(column, log.columns[f"{name}{axis}_m"] - start, atol=2e-4)
+
+
+def test_csv_and_spec_of_every_kind(tmp_path: FilePath) -> None:
+    runs = [
+        scenario("multirotor_lines", 1, 20.0),
+        scenario("car_stops", 1, 20.0, kind="position"),
+        scenario(CHAIN, 1, 20.0),
+    ]
+    needed = [
+        {"range_m", "target_north_m", "roll_deg", "rate_x_degps", "velocity_down_mps"},
+        {"reference_east_m", "position_down_m", "yaw_deg"},
+        {"vessel_range_m", "auv_elevation_deg", "vessel_position_east_m", "target_down_m"},
+    ]
+    for run, names in zip(runs, needed, strict=True):
+        log = make_log(run, (hidden("latency", "position", latency_s=0.03),))
+        first = log.to_csv(tmp_path / "log.csv").read_bytes()
+        assert first == make_log(run, log.effects).to_csv(tmp_path / "again.csv").read_bytes()
+        header = first.split(b"\n", 1)[0].decode().split(",")
+        assert names <= set(header)
+        spec = yaml.safe_load(log.spec_yaml())
+        assert [stage["name"] for stage in spec["stages"]] == [c.name for c in run.carriers]
+        assert "effects" not in spec  # the spec knows nothing of what is hidden
+        assert yaml.safe_load(log.spec_yaml(log.effects))["effects"][0]["effect"] == "latency"
+
+
+def test_gaps_leave_the_other_rows_alone() -> None:
+    run = scenario("car_stops", 3, 60.0)
+    short = run.without(((10.0, 20.0), (30.0, 31.0)))
+    assert run.stamps_s.size - short.stamps_s.size == pytest.approx(110, abs=1)
+    assert not np.any((short.stamps_s >= 10.0) & (short.stamps_s < 20.0))
+    whole, rest = make_log(run, (), SILENT), make_log(short, (), SILENT)
+    kept = np.isin(run.stamps_s, short.stamps_s)
+    np.testing.assert_array_equal(whole.columns["range_m"][kept], rest.columns["range_m"])
+
+
+def test_seeds_differ_and_repeat() -> None:
+    first = scenario("vessel_figure_eights", 1, 30.0)
+    again = scenario("vessel_figure_eights", 1, 30.0)
+    other = scenario("vessel_figure_eights", 2, 30.0)
+    np.testing.assert_array_equal(make_log(first).error(), make_log(again).error())
+    assert not np.allclose(first.targets_m[:4], other.targets_m[:4])
