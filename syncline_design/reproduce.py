@@ -1,0 +1,364 @@
+"""`reproduce`: every printed figure of the paper, computed anew from the built-in catalog.
+
+A tau_crit cell agrees when the exact value lies within one unit of its last printed digit (the
+paper sometimes cuts and sometimes rounds).  One that does not must be a documented erratum and
+come out at the documented value; anything else makes the reproduction fail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+from syncline_design import __version__
+from syncline_design.catalog import Catalog
+from syncline_design.model import syncline
+from syncline_design.model.budget import budget
+from syncline_design.paper_figures import (
+    FIGURE_1_SENSOR_ERROR_M,
+    SURVEY_PAYLOAD,
+    Figure,
+    figures,
+    platform_of,
+    sigma_axes,
+    survey_system,
+)
+from syncline_design.paper_tables import PRINTED
+from syncline_design.units import Dimension, Quantity, parse_quantity
+
+SCHEMA = "syncline-design/reproduction/v1"
+TAU_CRIT_TABLES = ("tau_crit_georeferencing", "tau_crit_survey")
+
+Status = Literal["agrees", "erratum", "differs"]
+Key = tuple[str, str, str]  # table, row, column
+
+
+@dataclass(frozen=True, slots=True)
+class Erratum:
+    """A place where the paper contradicts itself.
+
+    cells: the printed figures it explains, with what they come out at instead (in the cell's
+    display unit; half a unit of its last digit is the tolerance).
+    """
+
+    id: str
+    where: str
+    reason: str
+    cells: tuple[tuple[Key, str], ...] = ()
+
+
+ERRATA = (
+    Erratum(
+        "auv_row",
+        "table Robot platform parameters, AUV",
+        "Printed v_max 30 m/s and d 5 m. The survey table, the text (30 m above the sea floor) and "
+        "both system tau_crit only come out with d 30 m and v_max 2.0779 m/s. The catalog's auv "
+        "is corrected, auv_printed is as printed.",
+        (
+            (("platforms", "auv", "v_max"), "2.0779"),
+            (("platforms", "auv", "distance"), "30"),
+        ),
+    ),
+    Erratum(
+        "auv_speed_digits",
+        "table Critical synchronization error, M3 Sonar on the AUV",
+        "The corrected speed, 2.0779 m/s, is itself cut: the six AUV cells together ask for "
+        "2.07795 to 2.07800 m/s, and 2.07797 m/s gives 82.776 ms.",
+        ((("tau_crit_survey", "kongsberg_m3", "auv"), "82.7771"),),
+    ),
+    Erratum(
+        "survey_roof",
+        "text on the survey Synclines",
+        "Printed 1.67 m. The paper's own formula and tables give 1.4127 m, and only 1.4127 m gives "
+        "the printed system tau_crit of 16 and 4 ms.",
+        ((("text", "survey_roof", "both_sv"), "1.4127"),),
+    ),
+    Erratum(
+        "fixed_wing_rate",
+        "table Minimum synchronization error, VUX-1 on the fixed wing",
+        "77.9 deg/s is a rounding of 45 sqrt(3) = 77.94 deg/s, which gives 157.99 us; the printed "
+        "rate gives 158.06 us.",
+        ((("tau_crit_georeferencing", "riegl_vux1uav", "uav_fixed_wing"), "158.06"),),
+    ),
+    Erratum(
+        "superscripts",
+        "GNSS and AUV INS measurement equations",
+        "The sync error of the GNSS equation carries the superscript of the INS, that of the AUV's "
+        "INS the one of the surface vessel; the GNSS and the AUV are meant. No figure changes.",
+    ),
+    Erratum(
+        "lever_arm",
+        "Syncline equation",
+        "The lever arm enters the simulator (v + omega x l) but not the Syncline. For the large "
+        "surface vessel b omega = 3.9 m/s exceeds v_max = 2.5 m/s, so its position tau_crit is "
+        "optimistic by a factor of 2.6. Both values are shown by check.",
+    ),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One printed figure and the same computed, both in `unit`."""
+
+    table: str
+    row: str
+    column: str
+    printed_text: str
+    printed: float
+    computed: float
+    unit: str
+    status: Status
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """cells: the paper's results; inputs: its platform and sensor figures against the catalog."""
+
+    cells: tuple[Cell, ...]
+    inputs: tuple[Cell, ...]
+    figures: tuple[Figure, ...]
+
+    @property
+    def ok(self) -> bool:
+        """Whether every printed figure agrees or is a documented erratum."""
+        return all(cell.status != "differs" for cell in (*self.cells, *self.inputs))
+
+
+def reproduce(catalog: Catalog) -> Reproduction:
+    """Compute every printed figure from a catalog (the built-in one, for the command)."""
+    cells = tuple(
+        _cell((table, row, column), text, _computed_si(catalog, table, row, column))
+        for table in (*TAU_CRIT_TABLES, "text")
+        for row, column, text in _entries(table)
+    )
+    inputs = tuple(
+        _cell((table, row, column), text, _catalog_si(catalog, table, row, column), exact=True)
+        for table in ("platforms", "sensors")
+        for row, column, text in _entries(table)
+    )
+    return Reproduction(cells, inputs, figures(catalog))
+
+
+def _entries(table: str) -> Iterator[tuple[str, str, str]]:
+    for row, columns in PRINTED[table].items():
+        for column, text in columns.items():
+            yield row, column, text
+
+
+def _computed_si(catalog: Catalog, table: str, row: str, column: str) -> float:
+    """A result of the paper in SI: a sensor's tau_crit, a system's, or a roof."""
+    if table in TAU_CRIT_TABLES:
+        return _sensor_tau_crit_s(catalog, row, column)
+    if row == "survey_tau_crit":
+        return budget(survey_system(catalog, column, SURVEY_PAYLOAD)).tau_crit_s
+    if row == "survey_roof":
+        return budget(survey_system(catalog, "large_sv", SURVEY_PAYLOAD)).sensor_error_m
+    p = platform_of(catalog, column)
+    rate = syncline.sync_rate_mps(p.v_max_mps, p.omega_max_radps, p.distance_m)
+    return syncline.accuracy_per_m(syncline.syncline_m(0.0, FIGURE_1_SENSOR_ERROR_M, rate))
+
+
+def _sensor_tau_crit_s(catalog: Catalog, sensor: str, platform: str) -> float:
+    entry, p = catalog.sensors[sensor], platform_of(catalog, platform)
+    role = entry.modality
+    error = syncline.sensor_error_m(role, sigma_axes(entry), p.distance_m)
+    rate = syncline.sensor_rate_mps(role, p.v_max_mps, p.omega_max_radps, p.distance_m)
+    return syncline.tau_crit_s(error, rate)
+
+
+def _catalog_si(catalog: Catalog, table: str, row: str, column: str) -> Quantity:
+    """A figure of the catalog that the paper prints as an input."""
+    if table == "platforms":
+        value: Any = getattr(catalog.platforms[row], column)
+        return _quantity(value)
+    entry = catalog.sensors[row]
+    field, axis = {
+        "position": ("sigma_position", 0),
+        "roll": ("sigma_attitude", 0),
+        "pitch": ("sigma_attitude", 1),
+        "yaw": ("sigma_attitude", 2),
+        "range": ("sigma_range", 0),
+        "azimuth": ("sigma_bearing", 0),
+        "elevation": ("sigma_bearing", 1),
+    }[column]
+    value = getattr(entry, field)
+    return _quantity(value[axis] if isinstance(value, tuple) else value)
+
+
+def _quantity(value: Any) -> Quantity:
+    if not isinstance(value, Quantity):
+        raise TypeError(f"expected a figure with a unit, found {value!r}")
+    return value
+
+
+_DIMENSIONS = {
+    "m": Dimension.LENGTH, "cm": Dimension.LENGTH, "mm": Dimension.LENGTH,
+    "us": Dimension.TIME, "ms": Dimension.TIME, "deg": Dimension.ANGLE,
+    "m/s": Dimension.SPEED, "deg/s": Dimension.ANGULAR_RATE,
+}  # fmt: skip
+
+
+def _unit_si(unit: str) -> Fraction:
+    """One display unit in SI, exactly; 1/m (figure 1's axis) is SI itself."""
+    if unit == "1/m":
+        return Fraction(1)
+    return parse_quantity(f"1 {unit}", _DIMENSIONS[unit]).exact
+
+
+def _last_digit(number: str) -> Fraction:
+    """One unit of the last digit: `16` -> 1, `4.330` -> 1/1000."""
+    return Fraction(1, 10 ** len(number.partition(".")[2]))
+
+
+def _cell(key: Key, text: str, computed_si: float, *, exact: bool = False) -> Cell:
+    """Compare a printed figure with the computed one: within one unit of the last digit.
+
+    exact: an input, which has to be the printed figure itself.
+    """
+    number, unit = text.split(" ")
+    computed = (
+        computed_si.exact if isinstance(computed_si, Quantity) else Fraction(computed_si)
+    ) / _unit_si(unit)
+    distance = abs(computed - Fraction(number))
+    agrees = distance == 0 if exact else distance < _last_digit(number)
+    status, note = _agreement(key) if agrees else _explain(key, computed)
+    return Cell(*key, text, float(number), float(computed), unit, status, note)
+
+
+def _agreement(key: Key) -> tuple[Status, str]:
+    """A figure that agrees, with what it was computed with where that is not the printed row."""
+    table, row, column = key
+    uses_auv = table in TAU_CRIT_TABLES and column == "auv"
+    corrected = uses_auv or row == "survey_tau_crit"
+    return "agrees", "with the corrected AUV row" if corrected else ""
+
+
+def _explain(key: Key, computed: Fraction) -> tuple[Status, str]:
+    """A figure that does not agree: an erratum if it is documented and comes out as documented."""
+    for erratum in ERRATA:
+        documented = dict(erratum.cells).get(key)
+        if documented is None:
+            continue
+        if abs(computed - Fraction(documented)) <= _last_digit(documented) / 2:
+            return "erratum", f"{erratum.id}: {erratum.reason}"
+        return "differs", f"documented as {documented} (erratum {erratum.id})"
+    return "differs", "neither agrees nor is a documented erratum"
+
+
+def tau_crit_cells(result: Reproduction) -> tuple[Cell, ...]:
+    """The cells of the paper's two tau_crit tables."""
+    return tuple(cell for cell in result.cells if cell.table in TAU_CRIT_TABLES)
+
+
+def as_json(result: Reproduction) -> dict[str, Any]:
+    """The reproduction as plain data (schema syncline-design/reproduction/v1)."""
+    return {
+        "schema": SCHEMA,
+        "version": __version__,
+        "ok": result.ok,
+        "counts": _counts(result),
+        "cells": [_cell_json(cell) for cell in result.cells],
+        "inputs": [_cell_json(cell) for cell in result.inputs],
+        "errata": [
+            {"id": e.id, "where": e.where, "reason": e.reason, "cells": [k for k, _ in e.cells]}
+            for e in ERRATA
+        ],
+        "figures": [_figure_json(figure) for figure in result.figures],
+    }
+
+
+def _cell_json(cell: Cell) -> dict[str, Any]:
+    names = ("table", "row", "column", "printed", "printed_text", "computed", "unit")
+    return {name: getattr(cell, name) for name in (*names, "status", "note")}
+
+
+def _figure_json(figure: Figure) -> dict[str, Any]:
+    grid = figure.tau_grid_s()
+    return {
+        "number": figure.number,
+        "title": figure.title,
+        "note": figure.note,
+        "tau_s": list(grid),
+        "curves": [
+            {
+                "label": curve.label,
+                "sensor_error_m": curve.sensor_error_m,
+                "sync_rate_mps": curve.sync_rate_mps,
+                "tau_crit_s": curve.tau_crit_s,
+                "error_m": list(curve.error_m(grid)),
+            }
+            for curve in figure.curves
+        ],
+    }
+
+
+def _counts(result: Reproduction) -> dict[str, dict[str, int]]:
+    groups = {
+        "tau_crit": tau_crit_cells(result),
+        "text": tuple(cell for cell in result.cells if cell.table == "text"),
+        "inputs": result.inputs,
+    }
+    statuses: tuple[Status, ...] = ("agrees", "erratum", "differs")
+    return {
+        name: {"printed": len(cells)}
+        | {status: sum(cell.status == status for cell in cells) for status in statuses}
+        for name, cells in groups.items()
+    }
+
+
+def as_text(result: Reproduction) -> str:
+    """The reproduction as aligned text: every cell, the errata, the counts at the end."""
+    lines: list[str] = []
+    for table in (*TAU_CRIT_TABLES, "text"):
+        lines += [table, *_rows([cell for cell in result.cells if cell.table == table]), ""]
+    disputed = [cell for cell in result.inputs if cell.status != "agrees"]
+    lines += ["inputs that are not as printed", *_rows(disputed), ""]
+    lines += ["errata of the paper", *(f"  {e.id}: {e.where}. {e.reason}" for e in ERRATA), ""]
+    words = {"tau_crit": "printed tau_crit cells", "text": "figures of the text"}
+    for name, count in _counts(result).items():
+        lines.append(_count_line(count, words.get(name, "printed inputs")))
+    lines.append(
+        "Every printed figure is accounted for."
+        if result.ok
+        else "Some printed figures are NOT accounted for: see the rows that say differs."
+    )
+    return "\n".join(lines)
+
+
+def _count_line(count: Mapping[str, int], what: str) -> str:
+    accounted = count["agrees"] + count["erratum"]
+    return (
+        f"{accounted} of {count['printed']} {what} accounted for: agree {count['agrees']}, "
+        f"documented errata {count['erratum']}, differ {count['differs']}"
+    )
+
+
+def _rows(cells: list[Cell]) -> list[str]:
+    """Aligned lines of cells: row, column, printed, computed, status, erratum."""
+    header = ("row", "column", "printed", "computed", "status")
+    table = [(c.row, c.column, c.printed_text, _computed_text(c), _status_text(c)) for c in cells]
+    widths = [max(len(line[i]) for line in [header, *table]) for i in range(len(header))]
+    lines = (
+        f"  {a:<{widths[0]}}  {b:<{widths[1]}}  {p:>{widths[2]}}  {q:>{widths[3]}}  {s}"
+        for a, b, p, q, s in [header, *table]
+    )
+    return [line.rstrip() for line in lines]
+
+
+def _computed_text(cell: Cell) -> str:
+    """The computed figure: five digits, or one decimal more than printed if that is more."""
+    decimals = len(cell.printed_text.split(" ")[0].partition(".")[2])
+    five, one_more = f"{cell.computed:.5g}", f"{cell.computed:.{decimals + 1}f}"
+    return f"{max(five, one_more, key=len)} {cell.unit}"
+
+
+def _status_text(cell: Cell) -> str:
+    """Status; an erratum with its id, a difference with what is known of it."""
+    if cell.status == "erratum":
+        return f"erratum ({cell.note.partition(':')[0]})"
+    if cell.status == "differs":
+        return f"DIFFERS, {cell.note}"
+    return f"agrees, {cell.note}" if cell.note else "agrees"
