@@ -121,7 +121,7 @@ def printable(text: str, limit: int = 60) -> str:
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in short)
 
 
-class _StopReadingError(Exception):
+class StopReadingError(Exception):
     """Reading cannot go on."""
 
 
@@ -133,7 +133,7 @@ def read(path: str | Path, shown_as: str | None = None) -> Document:
     except OSError as error:
         reason = error.strerror or str(error)
         return _unreadable(Problem(file, 0, 0, "", f"cannot read the file: {reason.lower()}"))
-    except _StopReadingError as refused:
+    except StopReadingError as refused:
         return _unreadable(Problem(file, 0, 0, "", str(refused)))
     try:
         text = raw.decode("utf-8-sig")
@@ -153,14 +153,14 @@ def read_bytes(path: Path) -> bytes:
     with os.fdopen(descriptor, "rb") as stream:
         status = os.fstat(descriptor)
         if stat.S_ISDIR(status.st_mode):
-            raise _StopReadingError("a folder; expected a file")
+            raise StopReadingError("a folder; expected a file")
         if not stat.S_ISREG(status.st_mode):
-            raise _StopReadingError("not a regular file (a pipe, socket or device)")
+            raise StopReadingError("not a regular file (a pipe, socket or device)")
         if status.st_size > MAX_BYTES:
-            raise _StopReadingError(f"{status.st_size} bytes; expected at most {MAX_BYTES}")
+            raise StopReadingError(f"{status.st_size} bytes; expected at most {MAX_BYTES}")
         content = stream.read(MAX_BYTES + 1)
     if len(content) > MAX_BYTES:
-        raise _StopReadingError(f"more than {MAX_BYTES} bytes")
+        raise StopReadingError(f"more than {MAX_BYTES} bytes")
     return content
 
 
@@ -188,7 +188,7 @@ def parse(text: str, file: str = "<text>") -> Document:
     try:
         _refuse_characters(text, builder)
         data = builder.build(_events(text))
-    except _StopReadingError:
+    except StopReadingError:
         data = None
     except yaml.YAMLError as error:
         builder.refuse_syntax(error, text)
@@ -238,7 +238,7 @@ def _refuse_characters(text: str, builder: _Builder) -> None:
         if len(builder.problems) >= 20:
             break
     if found:
-        raise _StopReadingError
+        raise StopReadingError
 
 
 def _place(mark: Any) -> Position:
@@ -274,14 +274,14 @@ class _Builder:
                 data = self._node(event, events, (), 0)
         if not seen or (data is None and not self.problems):
             self.refuse((), (1, 1), "an empty file", expected="a mapping of keys and values")
-            raise _StopReadingError
+            raise StopReadingError
         return data
 
     def _check_document(self, event: Any, seen: int) -> None:
         place = _place(event.start_mark)
         if seen > 1:
             self.refuse((), place, "a second document", expected="one document per file")
-            raise _StopReadingError
+            raise StopReadingError
         if event.tags:
             self.refuse((), place, "a %TAG directive", expected="plain YAML")
         if event.version not in (None, (1, 2)):
@@ -292,7 +292,7 @@ class _Builder:
         self.positions[path] = place
         if depth > MAX_DEPTH:
             self.refuse(path[:4], place, f"nested deeper than {MAX_DEPTH} levels")
-            raise _StopReadingError
+            raise StopReadingError
         if isinstance(event, yaml.AliasEvent):
             self.refuse(path, place, f"an alias (*{event.anchor})", hint="write the value out")
             return None
@@ -385,7 +385,7 @@ class _Builder:
                 self.refuse(
                     path, _place(event.start_mark), f"nested deeper than {MAX_DEPTH} levels"
                 )
-                raise _StopReadingError
+                raise StopReadingError
             for inner in events:
                 if isinstance(inner, yaml.CollectionEndEvent):
                     break

@@ -1,0 +1,227 @@
+"""Catalog files: the built-in ones and a spec's own, checked, drawn together, hashed."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from syncline_design.catalog import SECTIONS, Catalog, CatalogFile
+from syncline_design.units import Dimension, Quantity, UnitError, parse_quantity
+from syncline_design.validation import validate
+from syncline_design.yaml_reader import (
+    Document,
+    KeyPath,
+    Problem,
+    StopReadingError,
+    printable,
+    read,
+    read_bytes,
+    show_path,
+)
+
+BUILTIN_PACKAGE = "syncline_design.catalogs"
+
+
+@dataclass
+class Collection:
+    """Catalog entries as they are drawn together, with where each came from."""
+
+    entries: dict[str, dict[str, Any]] = field(default_factory=lambda: {s: {} for s in SECTIONS})
+    origins: dict[tuple[str, str], str] = field(
+        default_factory=dict
+    )  # (section, id) -> file:line:col
+    documents: dict[tuple[str, str], tuple[Document, KeyPath]] = field(default_factory=dict)
+    problems: list[Problem] = field(default_factory=list)
+    digests: list[str] = field(default_factory=list)
+
+    def catalog(self) -> Catalog:
+        """The merged catalog; its entries have been validated one by one."""
+        return Catalog.model_construct(**self.entries)  # type: ignore[arg-type]
+
+    def sha256(self) -> str:
+        """One hash over all files, in the order they were drawn in."""
+        return hashlib.sha256("\n".join(self.digests).encode()).hexdigest()
+
+
+def problem_at(
+    document: Document, path: KeyPath, message: str, expected: str = "", found: str = "",
+    hint: str = "",
+) -> Problem:  # fmt: skip
+    """A problem at the place of a key path."""
+    line, column = document.position(path)
+    return Problem(
+        document.file, line, column, show_path(path), message, expected, printable(found, 80), hint
+    )
+
+
+def add_builtin(collection: Collection) -> None:
+    """Draw in every catalog file of the package."""
+    folder = files(BUILTIN_PACKAGE)
+    for resource in sorted(folder.iterdir(), key=lambda r: r.name):
+        if resource.name.endswith(".yaml"):
+            path = Path(str(resource))
+            _add_document(collection, read(path, f"builtin:{resource.name}"), path.parent)
+
+
+def add_own(collection: Collection, spec: Document, folder: Path, key: str = "catalogs") -> None:
+    """Draw in the catalogs that a spec names, and those that these name."""
+    _add_listed(collection, spec, folder, folder.resolve(), (spec.file,), key)
+
+
+def _add_listed(
+    collection: Collection, lister: Document, folder: Path, root: Path, chain: tuple[str, ...],
+    key: str = "catalogs",
+) -> None:  # fmt: skip
+    listed = lister.data.get(key, ()) if isinstance(lister.data, dict) else ()
+    for index, name in enumerate(listed if isinstance(listed, tuple) else ()):
+        if not isinstance(name, str) or not name:
+            continue  # the model of the listing file says so
+        inside = inside_folder(lister, (key, index), name, folder, root)
+        if isinstance(inside, Problem):
+            collection.problems.append(inside)
+            continue
+        shown = str(Path(chain[0]).parent / inside.relative_to(root))
+        if shown in chain or inside == (root / Path(chain[0]).name):
+            circle = " -> ".join((*chain, shown))
+            problem = problem_at(lister, (key, index), "catalogs include each other in a circle",
+                                 found=circle)  # fmt: skip
+            # The chain is the message: it must not be shortened.
+            collection.problems.append(_with_found(problem, circle))
+            continue
+        if any(shown == digest.partition(" ")[2] for digest in collection.digests):
+            continue  # drawn in already by another file
+        document = read(inside, shown)
+        _add_document(collection, document, root)
+        _add_listed(collection, document, inside.parent, root, (*chain, shown))
+
+
+def _with_found(problem: Problem, found: str) -> Problem:
+    from dataclasses import replace
+
+    return replace(problem, found=found)
+
+
+def inside_folder(
+    document: Document, path: KeyPath, name: str, folder: Path, root: Path
+) -> Path | Problem:
+    """The file that a relative name means, if it is inside `root` after following symlinks."""
+    wanted = "a file inside the spec's folder"
+    if Path(name).is_absolute() or name.startswith(("~", "\\")) or ":" in name[:3]:
+        return problem_at(document, path, "an absolute path", wanted, name, "write it relative")
+    try:
+        target = (folder / name).resolve()
+    except (OSError, RuntimeError, ValueError) as error:
+        return problem_at(document, path, f"a path that cannot be followed: {error}", wanted, name)
+    if not target.is_relative_to(root):
+        return problem_at(document, path, "a path that leaves the spec's folder", wanted, name)
+    if not target.exists():
+        near = [p.name for p in sorted(root.glob("*.yaml"))]
+        from syncline_design.values import did_you_mean
+
+        return problem_at(document, path, "no such file", wanted, name, did_you_mean(name, near))
+    return target
+
+
+def _add_document(collection: Collection, document: Document, root: Path) -> None:
+    collection.digests.append(f"{document.sha256} {document.file}")
+    collection.problems.extend(document.problems)
+    if document.data is None:
+        return
+    if not isinstance(document.data, dict):
+        collection.problems.append(
+            problem_at(document, (), "not a catalog", f"a mapping of {', '.join(SECTIONS)}")
+        )
+        return
+    filled = fill_empirical(document, root, collection)
+    model, problems = validate(CatalogFile, document, filled)
+    collection.problems.extend(problems)
+    for section in SECTIONS:
+        raw = document.data.get(section)
+        for identity in raw if isinstance(raw, dict) else ():
+            _add_entry(collection, document, section, identity, model)
+
+
+def _add_entry(
+    collection: Collection, document: Document, section: str, identity: str, model: Catalog | None
+) -> None:
+    """Note one entry; a broken one keeps its id so that references to it are not unknown."""
+    line, column = document.key_positions.get((section, identity), (1, 1))
+    place = f"{document.file}:{line}:{column}"
+    first = collection.origins.get((section, identity))
+    if first is not None:
+        message = f"this id is taken: {identity} is also at {first}"
+        problem = problem_at(document, (section, identity), message, hint="rename one of them")
+        collection.problems.append(problem)
+        return
+    collection.origins[section, identity] = place
+    collection.documents[section, identity] = (document, (section, identity))
+    if model is not None:
+        collection.entries[section][identity] = getattr(model, section)[identity]
+
+
+def fill_empirical(document: Document, root: Path, collection: Collection) -> Any:
+    """The document's data with the values of empirical error files put in."""
+    return _filled(document.data, (), document, root, collection)
+
+
+def _filled(
+    data: Any, path: KeyPath, document: Document, root: Path, collection: Collection
+) -> Any:
+    if isinstance(data, tuple):
+        return tuple(
+            _filled(item, (*path, i), document, root, collection) for i, item in enumerate(data)
+        )
+    if not isinstance(data, dict):
+        return data
+    if data.get("distribution") == "empirical" and isinstance(data.get("file"), str):
+        return _with_values(data, path, document, root, collection)
+    return {
+        key: _filled(item, (*path, key), document, root, collection) for key, item in data.items()
+    }
+
+
+def _with_values(
+    data: dict[str, Any], path: KeyPath, document: Document, root: Path, collection: Collection
+) -> dict[str, Any]:
+    at = (*path, "file")
+    if "values" in data:
+        error = problem_at(document, at, "both values and file", "one of them", hint="delete one")
+        collection.problems.append(error)
+        return data
+    inside = inside_folder(document, at, data["file"], root, root.resolve())
+    if isinstance(inside, Problem):
+        collection.problems.append(inside)
+        return data
+    try:
+        content = read_bytes(inside)
+        values = tuple(_read_values(content.decode("utf-8-sig"), data["file"]))
+    except (OSError, UnicodeDecodeError, StopReadingError, UnitError) as error:
+        message = f"cannot read the values: {error}"
+        collection.problems.append(problem_at(document, at, message))
+        return data
+    collection.digests.append(f"{hashlib.sha256(content).hexdigest()} {data['file']}")
+    return {**data, "values": values}
+
+
+def _read_values(text: str, name: str) -> list[Quantity]:
+    """Times of a file: `NUMBER UNIT` per line, or bare numbers under a header that is a unit."""
+    lines = [(n, line.strip()) for n, line in enumerate(text.splitlines(), 1)]
+    lines = [(n, line) for n, line in lines if line and not line.startswith("#")]
+    if not lines:
+        raise UnitError(f"{name} holds no values", "one time per line")
+    unit = ""
+    if not any(c.isdigit() for c in lines[0][1]):
+        unit = " " + lines.pop(0)[1].strip("[]")
+        parse_quantity(f"1{unit}", Dimension.TIME)
+    values: list[Quantity] = []
+    for number, line in lines:
+        try:
+            values.append(parse_quantity(line + unit, Dimension.TIME, tolerance=False))
+        except UnitError as error:
+            raise UnitError(f"{name} line {number}: {error}") from None
+    if not values:
+        raise UnitError(f"{name} holds no values", "one time per line")
+    return values
