@@ -10,6 +10,7 @@ from pydantic_core import PydanticCustomError
 from syncline_design.units import Dimension
 from syncline_design.values import (
     AngularRate,
+    AtLeastOne,
     Count,
     Loc,
     Mass,
@@ -221,7 +222,7 @@ ErrorEntry = Annotated[
 class TimestampingEntry(Entry):
     """A timestamping method; cost, mass and power count per sensor that uses it."""
 
-    primitives: Annotated[tuple[Primitive, ...], Field(min_length=1)]
+    primitives: Annotated[tuple[Primitive, ...], AtLeastOne]
     timeline: Literal["host", "utc"] = "host"
     error: ErrorEntry
     cost: Money | None = None

@@ -25,6 +25,7 @@ from syncline_design.units import (
 )
 from syncline_design.values import (
     AngularRate,
+    AtLeastOne,
     Loc,
     Money,
     NonNegativeLength,
@@ -439,9 +440,9 @@ class Spec(Record):
     catalogs: tuple[Text, ...] = ()
     currency: Literal["EUR", "USD", "GBP", "NOK", "SEK", "DKK", "CHF", "CAD", "AUD", "JPY"] = "EUR"
     exchange_rates: dict[str, PositiveMoney] = Field(default_factory=dict)  # {USD: 0.92 EUR}
-    requirements: Annotated[tuple[Requirement, ...], Field(min_length=1)]
+    requirements: Annotated[tuple[Requirement, ...], AtLeastOne]
     sync_model: Literal["syncline", "per_sensor"] = "syncline"
-    stages: Annotated[tuple[StageChoice, ...], Field(min_length=1)]
+    stages: Annotated[tuple[StageChoice, ...], AtLeastOne]
     timestamping: Annotated[MethodChoice | None, _one_or_candidates("timestamping")] = None
     coverage_factor: PositiveNumber = 3.0
     objective: Literal["cost", "mass", "power", "error"] = "cost"

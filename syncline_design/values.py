@@ -13,6 +13,7 @@ from typing import Annotated, Any, TypeVar
 
 from pydantic import (
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     ModelWrapValidatorHandler,
@@ -209,6 +210,16 @@ def _number(lowest: float) -> Reader:
 
 
 PositiveNumber = Annotated[float, _number(0.0)]
+
+
+def _refuse_empty(value: Any) -> Any:
+    """Looked at before the items: their errors would make the list seem empty."""
+    if isinstance(value, tuple | list) and not value:
+        raise refusal("an empty list", "at least one entry", "[]")
+    return value
+
+
+AtLeastOne = BeforeValidator(_refuse_empty)
 Text = Annotated[str, Field(min_length=1)]
 Count = Annotated[int, Field(ge=1)]
 

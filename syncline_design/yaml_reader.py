@@ -10,10 +10,12 @@ Sequences become tuples, decimals become `Number`, which keeps the digits as wri
 from __future__ import annotations
 
 import hashlib
+import importlib
 import os
 import re
 import stat
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -27,7 +29,9 @@ MAX_NUMBER_LENGTH = 60
 KeyPath = tuple[str | int, ...]
 Position = tuple[int, int]
 
-_CParser = getattr(yaml, "CParser", None)
+_CParser: Any = None  # stays so where PyYAML was built without libyaml
+with suppress(ImportError):
+    _CParser = importlib.import_module("yaml._yaml").CParser
 
 _INT = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
 _FLOAT = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
@@ -316,7 +320,7 @@ class _Builder:
             code = ord(bad[0]) if bad else 0
             self.refuse(path, place, f"a character that no text may hold (U+{code:04X})")
             return None
-        return plain_scalar(event.value) if event.style is None else event.value
+        return event.value if event.style else plain_scalar(event.value)  # style: none if plain
 
     def _sequence(self, events: Iterator[Any], path: KeyPath, depth: int) -> tuple[Any, ...]:
         items: list[Any] = []
@@ -367,7 +371,7 @@ class _Builder:
         key = self._scalar(event, path, place)
         if len(self.problems) > before:
             return None
-        if key == "<<" and event.style is None:
+        if key == "<<" and not event.style:
             self.refuse(path, place, "a merge key (<<)", hint="write the keys out")
             return None
         if not isinstance(key, str) or not key:
