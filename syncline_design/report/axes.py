@@ -1,0 +1,99 @@
+"""Axes in units people read: decades of metres and seconds, labelled by their unit ladder."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Literal
+
+from syncline_design.report import numbers
+from syncline_design.report.palette import GRID, MUTED
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_SUPERSCRIPT = str.maketrans(
+    "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
+)
+
+
+def power_of_ten(value: float) -> str:
+    """1000 as 10 with a superscript 3, in plain characters; 1 and 10 as they are."""
+    exponent = round(math.log10(value))
+    return f"{value:g}" if exponent in (0, 1) else "10" + str(exponent).translate(_SUPERSCRIPT)
+
+
+def decades(low: float, high: float, most: int = 7) -> list[float]:
+    """Powers of ten from low to high, thinned to at most `most`."""
+    first, last = math.ceil(math.log10(low) - 1e-9), math.floor(math.log10(high) + 1e-9)
+    step = max(1, math.ceil((last - first + 1) / most))
+    return [10.0**exponent for exponent in range(first, last + 1, step)]
+
+
+def one_two_five(low: float, high: float) -> list[float]:
+    """1, 2, 5 times powers of ten from low to high."""
+    exponents = range(math.floor(math.log10(low)), math.floor(math.log10(high)) + 1)
+    steps = (leading * 10.0**exponent for exponent in exponents for leading in (1.0, 2.0, 5.0))
+    return [s for s in steps if low * (1 - 1e-9) <= s <= high * (1 + 1e-9)]
+
+
+def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
+    """Decades, or 1-2-5 steps where the span holds fewer than three decades."""
+    whole = decades(low, high, most)
+    return whole if len(whole) >= 3 else one_two_five(low, high)
+
+
+def set_ticks(
+    axes: Axes, which: Literal["x", "y"], ticks: Iterable[float], label: Callable[[float], str]
+) -> None:
+    """Fixed major ticks with the given labels; no minor ones."""
+    from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
+
+    places = list(ticks)
+    axis = axes.xaxis if which == "x" else axes.yaxis
+    axis.set_major_locator(FixedLocator(places))
+    axis.set_major_formatter(FixedFormatter([label(place) for place in places]))
+    axis.set_minor_locator(NullLocator())
+
+
+def grid(axes: Axes, which: Literal["x", "y", "both"] = "both") -> None:
+    """A quiet grid."""
+    axes.grid(True, axis=which, color=GRID, linewidth=0.7)
+
+
+def hide_ticks(axes: Axes, which: Literal["x", "y"]) -> None:
+    """Labels stay, tick marks and the axis line go."""
+    axes.tick_params(axis=which, length=0)
+    axes.spines["left" if which == "y" else "bottom"].set_visible(False)
+
+
+def inverse_axis(
+    axes: Axes, which: Literal["x", "y"], label: str, shown: Callable[[float], str]
+) -> None:
+    """A second axis opposite the first, in the reciprocal quantity (tau for 1/tau)."""
+    low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
+    twin = axes.twiny() if which == "x" else axes.twinx()
+    spine = "top" if which == "x" else "right"
+    for name, line in twin.spines.items():
+        line.set_visible(name == spine)
+    if which == "x":
+        twin.set_xscale("log")
+        twin.set_xlim(low, high)
+        twin.set_xlabel(label)
+    else:
+        twin.set_yscale("log")
+        twin.set_ylim(low, high)
+        twin.set_ylabel(label)
+    wanted = log_ticks(1.0 / high, 1.0 / low, 6)
+    set_ticks(twin, which, [1.0 / value for value in wanted], lambda place: shown(1.0 / place))
+    twin.tick_params(colors=MUTED, labelcolor=MUTED)
+
+
+def short_length(value: float) -> str:
+    """A tick label in metres' ladder."""
+    return numbers.length(value, 3)
+
+
+def short_time(value: float) -> str:
+    """A tick label in seconds' ladder."""
+    return numbers.time(value, 3)

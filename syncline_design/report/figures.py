@@ -1,0 +1,340 @@
+"""The figures of a verdict: the Syncline, tau against tau_crit, the ledger of terms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from syncline_design.report import axes as scales
+from syncline_design.report import numbers
+from syncline_design.report.palette import BAD, GOOD, INK, LINE, MUTED, SERIES, SHADE, SURFACE, WARN
+from syncline_design.report.svg import InlineFigure, add_axes, draw
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH = 540.0  # SVG units; shown near their size on a desk, still readable on a phone
+
+
+@dataclass(frozen=True, slots=True)
+class SynclineCurve:
+    """What the Syncline plot shows.
+
+    total(tau) = floor_m + rate_mps * tau, floor_m being sensor error plus systematic error.
+    """
+
+    floor_m: float
+    rate_mps: float
+    tau_crit_s: float | None
+    tau_s: float | None
+    total_m: float | None
+    target_m: float | None
+    lever_arm_rate_mps: float | None = None
+
+
+def _tau_span(curve: SynclineCurve) -> tuple[float, float]:
+    """Least and largest tau shown: three decades around tau_crit, the design well inside."""
+    crit = curve.tau_crit_s or (curve.tau_s if curve.tau_s else 1e-3)
+    low, high = crit / 1e3, crit * 1e3
+    if curve.tau_s:
+        low, high = min(low, curve.tau_s / 3), max(high, curve.tau_s * 3)
+    return low, high
+
+
+def syncline(curve: SynclineCurve, name: str = "fig-syncline") -> InlineFigure:
+    """Accuracy against synchronisation accuracy, log-log, as in the paper's figure 1."""
+    low, high = _tau_span(curve)
+
+    def build(figure: Figure) -> Axes:
+        import numpy as np
+
+        axes = add_axes(figure)
+        tau = np.geomspace(low, high, 241)
+        error = curve.floor_m + curve.rate_mps * tau
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xlim(1.0 / high, 1.0 / low)
+        _set_accuracy_limits(axes, curve, float(error[-1]))
+        _regions(axes, curve)
+        _asymptotes(axes, curve, low, high)
+        if curve.lever_arm_rate_mps and curve.lever_arm_rate_mps > 1.01 * curve.rate_mps:
+            wider = curve.floor_m + curve.lever_arm_rate_mps * tau
+            axes.plot(1 / tau, 1 / wider, color=LINE, linewidth=1, linestyle=(0, (1, 2)))
+        axes.plot(1 / tau, 1 / error, color=LINE, linewidth=2.4, zorder=3)
+        _target_and_design(axes, curve, low)
+        _syncline_labels(axes)
+        return axes
+
+    return draw(name, "Syncline of the design", _describe(curve), (WIDTH, 372.0), build)
+
+
+def _set_accuracy_limits(axes: Axes, curve: SynclineCurve, worst_m: float) -> None:
+    errors = [curve.floor_m, worst_m, *(e for e in (curve.target_m, curve.total_m) if e)]
+    axes.set_ylim(1.0 / (max(errors) * 1.3), 2.5 / min(errors))
+
+
+def _regions(axes: Axes, curve: SynclineCurve) -> None:
+    """Sync-bound left of 1/tau_crit (shaded), sensor-bound right of it."""
+    if not curve.tau_crit_s:
+        return
+    border = 1.0 / curve.tau_crit_s
+    left, right = axes.get_xlim()
+    axes.axvspan(left, border, color=SHADE, linewidth=0, zorder=0)
+    axes.axvline(border, color=MUTED, linewidth=1, linestyle=(0, (2, 2)), zorder=1)
+    for text, ends in (("sync-bound", (left, border)), ("sensor-bound", (border, right))):
+        axes.annotate(
+            text,
+            (math.sqrt(ends[0] * ends[1]), 0.015),
+            xycoords=("data", "axes fraction"),
+            ha="center",
+            va="bottom",
+            color=MUTED,
+        )
+    axes.annotate(
+        f"\u03c4_crit {numbers.time(curve.tau_crit_s, 3)}",
+        (border, 0.10),
+        xycoords=("data", "axes fraction"),
+        xytext=(5, 0),
+        textcoords="offset points",
+        color=INK,
+    )
+
+
+def _asymptotes(axes: Axes, curve: SynclineCurve, low: float, high: float) -> None:
+    """Roof 1/floor and slope 1/(rate tau)."""
+    left, right = axes.get_xlim()
+    roof = 1.0 / curve.floor_m
+    dashes: dict[str, Any] = {
+        "color": MUTED,
+        "linewidth": 1.0,
+        "linestyle": (0, (5, 3)),
+        "zorder": 2,
+    }
+    axes.plot([left, right], [roof, roof], **dashes)
+    axes.annotate(
+        f"roof {numbers.length(curve.floor_m, 3)}",
+        (left, roof),
+        xytext=(6, 4),
+        textcoords="offset points",
+        color=MUTED,
+    )
+    if curve.rate_mps > 0:
+        ends = [1.0 / high, min(right, 1.6 * curve.rate_mps / curve.floor_m)]
+        axes.plot(ends, [x / curve.rate_mps for x in ends], **dashes)
+        place = ends[0] * (right / left) ** 0.12
+        axes.annotate(
+            f"slope {numbers.speed(curve.rate_mps, 3)}",
+            (place, place / curve.rate_mps),
+            xytext=(8, -6),
+            textcoords="offset points",
+            va="top",
+            color=MUTED,
+        )
+
+
+def _target_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
+    """Target line and operating point, in groups of their own for the page's script."""
+    left, right = axes.get_xlim()
+    if curve.target_m:
+        target = axes.plot([left, right], [1 / curve.target_m] * 2, color=WARN, linewidth=1.6)[0]
+        target.set_gid("target-line")
+        label = axes.annotate(
+            f"target {numbers.length(curve.target_m, 4)}",
+            (right, 1 / curve.target_m),
+            xytext=(-4, 4 if curve.target_m < curve.floor_m else -4),
+            textcoords="offset points",
+            ha="right",
+            va="bottom" if curve.target_m < curve.floor_m else "top",
+            color=WARN,
+        )
+        label.set_gid("target-label")
+    if curve.total_m is None or curve.tau_s is None:
+        return
+    met = curve.target_m is None or curve.total_m <= curve.target_m
+    point = axes.plot(
+        [1.0 / max(curve.tau_s, low)],
+        [1.0 / curve.total_m],
+        marker="o" if met else "X",
+        markersize=11,
+        color=GOOD if met else BAD,
+        markeredgecolor=SURFACE,
+        markeredgewidth=1.5,
+        linestyle="none",
+        zorder=5,
+        clip_on=False,
+    )[0]
+    point.set_gid("operating-point")
+
+
+def _syncline_labels(axes: Axes) -> None:
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    scales.set_ticks(axes, "x", scales.decades(left, right), scales.power_of_ten)
+    scales.set_ticks(axes, "y", scales.log_ticks(bottom, top), lambda v: f"{v:g}")
+    axes.set_xlabel("synchronisation accuracy 1/\u03c4 [1/s]")
+    axes.set_ylabel("accuracy 1/error [1/m]")
+    scales.grid(axes)
+    scales.inverse_axis(axes, "x", "timestamp error \u03c4", scales.short_time)
+    scales.inverse_axis(axes, "y", "worst-case error", scales.short_length)
+
+
+def _describe(curve: SynclineCurve) -> str:
+    parts = [
+        "Accuracy against synchronisation accuracy on logarithmic axes.",
+        f"Roof at {numbers.length(curve.floor_m)} of error, slope {numbers.speed(curve.rate_mps)}.",
+    ]
+    if curve.tau_crit_s:
+        parts.append(f"They meet at tau_crit {numbers.time(curve.tau_crit_s)}.")
+    if curve.total_m is not None and curve.tau_s is not None:
+        parts.append(
+            f"The design sits at tau {numbers.time(curve.tau_s)} with an error of "
+            f"{numbers.length(curve.total_m)}."
+        )
+    if curve.target_m:
+        parts.append(f"The target is {numbers.length(curve.target_m)}.")
+    return " ".join(parts)
+
+
+@dataclass(frozen=True, slots=True)
+class TauBar:
+    """One sensor's timestamp error beside the largest it may have."""
+
+    label: str
+    tau_s: float
+    tau_crit_s: float | None
+    within: bool
+
+
+def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineFigure:
+    """tau of each sensor as a bar up to its tau_crit mark, on a logarithmic time axis."""
+    known = [v for b in bars for v in (b.tau_s, b.tau_crit_s) if v]
+    low = min(known, default=1e-6) / 5
+    high = max(known, default=1.0) * 5
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        axes.set_xscale("log")
+        axes.set_xlim(low, high)
+        axes.set_ylim(len(bars) - 0.4, -0.6)
+        for row, bar in enumerate(bars):
+            _tau_row(axes, row, bar, low, high)
+        scales.set_ticks(axes, "x", scales.log_ticks(low, high), scales.short_time)
+        scales.set_ticks(axes, "y", range(len(bars)), lambda row: bars[int(row)].label)
+        scales.hide_ticks(axes, "y")
+        scales.grid(axes, "x")
+        axes.set_xlabel("timestamp error \u03c4 (bar) and \u03c4_crit (mark)")
+
+    spoken = "; ".join(
+        f"{b.label}: tau {numbers.time(b.tau_s)}, tau_crit {numbers.time_limit(b.tau_crit_s)}, "
+        + ("within" if b.within else "exceeded")
+        for b in bars
+    )
+    title = "Timestamp error of each sensor against its tau_crit"
+    return draw(name, title, spoken, (WIDTH, 64.0 + 27.0 * len(bars)), build)
+
+
+def _tau_row(axes: Axes, row: int, bar: TauBar, low: float, high: float) -> None:
+    colour = GOOD if bar.within else BAD
+    end = max(bar.tau_s, low)
+    crit = bar.tau_crit_s or high
+    axes.plot([low, high], [row, row], color=SHADE, linewidth=13, solid_capstyle="butt", zorder=1)
+    axes.plot([low, end], [row, row], color=colour, linewidth=13, solid_capstyle="butt", zorder=2)
+    if bar.tau_crit_s:
+        axes.plot([crit, crit], [row - 0.4, row + 0.4], color=INK, linewidth=2.2, zorder=4)
+    word = "\u2713" if bar.within else "\u2717"
+    axes.annotate(
+        word,
+        (min(end, high / 1.5), row),
+        xytext=(6, 0),
+        textcoords="offset points",
+        va="center",
+        color=colour,
+        fontweight="bold",
+        zorder=5,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class LedgerTerm:
+    """One additive term of the total error."""
+
+    label: str
+    value_m: float
+    kind: str  # sensor, sync or systematic
+
+
+_HATCH = {"sensor": "", "sync": "///", "systematic": "xxx"}
+
+
+def ledger(
+    terms: Sequence[LedgerTerm], target_m: float | None, name: str = "fig-ledger"
+) -> InlineFigure:
+    """The terms as a waterfall that adds up to the total, with the target."""
+    total = math.fsum(t.value_m for t in terms)
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        start = 0.0
+        for row, term in enumerate(terms):
+            colour = {"sensor": SERIES[0], "sync": SERIES[1]}.get(term.kind, SERIES[3])
+            axes.barh(
+                row, term.value_m, left=start, height=0.62, color=colour, edgecolor=SURFACE,
+                linewidth=0.8, hatch=_HATCH.get(term.kind, ""), zorder=3,
+            )  # fmt: skip
+            start += term.value_m
+            _beside(axes, start, row, numbers.length(term.value_m, 3))
+        axes.barh(len(terms), total, height=0.62, color=INK, zorder=3)
+        _beside(axes, total, len(terms), numbers.length(total, 4))
+        axes.set_ylim(len(terms) + 0.6, -0.9)
+        axes.set_xlim(0, 1.22 * max(total, target_m or 0.0) or 1.0)
+        if target_m:
+            _mark_target(axes, target_m)
+        labels = [*(t.label for t in terms), "total"]
+        scales.set_ticks(axes, "y", range(len(labels)), lambda row: labels[int(row)])
+        scales.hide_ticks(axes, "y")
+        _length_ticks(axes)
+        scales.grid(axes, "x")
+
+    spoken = "; ".join(f"{t.label} {numbers.length(t.value_m)}" for t in terms)
+    spoken += f"; total {numbers.length(total)}"
+    if target_m:
+        spoken += f"; target {numbers.length(target_m)}"
+    size = (WIDTH, 70.0 + 23.0 * (len(terms) + 1))
+    return draw(name, "Terms that add up to the total error", spoken, size, build)
+
+
+def _beside(axes: Axes, x: float, row: float, text: str) -> None:
+    axes.annotate(
+        text, (x, row), xytext=(5, 0), textcoords="offset points", va="center", color=INK,
+        zorder=5,
+    )  # fmt: skip
+
+
+def _mark_target(axes: Axes, target_m: float) -> None:
+    axes.axvline(target_m, color=WARN, linewidth=1.6, zorder=4)
+    axes.annotate(
+        f"target {numbers.length(target_m, 4)}",
+        (target_m, 1.0),
+        xycoords=("data", "axes fraction"),
+        xytext=(-4, -2),
+        textcoords="offset points",
+        ha="right",
+        va="top",
+        color=WARN,
+    )
+
+
+def _length_ticks(axes: Axes) -> None:
+    """Linear ticks in the unit ladder of the axis's end."""
+    from matplotlib.ticker import MaxNLocator
+
+    ticks = [float(t) for t in MaxNLocator(6).tick_values(*axes.get_xlim())]
+    high = axes.get_xlim()[1]
+    scales.set_ticks(
+        axes,
+        "x",
+        [t for t in ticks if 0 <= t <= high],
+        lambda value: "0" if value == 0 else scales.short_length(value),
+    )

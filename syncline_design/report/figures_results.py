@@ -1,0 +1,228 @@
+"""Figures of computed results: Monte Carlo, simulation against the Syncline, Pareto front."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from syncline_design.report import axes as scales
+from syncline_design.report import numbers
+from syncline_design.report.figures import WIDTH
+from syncline_design.report.palette import BAD, GOOD, INK, LINE, MUTED, SERIES, SURFACE, WARN
+from syncline_design.report.svg import InlineFigure, add_axes, draw
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Histogram:
+    """Density of the simulated error over bins, with marks on the error axis."""
+
+    edges_m: tuple[float, ...]
+    density: tuple[float, ...]
+    marks: tuple[tuple[str, float], ...]  # (word, error) of the quantiles
+    target_m: float | None
+    syncline_m: float | None
+
+
+def error_histogram(data: Histogram, name: str = "fig-mc") -> InlineFigure:
+    """Distribution of the simulated error, target, Syncline and quantiles marked."""
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        top = max(data.density, default=1.0) or 1.0
+        axes.stairs(data.density, data.edges_m, fill=True, color=SERIES[0], alpha=0.35, zorder=2)
+        axes.stairs(data.density, data.edges_m, color=SERIES[0], linewidth=1.4, zorder=3)
+        axes.set_ylim(0, 1.42 * top)
+        vertical = [*data.marks]
+        colours = [INK] * len(vertical)
+        for word, value, colour in (
+            ("target", data.target_m, WARN),
+            ("Syncline", data.syncline_m, BAD),
+        ):
+            if value is not None:
+                vertical.append((word, value))
+                colours.append(colour)
+        right = max([data.edges_m[-1], *(value for _, value in vertical)]) * 1.05
+        axes.set_xlim(min(data.edges_m[0], 0.0), right)
+        _vertical_marks(axes, vertical, colours, right)
+        _plain_length_axis(axes)
+        axes.set_yticks([])
+        axes.spines["left"].set_visible(False)
+        axes.set_xlabel("georeferencing error")
+
+    spoken = "; ".join(f"{word} at {numbers.length(value)}" for word, value in data.marks)
+    for word, value in (("target", data.target_m), ("Syncline", data.syncline_m)):
+        if value is not None:
+            spoken += f"; {word} at {numbers.length(value)}"
+    return draw(name, "Distribution of the simulated error", spoken, (WIDTH, 290.0), build)
+
+
+def _vertical_marks(
+    axes: Axes, marks: Sequence[tuple[str, float]], colours: Sequence[str], right: float
+) -> None:
+    """Labelled vertical lines, labels on four levels so that near ones do not cover each other."""
+    top = axes.get_ylim()[1]
+    ordered = sorted(zip(marks, colours, strict=True), key=lambda item: item[0][1])
+    for index, ((word, value), colour) in enumerate(ordered):
+        level = 0.985 - 0.07 * (index % 4)
+        solid = colour != INK
+        axes.plot(
+            [value, value], [0, level * top], color=colour, linewidth=1.6 if solid else 1.0,
+            linestyle="-" if solid else (0, (3, 2)), zorder=4,
+        )  # fmt: skip
+        on_right = value < 0.72 * right
+        axes.annotate(
+            f"{word} {numbers.length(value, 3)}",
+            (value, level * top),
+            xytext=(4 if on_right else -4, 0),
+            textcoords="offset points",
+            ha="left" if on_right else "right",
+            va="top",
+            color=colour,
+            zorder=6,
+        )
+
+
+def _plain_length_axis(axes: Axes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = axes.get_xlim()
+    places = [float(t) for t in MaxNLocator(6).tick_values(low, high) if low <= t <= high]
+    scales.set_ticks(axes, "x", places, lambda v: "0" if v == 0 else scales.short_length(v))
+    scales.grid(axes, "x")
+
+
+@dataclass(frozen=True, slots=True)
+class GridPoint:
+    """Worst simulated error and Syncline at one timestamp error."""
+
+    tau_s: float
+    worst_m: float
+    syncline_m: float
+
+
+def simulated_against_syncline(
+    points: Sequence[GridPoint], name: str = "fig-grid", title: str | None = None
+) -> InlineFigure:
+    """Worst case of the simulator over a grid of tau, beside the Syncline, and their ratio."""
+    shown = [p for p in points if p.tau_s > 0 and p.worst_m > 0 and p.syncline_m > 0]
+    ratios = [p.worst_m / p.syncline_m for p in shown]
+
+    def build(figure: Figure) -> None:
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
+        inverse = [1.0 / p.tau_s for p in shown]
+        for axes in (upper, lower):
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.set_xscale("log")
+        upper.set_yscale("log")
+        upper.plot(inverse, [1.0 / p.syncline_m for p in shown], color=LINE, linewidth=2.2,
+                   label="Syncline")  # fmt: skip
+        upper.plot(inverse, [1.0 / p.worst_m for p in shown], color=SERIES[1], linestyle="none",
+                   marker="o", markersize=5, markeredgecolor=SURFACE, label="simulated worst case",
+                   )  # fmt: skip
+        upper.legend(loc="lower right")
+        upper.set_ylabel("accuracy 1/error [1/m]")
+        low, high = upper.get_ylim()
+        scales.set_ticks(upper, "y", scales.log_ticks(low, high), lambda v: f"{v:g}")
+        scales.inverse_axis(upper, "x", "timestamp error \u03c4", scales.short_time)
+        lower.axhline(1.0, color=MUTED, linewidth=1)
+        lower.plot(inverse, ratios, color=SERIES[1], marker="o", markersize=3.5, linewidth=1)
+        lower.set_ylabel("ratio")
+        lower.set_xlabel("synchronisation accuracy 1/\u03c4 [1/s]")
+        low, high = upper.get_xlim()
+        scales.set_ticks(lower, "x", scales.decades(low, high), scales.power_of_ten)
+        for axes in (upper, lower):
+            scales.grid(axes)
+
+    spoken = "No point to show."
+    if ratios:
+        spoken = (
+            f"{len(ratios)} timestamp errors from {numbers.time(min(p.tau_s for p in shown))} to "
+            f"{numbers.time(max(p.tau_s for p in shown))}: the simulated worst case is "
+            f"{numbers.percent(min(ratios))} to {numbers.percent(max(ratios))} of the Syncline."
+        )
+    heading = title or "Simulated worst case against the Syncline"
+    return draw(name, heading, spoken, (WIDTH, 400.0), build)
+
+
+@dataclass(frozen=True, slots=True)
+class FrontPoint:
+    """One Pareto-optimal design."""
+
+    cost: float
+    error_m: float
+    chosen: bool
+
+
+def pareto_front(
+    points: Sequence[FrontPoint],
+    currency: str,
+    target_m: float | None,
+    cost_limit: float | None,
+    name: str = "fig-front",
+) -> InlineFigure:
+    """The exact front of cost against error as a staircase, the chosen design on it."""
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        costs = [p.cost for p in points]
+        errors = [p.error_m for p in points]
+        span = max(costs) - min(costs) or max(costs) or 1.0
+        right = max([max(costs) + 0.15 * span, *([1.04 * cost_limit] if cost_limit else [])])
+        axes.set_yscale("log")
+        axes.step([*costs, right], [*errors, errors[-1]], where="post", color=LINE, linewidth=2)
+        axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)
+        for point in points:
+            if point.chosen:
+                axes.plot([point.cost], [point.error_m], "D", color=GOOD, markersize=10,
+                          markeredgecolor=SURFACE, markeredgewidth=1.4, zorder=5)  # fmt: skip
+                axes.annotate("chosen", (point.cost, point.error_m), xytext=(9, 7),
+                              textcoords="offset points", color=GOOD, fontweight="bold",
+                              )  # fmt: skip
+        axes.set_xlim(max(0.0, min(costs) - 0.12 * span), right)
+        bounds = [*errors, *([target_m] if target_m else [])]
+        axes.set_ylim(min(bounds) / 1.5, max(bounds) * 1.6)
+        _limits(axes, target_m, cost_limit, currency)
+        low, high = axes.get_ylim()
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
+        _money_ticks(axes)
+        axes.set_xlabel(f"cost [{currency}]")
+        axes.set_ylabel("worst-case error (Syncline)")
+        scales.grid(axes)
+
+    spoken = (
+        f"{len(points)} designs from {numbers.money(points[0].cost, currency)} with an error of "
+        f"{numbers.length(points[0].error_m)} to {numbers.money(points[-1].cost, currency)} with "
+        f"{numbers.length(points[-1].error_m)}."
+    )
+    for point in points:
+        if point.chosen:
+            spoken += (
+                f" Chosen: {numbers.money(point.cost, currency)}, {numbers.length(point.error_m)}."
+            )
+    return draw(name, "Pareto front of cost against error", spoken, (WIDTH, 330.0), build)
+
+
+def _limits(axes: Axes, target_m: float | None, cost_limit: float | None, currency: str) -> None:
+    if target_m:
+        axes.axhline(target_m, color=WARN, linewidth=1.6)
+        axes.annotate(f"target {numbers.length(target_m, 4)}", (1, target_m),
+                      xycoords=("axes fraction", "data"), xytext=(-4, 4),
+                      textcoords="offset points", ha="right", color=WARN)  # fmt: skip
+    if cost_limit:
+        axes.axvline(cost_limit, color=WARN, linewidth=1.6, linestyle=(0, (5, 3)))
+        axes.annotate(f"limit {numbers.money(cost_limit, currency)}", (cost_limit, 1),
+                      xycoords=("data", "axes fraction"), xytext=(-4, -2),
+                      textcoords="offset points", ha="right", va="top", color=WARN)  # fmt: skip
+
+
+def _money_ticks(axes: Axes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = axes.get_xlim()
+    places = [float(t) for t in MaxNLocator(5).tick_values(low, high) if low <= t <= high]
+    scales.set_ticks(axes, "x", places, numbers.count)

@@ -1,0 +1,112 @@
+"""Figures as people read them in reports; the units themselves come from `units`."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Final
+
+from syncline_design.units import Dimension, format_quantity
+
+MISSING: Final = "\N{EM DASH}"
+_TYPOGRAPHIC = (
+    (" us", " \N{MICRO SIGN}s"),
+    (" um", " \N{MICRO SIGN}m"),
+    (" uW", " \N{MICRO SIGN}W"),
+    ("m/s^2", "m/s\N{SUPERSCRIPT TWO}"),
+    ("-", "\N{MINUS SIGN}"),
+)
+
+
+def finite(value: Any) -> float | None:
+    """The value as a float; None when it is missing, not a number or infinite."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return float(value) if math.isfinite(value) else None
+
+
+def _shown(value: Any, dimension: Dimension, digits: int, currency: str = "EUR") -> str:
+    number = finite(value)
+    if number is None:
+        return MISSING
+    text = format_quantity(number, dimension, digits, currency)
+    if dimension is Dimension.MONEY:
+        return text.replace(" ", "\N{NO-BREAK SPACE}")
+    for plain, printed in _TYPOGRAPHIC:
+        text = text.replace(plain, printed)
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def length(value: Any, digits: int = 4) -> str:
+    """Metres as `18.13 mm`."""
+    return _shown(value, Dimension.LENGTH, digits)
+
+
+def time(value: Any, digits: int = 4) -> str:
+    """Seconds as `12 us`, typeset."""
+    return _shown(value, Dimension.TIME, digits)
+
+
+def time_limit(value: Any, digits: int = 4) -> str:
+    """A tau_crit: null means that motion does not matter, so nothing limits it."""
+    return "unlimited" if value is None or value == math.inf else time(value, digits)
+
+
+def speed(value: Any, digits: int = 4) -> str:
+    """Metres per second."""
+    return _shown(value, Dimension.SPEED, digits)
+
+
+def angular_rate(value: Any, digits: int = 4) -> str:
+    """Radians per second, shown in degrees per second."""
+    return _shown(value, Dimension.ANGULAR_RATE, digits)
+
+
+def mass(value: Any, digits: int = 4) -> str:
+    """Kilograms."""
+    return _shown(value, Dimension.MASS, digits)
+
+
+def power(value: Any, digits: int = 4) -> str:
+    """Watts."""
+    return _shown(value, Dimension.POWER, digits)
+
+
+def money(value: Any, currency: str) -> str:
+    """An amount with thousands grouped: `38 400 EUR`."""
+    return _shown(value, Dimension.MONEY, 4, currency)
+
+
+def number(value: Any, digits: int = 4) -> str:
+    """A plain number."""
+    return _shown(value, Dimension.DIMENSIONLESS, digits)
+
+
+def count(value: Any) -> str:
+    """A whole number with thousands grouped."""
+    amount = finite(value)
+    return MISSING if amount is None else f"{amount:,.0f}".replace(",", "\N{NO-BREAK SPACE}")
+
+
+def percent(fraction: Any, digits: int = 3) -> str:
+    """0.124 as `12.4 %`."""
+    amount = finite(fraction)
+    if amount is None:
+        return MISSING
+    return number(100.0 * amount, digits) + "\N{NO-BREAK SPACE}%"
+
+
+def in_unit(value: Any, unit: str, digits: int = 4) -> str:
+    """A requirement's figure: lengths, times, masses and powers by their ladder, else as it is."""
+    match unit:
+        case "m":
+            return length(value, digits)
+        case "s":
+            return time(value, digits)
+        case "kg":
+            return mass(value, digits)
+        case "W":
+            return power(value, digits)
+        case "" | "1" | "ratio":
+            return number(value, digits)
+        case _:
+            return money(value, unit)

@@ -1,0 +1,7 @@
+"""HTML pages by kind; jinja2 and matplotlib load with the first one."""
+
+from __future__ import annotations
+
+from syncline_design.report.verdict_page import render_verdict
+
+__all__ = ["render_verdict"]

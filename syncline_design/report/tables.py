@@ -1,0 +1,53 @@
+"""Tables of a page: cells with their text, sort key and tone; one template draws them all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Tone = Literal["", "good", "bad", "warn", "muted"]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One cell: what it says, what it sorts by (its text when None), its colour and symbol."""
+
+    text: str
+    sort: float | None = None
+    tone: Tone = ""
+    mark: str = ""
+    code: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """One column heading; figures are set flush right."""
+
+    text: str
+    numeric: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A sortable table; the first cell of a row names the row."""
+
+    caption: str
+    heads: tuple[Head, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    note: str = ""
+
+
+def table(
+    caption: str,
+    heads: Iterable[str],
+    rows: Iterable[Iterable[Cell | str]],
+    note: str = "",
+) -> Table:
+    """A table; a heading that ends in ` #` is numeric, a plain string is a plain cell."""
+    return Table(
+        caption,
+        tuple(Head(h.removesuffix(" #"), h.endswith(" #")) for h in heads),
+        tuple(tuple(c if isinstance(c, Cell) else Cell(c) for c in row) for row in rows),
+        note,
+    )

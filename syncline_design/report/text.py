@@ -1,0 +1,79 @@
+"""Text that came from a spec, made harmless and visible before it enters any output."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+_REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
+_CONTROL_PICTURES = 0x2400  # U+2400..U+241F picture the C0 controls, U+2421 pictures DEL
+_DIRECTION_OR_BREAK = {
+    0x061C, 0x200E, 0x200F, 0x2028, 0x2029,
+    *range(0x202A, 0x202F), *range(0x2066, 0x206A), 0xFEFF,
+}  # fmt: skip
+_SPREADSHEET_FORMULA = ("=", "+", "-", "@", "\t", "\r")
+_MARKDOWN_SPECIAL = re.compile(r"([\\`*_{}\[\]()#+!|~^$])")
+
+
+def _visible_character(code: int) -> str | None:
+    """What stands in for a character that must not reach an output as it is; None: keep it."""
+    if code < 0x20:
+        return chr(_CONTROL_PICTURES + code)
+    if code == 0x7F:
+        return "\N{SYMBOL FOR DELETE}"
+    if 0x80 <= code <= 0x9F or 0xD800 <= code <= 0xDFFF or (code & 0xFFFE) == 0xFFFE:
+        return _REPLACEMENT
+    if code in _DIRECTION_OR_BREAK:
+        return f"\N{LEFT-POINTING ANGLE BRACKET}U+{code:04X}\N{RIGHT-POINTING ANGLE BRACKET}"
+    return None
+
+
+def visible(text: object) -> str:
+    """One line of text in which control, direction and broken characters show as pictures.
+
+    A newline becomes U+240A, BEL U+2407, a bidi override its code point in brackets, a lone
+    surrogate U+FFFD: the result is valid in XML 1.0, cannot start a new line and cannot reorder
+    what stands beside it.
+    """
+    plain = str(text)
+    if plain.isascii() and plain.isprintable():
+        return plain
+    return "".join(_visible_character(ord(c)) or c for c in plain)
+
+
+def spreadsheet_safe(text: object) -> str:
+    """A CSV text cell that no spreadsheet reads as a formula (a leading apostrophe stops it)."""
+    shown = visible(text)
+    raw = str(text)
+    return "'" + shown if raw.lstrip(" ").startswith(_SPREADSHEET_FORMULA) else shown
+
+
+def markdown_safe(text: object) -> str:
+    """Text that Markdown shows literally: no markup, no HTML, no mention, no table cell end."""
+    shown = visible(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    escaped = _MARKDOWN_SPECIAL.sub(r"\\\1", shown)
+    return escaped.replace("@", "&#64;").replace("://", ":&#8203;//")
+
+
+def sentence_list(items: list[str]) -> str:
+    """`a`, `a and b`, `a, b and c`."""
+    if len(items) < 2:
+        return "".join(items)
+    return ", ".join(items[:-1]) + " and " + items[-1]
+
+
+def harmless(value: Any) -> Any:
+    """A copy of nested JSON data in which every text, keys included, is `visible`."""
+    if isinstance(value, str):
+        return visible(value)
+    if isinstance(value, Mapping):
+        return {visible(key): harmless(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [harmless(entry) for entry in value]
+    return value
+
+
+def shortened(text: str, most: int = 30) -> str:
+    """Text for a figure's label; the tables have it in full."""
+    return text if len(text) <= most else text[: most - 1] + "\N{HORIZONTAL ELLIPSIS}"

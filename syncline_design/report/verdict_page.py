@@ -1,0 +1,375 @@
+"""The design report: one verdict as one offline HTML page."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from syncline_design.report import (
+    errata,
+    figures,
+    figures_results,
+    numbers,
+    page,
+    verdict_tables,
+    verdict_words,
+)
+from syncline_design.report.svg import InlineFigure
+from syncline_design.report.text import harmless, shortened
+from syncline_design.report.verdict_words import Json, items, part
+
+
+@dataclass(frozen=True, slots=True)
+class Explorer:
+    """What the page's script needs to move tau and the target; null where unknown."""
+
+    floor_m: float
+    rate_mps: float
+    tau_s: float
+    tau_crit_s: float | None
+    target_m: float | None
+    sync_limit: float
+    others_pass: bool
+    tau_span: tuple[float, float]
+    target_span: tuple[float, float]
+
+
+def render_verdict(verdict: Json) -> str:
+    """The HTML report of one verdict (schema syncline-design/verdict/v1); same input, same bytes.
+
+    Any optional part that is missing or null is left out of the page.
+    """
+    verdict = harmless(verdict)
+    drawn = _figures(verdict)
+    sections = _sections(verdict, drawn)
+    return page.render_page(
+        "verdict.html.j2",
+        kind="Design report",
+        contents=[(key, label) for key, label in _CONTENTS if sections[key]],
+        sections=sections,
+        outcome=verdict_words.outcome(verdict),
+        name=str(part(verdict, "spec").get("name") or "Unnamed system"),
+        sentence=verdict_words.design_sentence(verdict),
+        key_facts=_key_facts(verdict),
+        figures={key: _drawing(drawn.get(key)) for key in _FIGURES},
+        box=drawn["syncline"].box if "syncline" in drawn else None,
+        numbers=numbers,
+        explorer=_explorer(verdict),
+        syncline_facts=_syncline_facts(verdict),
+        simulation_facts=_simulation_facts(verdict),
+        proof=_proof(verdict),
+    )
+
+
+def _drawing(figure: InlineFigure | None) -> Any:
+    return None if figure is None else page.trusted_svg(figure.svg)
+
+
+_FIGURES = ("syncline", "timing", "ledger", "histogram", "grid", "choice")
+_CONTENTS = (
+    ("infeasibility", "Why not"),
+    ("requirements", "Requirements"),
+    ("warnings", "Warnings"),
+    ("payload", "Payload"),
+    ("timing", "Timing"),
+    ("syncline", "Syncline"),
+    ("ledger", "Ledger"),
+    ("simulation", "Simulation"),
+    ("choice", "Choice"),
+    ("effects", "Known effects"),
+    ("basis", "Basis"),
+    ("provenance", "Provenance"),
+)
+
+
+def _sections(verdict: Json, drawn: dict[str, InlineFigure]) -> dict[str, Any]:
+    """Content of every section by key; empty where the verdict has none."""
+    tables = verdict_tables
+    has_roles = next(tables.roles(verdict), None) is not None
+    choice = part(verdict, "choice")
+    candidates: dict[str, Any] = {
+        "infeasibility": part(verdict, "infeasibility"),
+        "requirements": tables.requirements(verdict) if verdict.get("requirements") else None,
+        "warnings": items(verdict, "warnings"),
+        "payload": (tables.payload(verdict), tables.shared(verdict)) if has_roles else None,
+        "timing": tables.taus(verdict) if has_roles else None,
+        "syncline": tables.models(verdict) if "syncline" in drawn else None,
+        "ledger": tables.ledger(verdict) if "ledger" in drawn else None,
+        "simulation": tables.quantiles(verdict) if part(verdict, "monte_carlo") else None,
+        "choice": _choice_tables(verdict) if choice else None,
+        "effects": items(verdict, "effects"),
+        "basis": _basis(verdict),
+        "provenance": _provenance(verdict),
+    }
+    return candidates
+
+
+def _choice_tables(verdict: Json) -> list[Any]:
+    tables = verdict_tables
+    found = (
+        tables.priced(verdict, "front", "Pareto front: cost against error", "Error #"),
+        tables.priced(verdict, "staircase", "Price staircase of accuracy", "Accuracy reached #"),
+        tables.priced(verdict, "next_best", "What else almost won", "Error #"),
+        tables.excluded(verdict),
+    )
+    return [entry for entry in found if entry is not None]
+
+
+def _basis(verdict: Json) -> dict[str, Any] | None:
+    tables = [
+        t for t in (verdict_tables.assumptions(verdict), verdict_tables.sources(verdict)) if t
+    ]
+    notes = errata.relevant(verdict)
+    return {"tables": tables, "errata": notes} if tables or notes else None
+
+
+def _provenance(verdict: Json) -> list[tuple[str, str]]:
+    provenance = part(verdict, "provenance")
+    labels = (
+        ("version", "syncline-design"),
+        ("spec_sha256", "Spec, SHA-256"),
+        ("catalogs_sha256", "Catalogs, SHA-256"),
+        ("seed", "Seed"),
+        ("python", "Python"),
+        ("numpy", "NumPy"),
+    )
+    known = [(label, str(provenance[key])) for key, label in labels
+             if provenance.get(key) is not None]  # fmt: skip
+    file = part(verdict, "spec").get("file")
+    return [*([("Spec file", str(file))] if file else []), *known]
+
+
+def _key_facts(verdict: Json) -> list[tuple[str, str]]:
+    """Price, error, tightest margin: the answer in figures."""
+    design, syncline = part(verdict, "design"), part(verdict, "syncline")
+    facts = []
+    if design.get("cost") is not None:
+        currency = verdict_tables.currency_of(verdict)
+        facts.append(("Price", numbers.money(design["cost"], currency)))
+    target = accuracy_target(verdict)
+    if syncline.get("total_m") is not None:
+        total = numbers.length(syncline["total_m"])
+        of = f" of {numbers.length(target)}" if target else ""
+        facts.append(("Worst-case error", total + of))
+    row = verdict_words.tightest(items(verdict, "requirements"))
+    if row is not None:
+        facts.append(("Tightest margin", f"{verdict_words.margin_text(row)} ({row.get('id')})"))
+    probability = numbers.finite(
+        part(part(verdict, "monte_carlo"), "probability_within_target").get("value")
+    )
+    if probability is not None:
+        facts.append(("Simulated within target", numbers.percent(probability, 4)))
+    for key, label, shown in (("mass", "Mass", numbers.mass), ("power", "Power", numbers.power)):
+        if design.get(key) is not None:
+            facts.append((label, shown(design[key])))
+    return facts
+
+
+def _syncline_facts(verdict: Json) -> list[tuple[str, str]]:
+    syncline = part(verdict, "syncline")
+    facts = [
+        ("Sensor error (roof)", numbers.length(syncline.get("sensor_error_m"))),
+        ("Synchronisation rate (slope)", numbers.speed(syncline.get("sync_rate_mps"))),
+        ("\u03c4 of the system", numbers.time(syncline.get("tau_s"))),
+        ("\u03c4_crit of the system", numbers.time_limit(syncline.get("tau_crit_s"))),
+        ("Synchronisation error", numbers.length(syncline.get("sync_error_m"))),
+        ("Total error", numbers.length(syncline.get("total_m"))),
+    ]
+    if syncline.get("systematic_error_m"):
+        facts.insert(-1, ("Known effects", numbers.length(syncline["systematic_error_m"])))
+    return facts
+
+
+def _simulation_facts(verdict: Json) -> list[tuple[str, str]]:
+    monte_carlo = part(verdict, "monte_carlo")
+    facts = [
+        ("Samples", numbers.count(monte_carlo.get("samples"))),
+        ("Envelope", str(monte_carlo.get("envelope") or numbers.MISSING)),
+        ("Seed", str(monte_carlo.get("seed", numbers.MISSING))),
+    ]
+    within = part(monte_carlo, "probability_within_target")
+    if within.get("value") is not None:
+        interval = (
+            f"{numbers.percent(within.get('low'), 5)} to {numbers.percent(within.get('high'), 5)}"
+        )
+        facts.append(
+            ("Within the target", f"{numbers.percent(within['value'], 5)} (95 %: {interval})")
+        )
+    worst = part(monte_carlo, "worst_case")
+    if worst.get("value_m") is not None:
+        ratio = numbers.percent(worst.get("ratio_to_syncline"))
+        facts.append(
+            ("Worst case found", f"{numbers.length(worst['value_m'])}, {ratio} of the Syncline")
+        )
+    return facts
+
+
+def _proof(verdict: Json) -> str:
+    """How it is known that nothing better exists."""
+    proof = part(part(verdict, "choice"), "proof")
+    if not proof:
+        return ""
+    methods = {"front": "the exact Pareto front", "milp": "an integer program",
+               "enumeration": "enumeration of all designs"}  # fmt: skip
+    method = methods.get(str(proof.get("method")), str(proof.get("method")))
+    combinations = numbers.finite(proof.get("combinations"))
+    among = f" among {numbers.count(combinations)} combinations" if combinations else ""
+    optimal = "proven optimal" if proof.get("optimal") else "not proven optimal"
+    checked = ", recomputed exactly afterwards" if proof.get("rechecked") else ""
+    return f"Found by {method}{among}: {optimal}{checked}."
+
+
+def accuracy_target(verdict: Json) -> float | None:
+    """The tightest accuracy limit [m]."""
+    limits = [
+        float(row["limit"])
+        for row in items(verdict, "requirements")
+        if row.get("kind") == "accuracy" and numbers.finite(row.get("limit")) is not None
+    ]
+    return min(limits, default=None)
+
+
+def _curve(verdict: Json) -> figures.SynclineCurve | None:
+    syncline = part(verdict, "syncline")
+    sensor = numbers.finite(syncline.get("sensor_error_m"))
+    rate = numbers.finite(syncline.get("sync_rate_mps"))
+    if not sensor or rate is None:
+        return None
+    return figures.SynclineCurve(
+        floor_m=sensor + (numbers.finite(syncline.get("systematic_error_m")) or 0.0),
+        rate_mps=rate,
+        tau_crit_s=numbers.finite(syncline.get("tau_crit_s")),
+        tau_s=numbers.finite(syncline.get("tau_s")),
+        total_m=numbers.finite(syncline.get("total_m")),
+        target_m=accuracy_target(verdict),
+        lever_arm_rate_mps=numbers.finite(part(syncline, "lever_arm").get("sync_rate_mps")),
+    )
+
+
+def _figures(verdict: Json) -> dict[str, InlineFigure]:
+    """Every figure the verdict has data for."""
+    drawn: dict[str, InlineFigure] = {}
+    curve = _curve(verdict)
+    target = accuracy_target(verdict)
+    if curve is not None:
+        drawn["syncline"] = figures.syncline(curve)
+    bars = _tau_bars(verdict)
+    if bars:
+        drawn["timing"] = figures.tau_bars(bars)
+    terms = _ledger_terms(verdict)
+    if terms:
+        drawn["ledger"] = figures.ledger(terms, target)
+    drawn |= _simulation_figures(verdict, target)
+    front = _front(verdict)
+    if len(front) > 1:
+        cost_limit = _limit(verdict, "cost")
+        currency = verdict_tables.currency_of(verdict)
+        drawn["choice"] = figures_results.pareto_front(front, currency, target, cost_limit)
+    return drawn
+
+
+def _tau_bars(verdict: Json) -> list[figures.TauBar]:
+    bars = []
+    for stage, role, entry in verdict_tables.roles(verdict):
+        tau, crit = numbers.finite(entry.get("tau_s")), numbers.finite(entry.get("tau_crit_s"))
+        if tau is not None:
+            within = crit is None or tau < crit
+            label = f"{shortened(stage, 18)} \u00b7 {role}"
+            bars.append(figures.TauBar(label, tau, crit, within))
+    return bars
+
+
+def _ledger_terms(verdict: Json) -> list[figures.LedgerTerm]:
+    entries = items(part(verdict, "syncline"), "ledger")
+    many = len({str(entry.get("stage")) for entry in entries if entry.get("stage")}) > 1
+    return [
+        figures.LedgerTerm(
+            (f"{shortened(str(entry['stage']), 14)}: " if many and entry.get("stage") else "")
+            + shortened(str(entry.get("term"))),
+            value,
+            str(entry.get("kind")),
+        )
+        for entry in entries
+        if (value := numbers.finite(entry.get("value_m"))) is not None
+    ]
+
+
+def _simulation_figures(verdict: Json, target: float | None) -> dict[str, InlineFigure]:
+    drawn: dict[str, InlineFigure] = {}
+    monte_carlo = part(verdict, "monte_carlo")
+    histogram = part(monte_carlo, "histogram")
+    edges, density = histogram.get("edges_m") or [], histogram.get("density") or []
+    if len(edges) == len(density) + 1 > 1:
+        marks = tuple(
+            (numbers.percent(float(key), 4), value)
+            for key, entry in part(monte_carlo, "quantiles").items()
+            if (value := numbers.finite(entry.get("value_m"))) is not None
+        )
+        total = numbers.finite(part(verdict, "syncline").get("total_m"))
+        drawn["histogram"] = figures_results.error_histogram(
+            figures_results.Histogram(tuple(edges), tuple(density), marks, target, total)
+        )
+    points = grid_points(items(monte_carlo, "grid"))
+    if len(points) > 1:
+        drawn["grid"] = figures_results.simulated_against_syncline(points)
+    return drawn
+
+
+def grid_points(rows: list[Json]) -> list[figures_results.GridPoint]:
+    """The simulated worst case and the Syncline over tau, incomplete rows left out."""
+    points = []
+    for row in rows:
+        tau = numbers.finite(row.get("tau_s"))
+        worst = numbers.finite(row.get("worst_case_m"))
+        line = numbers.finite(row.get("syncline_m"))
+        if tau and worst and line:
+            points.append(figures_results.GridPoint(tau, worst, line))
+    return sorted(points, key=lambda point: point.tau_s)
+
+
+def _front(verdict: Json) -> list[figures_results.FrontPoint]:
+    cost = numbers.finite(part(verdict, "design").get("cost"))
+    total = numbers.finite(part(verdict, "syncline").get("total_m"))
+    points = []
+    for entry in items(part(verdict, "choice"), "front"):
+        price, error = numbers.finite(entry.get("cost")), numbers.finite(entry.get("error_m"))
+        if price is not None and error:
+            chosen = (
+                price == cost and total is not None and math.isclose(error, total, rel_tol=1e-6)
+            )
+            points.append(figures_results.FrontPoint(price, error, chosen))
+    return sorted(points, key=lambda point: point.cost)
+
+
+def _limit(verdict: Json, kind: str) -> float | None:
+    limits = [
+        float(row["limit"])
+        for row in items(verdict, "requirements")
+        if row.get("kind") == kind and numbers.finite(row.get("limit")) is not None
+    ]
+    return min(limits, default=None)
+
+
+def _explorer(verdict: Json) -> Explorer | None:
+    """Values for the sliders; the total follows the model that decides, in proportion to tau."""
+    curve = _curve(verdict)
+    if curve is None or not curve.tau_s or curve.total_m is None:
+        return None
+    rows = items(verdict, "requirements")
+    fixed = [row for row in rows if row.get("kind") not in ("accuracy", "sync", "monte_carlo")]
+    rate = (curve.total_m - curve.floor_m) / curve.tau_s
+    centre = curve.tau_crit_s or curve.tau_s
+    target = curve.target_m
+    middle = target or curve.total_m
+    return Explorer(
+        floor_m=curve.floor_m,
+        rate_mps=rate,
+        tau_s=curve.tau_s,
+        tau_crit_s=curve.tau_crit_s,
+        target_m=target,
+        sync_limit=_limit(verdict, "sync") or 1.0,
+        others_pass=all(verdict_words.status_of(row).word in ("pass", "waived") for row in fixed),
+        tau_span=(min(centre / 1e3, curve.tau_s / 2), max(centre * 1e2, curve.tau_s * 2)),
+        target_span=(min(middle, curve.floor_m) / 4, max(middle, curve.total_m) * 10),
+    )

@@ -1,0 +1,265 @@
+"""The tables of a verdict page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from syncline_design.report import numbers
+from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.verdict_words import (
+    PRIMITIVES,
+    Json,
+    items,
+    kind_text,
+    margin_text,
+    part,
+    relative_margin,
+    selection_reason,
+    status_of,
+    value_text,
+    waiver_text,
+)
+
+
+def roles(verdict: Json) -> Iterator[tuple[str, str, Json]]:
+    """(stage, role, entry) of every chosen sensor."""
+    for stage in items(part(verdict, "design"), "stages"):
+        for role, entry in part(stage, "roles").items():
+            if isinstance(entry, Mapping):
+                yield str(stage.get("name")), str(role), entry
+
+
+def requirements(verdict: Json) -> Table:
+    """Every requirement with value, limit, margin and where the spec states it."""
+    rows = []
+    for row in items(verdict, "requirements"):
+        state = status_of(row)
+        line = numbers.finite(row.get("line"))
+        where = "implied" if row.get("implied") or not line else f"line {line:.0f}"
+        notes = [str(n) for n in (row.get("note"), _interval(row), waiver_text(row)) if n]
+        rows.append((
+            Cell(str(row.get("id"))),
+            Cell(state.word, tone=state.tone, mark=state.mark),
+            kind_text(row),
+            Cell(value_text(row, "value"), numbers.finite(row.get("value"))),
+            Cell(value_text(row, "limit"), numbers.finite(row.get("limit"))),
+            Cell(margin_text(row), relative_margin(row)),
+            where,
+            "; ".join(notes),
+        ))  # fmt: skip
+    heads = ("Requirement", "Status", "Limits", "Value #", "Limit #", "Margin #", "In the spec",
+             "Note")  # fmt: skip
+    return table("Requirements", heads, rows)
+
+
+def _interval(row: Json) -> str:
+    low, high = row.get("low"), row.get("high")
+    if numbers.finite(low) is None or numbers.finite(high) is None:
+        return ""
+    unit = str(row.get("unit") or "")
+    return f"95 % interval {numbers.in_unit(low, unit)} to {numbers.in_unit(high, unit)}"
+
+
+def payload(verdict: Json) -> Table:
+    """Chosen sensors, how each is timestamped, and why."""
+    currency = currency_of(verdict)
+    rows = [
+        (
+            f"{stage} \u00b7 {role}",
+            str(entry.get("name") or entry.get("sensor")),
+            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive"))),
+            str(entry.get("timestamping_name") or entry.get("timestamping")),
+            {"utc": "UTC", "host": "host clock"}.get(str(entry.get("timeline")), ""),
+            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
+            selection_reason(verdict, stage, role),
+        )
+        for stage, role, entry in roles(verdict)
+    ]
+    heads = ("Role", "Sensor", "Primitive", "Timestamping", "Timeline", "Cost #", "Why")
+    return table("Payload and timestamping", heads, rows)
+
+
+def shared(verdict: Json) -> Table | None:
+    """Shared hardware and clocks, bought once per vehicle."""
+    design = part(verdict, "design")
+    currency = currency_of(verdict)
+    rows = [
+        (
+            str(entry.get("name") or entry.get("id")),
+            str(entry.get("vehicle")),
+            Cell(numbers.count(entry.get("count")), numbers.finite(entry.get("count"))),
+            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
+        )
+        for entry in items(design, "infrastructure")
+    ]
+    rows += [
+        (
+            f"clock: {entry.get('id')}",
+            str(entry.get("vehicle")),
+            Cell("1", 1.0),
+            Cell(numbers.MISSING),
+        )
+        for entry in items(design, "clocks")
+        if entry.get("id")
+    ]
+    heads = ("Shared hardware", "Vehicle", "Count #", "Cost #")
+    return table("Shared hardware and clocks", heads, rows) if rows else None
+
+
+def taus(verdict: Json) -> Table:
+    """tau of each sensor against its tau_crit, as in the paper and with the lever arm."""
+    rows = []
+    for stage, role, entry in roles(verdict):
+        tau, crit = numbers.finite(entry.get("tau_s")), numbers.finite(entry.get("tau_crit_s"))
+        ratio = None if tau is None or not crit else tau / crit
+        within = ratio is None or ratio < 1.0
+        lever = entry.get("tau_crit_lever_arm_s")
+        rows.append((
+            f"{stage} \u00b7 {role}",
+            str(entry.get("name") or entry.get("sensor")),
+            Cell(numbers.time(tau), tau),
+            Cell(numbers.time_limit(crit), crit),
+            Cell(
+                numbers.percent(ratio) if ratio is not None else numbers.MISSING,
+                ratio,
+                "good" if within else "bad",
+                "\u2713" if within else "\u2717",
+            ),
+            Cell(numbers.time_limit(lever), numbers.finite(lever)),
+            Cell(numbers.length(entry.get("sensor_error_m")),
+                 numbers.finite(entry.get("sensor_error_m"))),
+        ))  # fmt: skip
+    heads = ("Role", "Sensor", "\u03c4 #", "\u03c4_crit #", "Used #", "\u03c4_crit, lever arm #",
+             "Sensor error #")  # fmt: skip
+    return table("Timestamp error of each sensor against the largest it may have", heads, rows)
+
+
+def ledger(verdict: Json) -> Table:
+    """Every term of the total error."""
+    words = {"sensor": "sensor", "sync": "synchronisation", "systematic": "known effect"}
+    rows = [
+        (
+            str(entry.get("term")),
+            str(entry.get("stage") or ""),
+            words.get(str(entry.get("kind")), str(entry.get("kind"))),
+            Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
+            Cell(numbers.percent(entry.get("share")), numbers.finite(entry.get("share"))),
+        )
+        for entry in items(part(verdict, "syncline"), "ledger")
+    ]
+    return table("Terms of the total error", ("Term", "Stage", "Kind", "Value #", "Share #"), rows)
+
+
+def models(verdict: Json) -> Table:
+    """Both synchronisation models and the lever-arm variant, side by side."""
+    syncline = part(verdict, "syncline")
+    used = str(syncline.get("model") or "syncline")
+    names = {"syncline": "Syncline (the paper's)", "per_sensor": "per sensor (tighter)"}
+    rows = []
+    for key, entry in part(syncline, "models").items():
+        rows.append((
+            names.get(str(key), str(key)) + (" \u2014 decides" if key == used else ""),
+            Cell(numbers.length(entry.get("sync_error_m")), entry.get("sync_error_m")),
+            Cell(numbers.length(entry.get("total_m")), entry.get("total_m")),
+        ))  # fmt: skip
+    lever = part(syncline, "lever_arm")
+    if lever:
+        total, sensor = numbers.finite(lever.get("total_m")), syncline.get("sensor_error_m")
+        rate, tau = numbers.finite(lever.get("sync_rate_mps")), syncline.get("tau_s")
+        error = rate * tau if rate is not None and tau is not None else None
+        if error is None and total is not None and numbers.finite(sensor) is not None:
+            error = total - float(sensor or 0.0)
+        rows.append((
+            "Syncline with the lever arm's rotation",
+            Cell(numbers.length(error), error),
+            Cell(numbers.length(total), total),
+        ))  # fmt: skip
+    heads = ("Model", "Synchronisation error #", "Total error #")
+    return table("Total error by model", heads, rows)
+
+
+def quantiles(verdict: Json) -> Table:
+    """Quantiles of the simulated error with their confidence intervals."""
+    rows = []
+    for key, entry in part(part(verdict, "monte_carlo"), "quantiles").items():
+        rows.append((
+            Cell(numbers.percent(float(key), 4), float(key)),
+            Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
+            f"{numbers.length(entry.get('low_m'))} to {numbers.length(entry.get('high_m'))}",
+        ))  # fmt: skip
+    heads = ("Quantile", "Error #", "95 % confidence interval")
+    return table("Quantiles of the simulated error", heads, rows)
+
+
+def priced(verdict: Json, key: str, caption: str, error_head: str) -> Table | None:
+    """A list of designs with price and error: the front, the staircase, the next best."""
+    currency = currency_of(verdict)
+    rows = []
+    for entry in items(part(verdict, "choice"), key):
+        error = entry.get("error_m", entry.get("limit_m"))
+        rows.append((
+            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
+            Cell(numbers.length(error), numbers.finite(error)),
+            design_text(entry.get("design")),
+        ))  # fmt: skip
+    return table(caption, ("Cost #", error_head, "Design"), rows) if rows else None
+
+
+def design_text(design: object) -> str:
+    """A design as words: text as it is; a design record as its sensors."""
+    if not isinstance(design, Mapping):
+        return str(design or "")
+    names = []
+    for stage in items(design, "stages"):
+        for entry in part(stage, "roles").values():
+            if isinstance(entry, Mapping):
+                method = entry.get("timestamping")
+                names.append(str(entry.get("name") or entry.get("sensor"))
+                             + (f" ({method})" if method else ""))  # fmt: skip
+    return ", ".join(names)
+
+
+def excluded(verdict: Json) -> Table | None:
+    """Options ruled out before the choice, with the reason."""
+    rows = [
+        (
+            f"{entry.get('stage')} \u00b7 {entry.get('role')}",
+            Cell(str(entry.get("sensor")), code=True),
+            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive"))),
+            Cell(str(entry.get("method")), code=True),
+            str(entry.get("reason")),
+        )
+        for entry in items(part(verdict, "choice"), "excluded")
+    ]
+    heads = ("Role", "Sensor", "Primitive", "Timestamping", "Reason")
+    return table("Options ruled out", heads, rows) if rows else None
+
+
+def assumptions(verdict: Json) -> Table | None:
+    """Figures without a public source that this verdict rests on."""
+    rows = [
+        (
+            Cell(str(entry.get("entry")), code=True),
+            str(entry.get("figure")),
+            str(entry.get("value")),
+            str(entry.get("note") or ""),
+        )
+        for entry in items(verdict, "assumptions")
+    ]
+    heads = ("Entry", "Figure", "Value", "Note")
+    return table("Assumptions: figures without a public source", heads, rows) if rows else None
+
+
+def sources(verdict: Json) -> Table | None:
+    """Where the catalog's figures come from."""
+    rows = [
+        (Cell(str(entry.get("entry")), code=True), str(entry.get("source")))
+        for entry in items(verdict, "sources")
+    ]
+    return table("Sources of the catalog figures", ("Entry", "Source"), rows) if rows else None
+
+
+def currency_of(verdict: Json) -> str:
+    """The currency amounts are given in."""
+    design, spec = part(verdict, "design"), part(verdict, "spec")
+    return str(design.get("currency") or spec.get("currency") or "EUR")

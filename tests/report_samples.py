@@ -1,0 +1,374 @@
+"""Hand-made verdicts for tests of the outputs; the figures follow from plain sums written here."""
+
+from __future__ import annotations
+
+import copy
+import itertools
+import math
+from typing import Any
+
+HOSTILE = (
+    "</script><script>alert(1)</script>",
+    r"$\frac{$",
+    '=HYPERLINK("https://example.invalid","x")',
+    "name\n::error file=a.py,line=1::owned",
+    "bell\x07 null\x00 escape\x1b[31m",
+    "\u202egnp.exe",
+    "lone \ud800 surrogate",
+    '"><img src=x onerror=alert(1)>',
+    "{{ 7 * 7 }}{% raw %}",
+    "<!-- ]]> & -->",
+    "a|b\\n*c*_d_`e`[f](javascript:alert(1)) @everyone",
+)
+
+
+def role(sensor: str, name: str, primitive: str, tau: float, crit: float, error: float) -> Any:
+    methods = {"tov": "hardware", "pps": "hardware", "network": "ptp_hw"}
+    names = {"tov": "timer capture", "pps": "timer capture", "network": "PTP, hardware stamps"}
+    return {
+        "sensor": sensor,
+        "name": name,
+        "primitive": primitive,
+        "timestamping": methods[primitive],
+        "timestamping_name": names[primitive],
+        "timeline": "host" if primitive == "tov" else "utc",
+        "tau_s": tau,
+        "tau_crit_s": crit,
+        "tau_crit_lever_arm_s": 0.94 * crit,
+        "sensor_error_m": error,
+        "cost": 9_000.0,
+    }
+
+
+def fixed_wing() -> dict[str, Any]:
+    """One stage, everything present, meets."""
+    v, omega, d = 21.0, math.radians(77.9), 100.0
+    rate = v + d * omega
+    sigma_att = math.radians(math.hypot(0.008, 0.008, 0.03))
+    sigma_u = math.radians(math.hypot(0.006, 0.006))
+    errors = {"position": 0.01, "attitude": sigma_att * d, "ranging": 0.01 + sigma_u * d}
+    sensor_error = sum(errors.values())
+    tau = 20e-6
+    total = sensor_error + rate * tau
+    roles = {
+        "position": role("ublox_f9p_rtk", "u-blox F9P RTK", "tov", 1e-6, 0.01 / v, 0.01),
+        "attitude": role(
+            "sbg_apogee", "SBG Apogee", "pps", 5e-6, errors["attitude"] / rate, errors["attitude"]
+        ),
+        "ranging": role(
+            "riegl_vux1uav", "RIEGL VUX-1UAV", "network", 19e-6, errors["ranging"] / rate,
+            errors["ranging"],
+        ),
+    }  # fmt: skip
+    return {
+        "schema": "syncline-design/verdict/v1",
+        "verdict": "meets",
+        "spec": {
+            "name": "UAV corridor mapping",
+            "file": "specs/uav_corridor.yaml",
+            "currency": "EUR",
+            "sync_model": "syncline",
+            "objective": "cost",
+            "coverage_factor": 3,
+            "open_roles": ["uav.position", "uav.attitude"],
+            "stages": [
+                {
+                    "name": "uav",
+                    "vehicle": "uav",
+                    "platform": {
+                        "id": "uav_fixed_wing",
+                        "name": "UAV fixed wing",
+                        "v_max_mps": v,
+                        "omega_max_radps": omega,
+                        "distance_m": d,
+                        "baseline_m": 1.0,
+                    },
+                }
+            ],
+        },
+        "requirements": [
+            requirement("ACC-1", "accuracy", total, 0.30, "m", 8),
+            requirement("SYNC-1", "sync", 0.16, 1.0, "", 9),
+            requirement("COST-1", "cost", 38_400.0, 40_000.0, "EUR", 10),
+            requirement("MASS-1", "mass", 2.1, 3.0, "kg", 11),
+            requirement("MC-1", "monte_carlo", 0.071, 0.30, "m", 12)
+            | {"quantile": 0.95, "low": 0.0705, "high": 0.0714},
+        ],
+        "design": {
+            "cost": 38_400.0,
+            "mass": 2.1,
+            "power": 41.0,
+            "currency": "EUR",
+            "infrastructure": [
+                {
+                    "id": "timing_board",
+                    "name": "Timing board",
+                    "vehicle": "uav",
+                    "count": 1,
+                    "cost": 400.0,
+                }
+            ],
+            "clocks": [{"vehicle": "uav", "id": "pps_hardware"}],
+            "stages": [
+                {"name": "uav", "platform": "uav_fixed_wing", "vehicle": "uav", "roles": roles}
+            ],
+        },
+        "syncline": syncline_section(v, omega, d, errors, tau),
+        "monte_carlo": monte_carlo_section(total),
+        "warnings": [
+            {"code": "assumption", "message": "price of riegl_vux1uav is an assumption"},
+        ],
+        "assumptions": [
+            {
+                "entry": "riegl_vux1uav",
+                "figure": "cost",
+                "value": "30000 EUR",
+                "note": "no public price",
+            },
+        ],
+        "sources": [
+            {"entry": "uav_fixed_wing", "source": "Jellum et al., arXiv:2209.01136v2, table 2"},
+            {"entry": "sbg_apogee", "source": "Jellum et al., arXiv:2209.01136v2, table 3"},
+        ],
+        "effects": [
+            {
+                "effect": "latency",
+                "sensor": "position",
+                "stage": "uav",
+                "sentence": "The position data are 2 ms older than their stamp.",
+            },
+        ],
+        "choice": choice_section(total),
+        "infeasibility": None,
+        "provenance": {
+            "version": "0.1.0",
+            "spec_sha256": "a" * 64,
+            "catalogs_sha256": "b" * 64,
+            "seed": 1,
+            "python": "3.11.2",
+            "numpy": "2.0.0",
+        },
+    }
+
+
+def requirement(
+    name: str, kind: str, value: float, limit: float, unit: str, line: int
+) -> dict[str, Any]:
+    met = value < limit if kind == "sync" else value <= limit
+    return {
+        "id": name,
+        "kind": kind,
+        "status": "pass" if met else "fail",
+        "value": value,
+        "limit": limit,
+        "unit": unit,
+        "margin": limit - value,
+        "line": line,
+        "column": 5,
+        "note": "",
+        "implied": False,
+    }
+
+
+def syncline_section(
+    v: float, omega: float, d: float, errors: dict[str, float], tau: float
+) -> dict[str, Any]:
+    rate = v + d * omega
+    sensor_error = sum(errors.values())
+    terms = [
+        ("position noise", errors["position"], "sensor", "sigma_p"),
+        ("attitude noise times distance", errors["attitude"], "sensor", "sigma_Theta d"),
+        ("range noise", 0.01, "sensor", "sigma_r"),
+        ("bearing noise times distance", errors["ranging"] - 0.01, "sensor", "sigma_u d"),
+        ("translation during tau", v * tau, "sync", "v_max tau"),
+        ("rotation during tau", d * omega * tau, "sync", "d omega_max tau"),
+    ]
+    total = sensor_error + rate * tau
+    lever_rate = rate + omega
+    return {
+        "sensor_error_m": sensor_error,
+        "sync_rate_mps": rate,
+        "tau_s": tau,
+        "tau_crit_s": sensor_error / rate,
+        "sync_error_m": rate * tau,
+        "systematic_error_m": 0.0,
+        "total_m": total,
+        "model": "syncline",
+        "models": {
+            "syncline": {"sync_error_m": rate * tau, "total_m": total},
+            "per_sensor": {"sync_error_m": 0.8 * rate * tau, "total_m": total - 0.2 * rate * tau},
+        },
+        "lever_arm": {
+            "tau_crit_s": sensor_error / lever_rate,
+            "total_m": sensor_error + lever_rate * tau,
+            "sync_rate_mps": lever_rate,
+        },
+        "stages": [
+            {
+                "name": "uav",
+                "sensor_error_m": sensor_error,
+                "sync_rate_mps": rate,
+                "tau_crit_s": sensor_error / rate,
+            }
+        ],
+        "ledger": [
+            {
+                "term": term,
+                "stage": "uav",
+                "value_m": value,
+                "kind": kind,
+                "symbol": symbol,
+                "share": value / total,
+            }
+            for term, value, kind, symbol in terms
+        ],
+    }
+
+
+def monte_carlo_section(total: float) -> dict[str, Any]:
+    edges = [0.005 * i for i in range(25)]
+    middles = [0.5 * (a + b) for a, b in itertools.pairwise(edges)]
+    density = [m * math.exp(-((m / 0.03) ** 2)) for m in middles]
+    grid = [
+        {
+            "tau_s": 10.0**e,
+            "worst_case_m": 0.094 + 140 * 10.0**e,
+            "syncline_m": 0.098 + 157 * 10.0**e,
+        }
+        for e in range(-7, 0)
+    ]
+    for point in grid:
+        point["ratio"] = point["worst_case_m"] / point["syncline_m"]
+    return {
+        "samples": 200_000,
+        "seed": 1,
+        "envelope": "limits",
+        "quantiles": {
+            "0.5": {"value_m": 0.031, "low_m": 0.0309, "high_m": 0.0311},
+            "0.95": {"value_m": 0.071, "low_m": 0.0705, "high_m": 0.0714},
+            "0.997": {"value_m": 0.094, "low_m": 0.093, "high_m": 0.0954},
+        },
+        "probability_within_target": {"value": 1.0, "low": 0.99998, "high": 1.0},
+        "worst_case": {"value_m": 0.97 * total, "ratio_to_syncline": 0.97},
+        "histogram": {"edges_m": edges, "density": density},
+        "grid": grid,
+    }
+
+
+def choice_section(total: float) -> dict[str, Any]:
+    front = [
+        {"cost": 31_000.0, "error_m": 0.42, "design": "u-blox F9P RTK, SBG Ellipse, HDL-32E"},
+        {"cost": 34_500.0, "error_m": 0.21, "design": "u-blox F9P RTK, SBG Apogee, HDL-32E"},
+        {"cost": 38_400.0, "error_m": total, "design": "u-blox F9P RTK, SBG Apogee, VUX-1UAV"},
+        {"cost": 61_000.0, "error_m": 0.039, "design": "u-blox F9P RTK, MRU5, VUX-1UAV"},
+    ]
+    return {
+        "proof": {"method": "front", "optimal": True, "rechecked": True, "combinations": 5760},
+        "front": front,
+        "staircase": [
+            {"limit_m": 0.42, "cost": 31_000.0, "design": front[0]["design"]},
+            {"limit_m": 0.21, "cost": 34_500.0, "design": front[1]["design"]},
+        ],
+        "next_best": [{"cost": 39_100.0, "error_m": 0.093, "design": front[2]["design"]}],
+        "excluded": [
+            {
+                "stage": "uav",
+                "role": "attitude",
+                "sensor": "kongsberg_mru5",
+                "primitive": "arrival",
+                "method": "uart",
+                "reason": "tau 2 ms exceeds its tau_crit of 38 us",
+            },
+        ],
+    }
+
+
+def failing() -> dict[str, Any]:
+    """The same system held to 5 cm: accuracy fails."""
+    verdict = fixed_wing()
+    verdict["verdict"] = "fails"
+    total = verdict["syncline"]["total_m"]
+    verdict["requirements"][0] = requirement("ACC-1", "accuracy", total, 0.05, "m", 8)
+    return verdict
+
+
+def infeasible() -> dict[str, Any]:
+    """No design at all."""
+    verdict = fixed_wing()
+    for key in ("design", "syncline", "monte_carlo", "choice"):
+        verdict[key] = None
+    verdict["verdict"] = "infeasible"
+    verdict["requirements"] = [
+        requirement("ACC-1", "accuracy", 1.0, 0.05, "m", 8)
+        | {"status": "indeterminate", "value": None, "margin": None},
+        requirement("COST-1", "cost", 1.0, 9_000.0, "EUR", 10)
+        | {"status": "indeterminate", "value": None, "margin": None},
+    ]
+    verdict["infeasibility"] = {
+        "roles_without_options": [
+            {"stage": "uav", "role": "attitude", "nearest": "sbg_ellipse with gpio",
+             "misses_by": 1.8},
+        ],
+        "conflict": {
+            "requirements": [{"id": "ACC-1", "line": 8}, {"id": "COST-1", "line": 10}],
+            "minimal": True,
+        },
+        "fixes": [
+            {"kind": "requirement", "requirement": "ACC-1", "from": 0.05, "to": 0.098,
+             "text": "ACC-1 from 5 cm to 9.8 cm", "proven": True},
+            {"text": "COST-1 by 3 400 EUR"},
+        ],
+    }  # fmt: skip
+    return verdict
+
+
+def two_stages() -> dict[str, Any]:
+    """A chain of two stages, with an unlimited tau_crit and missing optional parts."""
+    verdict = copy.deepcopy(fixed_wing())
+    second = copy.deepcopy(verdict["design"]["stages"][0])
+    second["name"] = second["vehicle"] = "auv"
+    del second["roles"]["position"]
+    second["roles"]["attitude"]["tau_crit_s"] = None
+    verdict["design"]["stages"].append(second)
+    stage = copy.deepcopy(verdict["spec"]["stages"][0]) | {"name": "auv", "vehicle": "auv"}
+    verdict["spec"]["stages"].append(stage)
+    for key in ("monte_carlo", "choice", "effects", "assumptions"):
+        verdict[key] = None
+    return verdict
+
+
+def with_hostile_text(text: str) -> dict[str, Any]:
+    """Every free text of a verdict replaced by one hostile string."""
+    verdict = fixed_wing()
+    verdict["spec"]["name"] = text
+    verdict["spec"]["file"] = "specs/x.yaml"
+    verdict["spec"]["stages"][0]["name"] = text
+    verdict["spec"]["stages"][0]["platform"]["name"] = text
+    for row in verdict["requirements"]:
+        row["id"] = row["id"] + text
+        row["note"] = text
+        row["status"] = "fail"
+    verdict["verdict"] = "fails"
+    stage = verdict["design"]["stages"][0]
+    stage["name"] = text
+    for entry in stage["roles"].values():
+        entry["name"] = entry["sensor"] = entry["timestamping_name"] = text
+    for term in verdict["syncline"]["ledger"]:
+        term["term"] = term["stage"] = text
+    for key, fields in (("warnings", ("message",)), ("effects", ("sentence",))):
+        for entry in verdict[key]:
+            for field in fields:
+                entry[field] = text
+    for entry in verdict["assumptions"] + verdict["sources"]:
+        for field in entry:
+            entry[field] = text
+    for entry in verdict["choice"]["front"] + verdict["choice"]["excluded"]:
+        for field, value in entry.items():
+            if isinstance(value, str):
+                entry[field] = text
+    verdict["infeasibility"] = {
+        "roles_without_options": [],
+        "conflict": None,
+        "fixes": [{"text": text}],
+    }
+    return verdict
