@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from syncline_design import __version__
 from syncline_design.catalog import Catalog
+from syncline_design.loading import load_builtin
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.paper_figures import (
@@ -127,8 +128,9 @@ class Reproduction:
         return all(cell.status != "differs" for cell in (*self.cells, *self.inputs))
 
 
-def reproduce(catalog: Catalog) -> Reproduction:
-    """Compute every printed figure from a catalog (the built-in one, for the command)."""
+def reproduce(catalog: Catalog | None = None) -> Reproduction:
+    """Compute every printed figure from a catalog, the built-in one unless another is given."""
+    catalog = load_builtin() if catalog is None else catalog
     cells = tuple(
         _cell((table, row, column), text, _computed_si(catalog, table, row, column))
         for table in (*TAU_CRIT_TABLES, "text")
