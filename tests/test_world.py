@@ -30,6 +30,7 @@ from tests.world import (
     scenario,
 )
 from tests.world.bound import cramer_rao, whitened
+from tests.world.example import write
 from tests.world.geodesy import to_geodetic
 from tests.world.motions import Sensors
 from tests.world.noise import gauss_markov, unit_draws
@@ -530,3 +531,17 @@ def test_seeds_differ_and_repeat() -> None:
     other = scenario("vessel_figure_eights", 2, 30.0)
     np.testing.assert_array_equal(make_log(first).error(), make_log(again).error())
     assert not np.allclose(first.targets_m[:4], other.targets_m[:4])
+
+
+def test_the_example_in_the_repository_is_what_its_script_writes(tmp_path: FilePath) -> None:
+    write(tmp_path)
+    kept = FilePath(__file__).parents[1] / "examples"
+    assert (tmp_path / "hidden_latency.yaml").read_text() == (
+        kept / "hidden_latency.yaml"
+    ).read_text()
+    found, expected = (
+        np.loadtxt(folder / "hidden_latency.csv", delimiter=",", skiprows=1)
+        for folder in (tmp_path, kept)
+    )
+    np.testing.assert_allclose(found, expected, atol=1.5e-3)  # a last digit may round elsewhere
+    assert (kept / "hidden_latency.csv").stat().st_size < 500_000

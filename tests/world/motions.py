@@ -77,7 +77,7 @@ def _multirotor(rng: np.random.Generator, duration_s: float) -> Motion:
     roll = right / GRAVITY_MPS2 + waves(rng, time_s, 1.2 * DEGREE, (0.2, 0.9))
     yaw = heading + waves(rng, time_s, 0.8 * DEGREE, (0.1, 0.6))
     path = fit(time_s, np.column_stack([place, down]), np.column_stack([yaw, pitch, roll]))
-    return Motion(path, (8.0, 35.0), (-3.0, 2.0), Sensors(), (11.0, 70.0 * DEGREE, 40.0))
+    return Motion(path, (8.0, 35.0), (-3.0, 2.0), Sensors(), (9.0, 50.0 * DEGREE, 40.0))
 
 
 def _fixed_wing(rng: np.random.Generator, duration_s: float) -> Motion:

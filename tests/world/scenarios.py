@@ -50,23 +50,21 @@ class Scenario:
         return replace(self, stamps_s=self.stamps_s[keep], sighted=self.sighted[keep])
 
 
-def _targets(
-    rng: np.random.Generator, motion: Motion, stamps_s: Array, start_s: float
-) -> tuple[Array, Indices]:
+def _targets(rng: np.random.Generator, motion: Motion, stamps_s: Array) -> tuple[Array, Indices]:
     """Targets all around the way, and one in sight at every stamp.
 
     Bearings within 15 degrees of the vertical are passed over where there is a choice: a real
     sensor's azimuth means nothing there.
     """
-    count = int(np.ceil((stamps_s[-1] - start_s) / SEGMENT_S)) + 1
-    middle = motion.path.position(start_s + (np.arange(count, dtype=np.float64) + 0.5) * SEGMENT_S)
+    count = int(np.ceil(stamps_s[-1] / SEGMENT_S)) + 1
+    middle = motion.path.position((np.arange(count, dtype=np.float64) + 0.5) * SEGMENT_S)
     around = np.repeat(middle, PER_SEGMENT, axis=0)
     angle = rng.uniform(-np.pi, np.pi, len(around))
     distance = rng.uniform(*motion.offsets_m, len(around))
     level = rng.uniform(*motion.levels_m, len(around))
     north, east = distance * np.cos(angle), distance * np.sin(angle)
     targets = np.column_stack([around[:, 0] + north, around[:, 1] + east, level])
-    segment = np.minimum(((stamps_s - start_s) / SEGMENT_S).astype(np.int64), count - 1)
+    segment = np.minimum((stamps_s / SEGMENT_S).astype(np.int64), count - 1)
     choice = segment * PER_SEGMENT + rng.integers(0, PER_SEGMENT, (8, stamps_s.size))
     here = motion.path.position(stamps_s)
     into_body = motion.path.rotation(stamps_s).inv().as_matrix()
@@ -78,10 +76,10 @@ def _targets(
     return targets, choice[steepest, np.arange(stamps_s.size)]
 
 
-def _stamps(rng: np.random.Generator, duration_s: float, rate_hz: float, start_s: float) -> Array:
-    """Row stamps: evenly spaced but for 2 % of scatter."""
+def _stamps(rng: np.random.Generator, duration_s: float, rate_hz: float) -> Array:
+    """Row stamps: evenly spaced but for 2 % of scatter, to the 0.1 ms that a log keeps."""
     count = round(duration_s * rate_hz)
-    return start_s + (np.arange(count) + rng.uniform(0.0, 0.02, count)) / rate_hz
+    return np.round((np.arange(count) + rng.uniform(0.0, 0.02, count)) / rate_hz, 4)
 
 
 def _carrier(name: str, motion: Motion) -> Carrier:
@@ -110,6 +108,6 @@ def scenario(
         if kind == "position":
             last = replace(last, sensors=replace(last.sensors, ranging=None, attitude_rad=None))
         carriers = (_carrier(name.split("_")[0], last),)
-    stamps = _stamps(rng, duration_s, rate_hz, 0.0)
-    targets, sighted = _targets(rng, last, stamps, 0.0)
+    stamps = _stamps(rng, duration_s, rate_hz)
+    targets, sighted = _targets(rng, last, stamps)
     return Scenario(name, seed, kind, duration_s, rate_hz, stamps, carriers, targets, sighted)

@@ -19,7 +19,7 @@ from tests.world.trajectory import Array
 
 DEGREE = np.pi / 180.0
 NED = ("north", "east", "down")
-DIGITS = {"_s": 6, "_m": 4, "_deg": 5, "_mps": 4, "_degps": 4, "_id": 0}
+DIGITS = {"_s": 4, "_m": 4, "_deg": 5, "_mps": 3, "_degps": 3, "_id": 0}
 
 
 @dataclass(frozen=True)
@@ -47,15 +47,18 @@ class WorldLog:
         return georeference(self.run.carriers, self.readings) - listed
 
     def to_csv(
-        self, path: FilePath | str, geodetic: tuple[float, float, float] | None = None
+        self,
+        path: FilePath | str,
+        geodetic: tuple[float, float, float] | None = None,
+        coarser: int = 0,
     ) -> FilePath:
-        """Write the log; `geodetic` (latitude, longitude in degrees, height) makes it WGS 84.
+        """Write the log, with `coarser` digits less of places and angles.
 
-        The origin of the local frame is then the first row's position, as who reads the log
-        takes it.
+        `geodetic` (latitude, longitude in degrees, height) makes it WGS 84; the origin of the
+        local frame is then the first row's position, as who reads the log takes it.
         """
         columns = self.columns if geodetic is None else _in_wgs84(self.columns, geodetic)
-        texts = [_texts(name, values) for name, values in columns.items()]
+        texts = [_texts(name, values, coarser) for name, values in columns.items()]
         lines = [",".join(columns)] + [",".join(row) for row in zip(*texts, strict=True)]
         target = FilePath(path)
         target.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -66,12 +69,12 @@ class WorldLog:
         return spec_text(self.run, known)
 
 
-def _texts(name: str, values: Array) -> list[str]:
+def _texts(name: str, values: Array, coarser: int) -> list[str]:
     if name.endswith(("latitude_deg", "longitude_deg")):
         digits = 10
     else:
         ending = max((e for e in DIGITS if name.endswith(e)), key=len)
-        digits = DIGITS[ending]
+        digits = DIGITS[ending] - (coarser if ending in ("_m", "_deg") else 0)
     return [f"{value:.{digits}f}" for value in values]
 
 
@@ -200,13 +203,13 @@ def _stage_lines(carrier: Carrier, georeferences: bool) -> list[str]:
     return lines
 
 
-def spec_text(run: Scenario, known: Sequence[Hidden] = ()) -> str:
+def spec_text(run: Scenario, known: Sequence[Hidden] = (), limit_m: float = 1.0) -> str:
     """The YAML of a spec that matches a run's sensors, with the known effects listed."""
     lines = [
         "syncline: 1",
         f"name: {run.name.replace('_', ' ')}",
         "requirements:",
-        "  - {id: ACC-1, kind: accuracy, limit: 1 m}",
+        f"  - {{id: ACC-1, kind: accuracy, limit: {limit_m:g} m}}",
         "stages:",
     ]
     for carrier in run.carriers:
