@@ -5,24 +5,15 @@ from __future__ import annotations
 import re
 from datetime import date
 from fractions import Fraction
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, PlainValidator, ValidationInfo, model_validator
 from pydantic import field_validator as reads_field
 from pydantic_core import PydanticCustomError
 
 from syncline_design.catalog import ErrorEntry, Modality, Primitive, SensorEntry
-from syncline_design.units import (
-    CURRENCIES,
-    UNITS,
-    Dimension,
-    Quantity,
-    UnitError,
-    parse_quantity,
-    plain_number,
-    si_name,
-    suffix_unit,
-)
+from syncline_design.spec_effects import EffectChoice as EffectChoice
+from syncline_design.units import CURRENCIES, UNITS, Dimension, Quantity, suffix_unit
 from syncline_design.values import (
     AngularRate,
     AtLeastOne,
@@ -32,7 +23,6 @@ from syncline_design.values import (
     PositiveLength,
     PositiveMoney,
     PositiveNumber,
-    Reader,
     Record,
     Speed,
     Text,
@@ -48,7 +38,6 @@ from syncline_design.values import (
 
 Role = Literal["position", "attitude", "ranging"]
 ROLE_NAMES: tuple[Role, ...] = ("position", "attitude", "ranging")
-M = TypeVar("M", bound=Record)
 
 LIMIT_DIMENSIONS: dict[str, Dimension] = {
     "accuracy": Dimension.LENGTH,
@@ -90,7 +79,7 @@ class Requirement(Record):
     waiver: Waiver | None = None
     note: str = ""
 
-    @reads_field("limit", mode="plain")
+    @reads_field("limit", mode="plain", json_schema_input_type=str | float)
     @classmethod
     def _read_limit(cls, value: Any, info: ValidationInfo) -> Any:
         kind = info.data.get("kind")
@@ -101,7 +90,7 @@ class Requirement(Record):
         above = kind in ("accuracy", "monte_carlo")
         return read_quantity(value, LIMIT_DIMENSIONS[kind], 0.0, above)
 
-    @reads_field("quantile", mode="plain")
+    @reads_field("quantile", mode="plain", json_schema_input_type=float)
     @classmethod
     def _read_quantile(cls, value: Any) -> Quantity | None:
         if value is None:
@@ -192,7 +181,7 @@ def _read_role_timestamping(value: Any) -> str | MethodChoice | InlineTimestampi
     raise refusal("not a timestamping choice", wanted, kind_of(value))
 
 
-def _one_or_candidates(what: str) -> BeforeValidator:
+def _one_or_candidates(what: str, model: type[Record]) -> BeforeValidator:
     """A bare id stands for a list of one candidate."""
 
     def widen(value: Any) -> Any:
@@ -204,7 +193,7 @@ def _one_or_candidates(what: str) -> BeforeValidator:
             )
         return value
 
-    return BeforeValidator(widen, json_schema_input_type=Any)
+    return BeforeValidator(widen, json_schema_input_type=str | model)
 
 
 def _read_sensor(value: Any) -> str | SensorEntry:
@@ -278,8 +267,10 @@ class StageChoice(Record):
     position: RoleChoice | None = None
     attitude: RoleChoice | None = None
     ranging: RoleChoice | None = None
-    timestamping: Annotated[MethodChoice | None, _one_or_candidates("timestamping")] = None
-    clock: Annotated[ClockChoice | None, _one_or_candidates("clock")] = None
+    timestamping: Annotated[
+        MethodChoice | None, _one_or_candidates("timestamping", MethodChoice)
+    ] = None
+    clock: Annotated[ClockChoice | None, _one_or_candidates("clock", ClockChoice)] = None
     note: str = ""
 
     def role(self, name: Role) -> RoleChoice | None:
@@ -323,78 +314,6 @@ class MonteCarloChoice(Record):
             error = refusal("not used", hint="set envelope: trajectory, or delete it")
             raise refusals([(("trajectory",), error)])
         return self
-
-
-def _read_parameter(name: str, value: Any) -> float | str:
-    """One effect parameter in SI: bare in the unit of its name, or a text with its own unit."""
-    factor, dimension = suffix_unit(name)
-    if isinstance(value, str):
-        if dimension is Dimension.DIMENSIONLESS:
-            return _plain_parameter(value)
-        return read_quantity(value, dimension)
-    number = read_number(value)
-    return number if factor == 1.0 else float(number) * factor
-
-
-def _plain_parameter(value: str) -> float | str:
-    """A ratio with its unit, or a word such as the name of a convention."""
-    try:
-        return parse_quantity(value, Dimension.RATIO)
-    except UnitError:
-        pass
-    try:
-        plain_number(value)
-    except UnitError as error:
-        if error.hint == "unquote it":
-            raise refusal(error.message, error.expected, error.found, error.hint) from None
-    return value
-
-
-def _read_parameters(value: Any) -> dict[str, float | str]:
-    if not isinstance(value, dict):
-        raise refusal("not parameters", "a mapping such as {latency_s: 0.087}", kind_of(value))
-    parameters: dict[str, float | str] = {}
-    errors: list[tuple[Loc, PydanticCustomError]] = []
-    for name, item in value.items():
-        if si_name(name) in parameters:
-            errors.append(((name,), refusal("given twice, in two units", si_name(name))))
-            continue
-        try:
-            parameters[si_name(name)] = _read_parameter(name, item)
-        except PydanticCustomError as error:
-            errors.append(((name,), error))
-    if errors:
-        raise refusals(errors)
-    return parameters
-
-
-def _read_uncertainties(value: Any) -> dict[str, float]:
-    figures: dict[str, float] = {}
-    for name, item in _read_parameters(value).items():
-        if isinstance(item, str) or not item >= 0.0:
-            raise refusals([((name,), refusal("not an uncertainty", "0 or more", str(item)))])
-        figures[name] = item
-    return figures
-
-
-_ParameterSchema = {"type": "object", "additionalProperties": {"type": ["number", "string"]}}
-
-
-class EffectChoice(Record):
-    """A known systematic effect, as `diagnose` writes it; parameter names carry their unit.
-
-    Stored in SI under the name with the SI suffix: `latency_ms: 87` reads as latency_s = 0.087.
-    """
-
-    effect: Text
-    sensor: Literal["position", "attitude", "ranging", "target"]
-    stage: Text | None = None
-    parameters: Annotated[dict[str, float | str], Reader(_read_parameters, _ParameterSchema)]
-    standard_uncertainty: Annotated[
-        dict[str, float], Reader(_read_uncertainties, _ParameterSchema)
-    ] = Field(default_factory=dict)
-    source: str = ""
-    note: str = ""
 
 
 _COLUMN = re.compile(r"(?P<name>.*\S)\s+\[(?P<unit>[^\[\]]*)\]\s*")
@@ -443,7 +362,9 @@ class Spec(Record):
     requirements: Annotated[tuple[Requirement, ...], AtLeastOne]
     sync_model: Literal["syncline", "per_sensor"] = "syncline"
     stages: Annotated[tuple[StageChoice, ...], AtLeastOne]
-    timestamping: Annotated[MethodChoice | None, _one_or_candidates("timestamping")] = None
+    timestamping: Annotated[
+        MethodChoice | None, _one_or_candidates("timestamping", MethodChoice)
+    ] = None
     coverage_factor: PositiveNumber = 3.0
     objective: Literal["cost", "mass", "power", "error"] = "cost"
     monte_carlo: MonteCarloChoice = Field(default_factory=MonteCarloChoice)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterator
 from typing import Any, TypeVar
 
 from pydantic import ValidationError
@@ -38,15 +38,29 @@ def validate(
     """
     if document.data is None and data is None:
         return None, []
+    nulls = dict(_nulls(document, document.data, ()))
+    refused = {*document.problem_paths, *nulls}
     try:
         value = model.model_validate(document.data if data is None else data)
     except ValidationError as error:
-        return None, list(_problems(error, document))
-    return value, []
+        return None, [*nulls.values(), *_problems(error, document, refused)]
+    return (None if nulls else value), list(nulls.values())
 
 
-def _problems(error: ValidationError, document: Document) -> Iterable[Problem]:
-    refused = set(document.problem_paths)
+def _nulls(document: Document, data: Any, path: KeyPath) -> Iterator[tuple[KeyPath, Problem]]:
+    """Keys and items with nothing in them: a slip more often than a wish for the default."""
+    if isinstance(data, dict | tuple):
+        for key, item in data.items() if isinstance(data, dict) else enumerate(data):
+            yield from _nulls(document, item, (*path, key))
+    elif data is None and path not in document.problem_paths:
+        place = document.position(path)
+        hint = "give a value, or delete the key"
+        yield path, Problem(document.file, *place, show_path(path), "nothing (null)", hint=hint)
+
+
+def _problems(
+    error: ValidationError, document: Document, refused: set[KeyPath]
+) -> Iterator[Problem]:
     for detail in error.errors(include_url=False):
         path = tuple(detail["loc"])
         if any(path[:length] in refused for length in range(1, len(path) + 1)):

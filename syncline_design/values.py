@@ -148,17 +148,20 @@ def read_number(value: Any, lowest: float | None = None, above: bool = False) ->
     return number
 
 
-def quantity_schema(dimension: Dimension) -> dict[str, Any]:
-    """JSON Schema of `NUMBER UNIT`."""
+def quantity_schema(dimension: Dimension, tolerance: bool = False) -> dict[str, Any]:
+    """JSON Schema of `NUMBER UNIT`, with a tolerance where one is taken."""
     units = sorted((u for u, (d, _) in UNITS.items() if d is dimension), key=len, reverse=True)
     escaped = "|".join(u.replace("^", r"\^") for u in units)
     number = r"[-+]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][-+]?[0-9]+)?"
     single = f"{number} +({escaped})"
-    tolerance = rf"( *(\+/-|\u00b1) *({single}|{number} *%)| +\.\. +{single})?"
+    spread = rf"( *(\+/-|\u00b1) *({single}|{number} *%)| +\.\. +{single})?" if tolerance else ""
     return {
         "type": "string",
-        "description": f"{dimension.value} as NUMBER UNIT, for instance {EXAMPLES[dimension]}",
-        "pattern": f"^ *{single}{tolerance} *$",
+        "description": (
+            f"{dimension.value}{' with or without tolerance' if tolerance else ''}, "
+            f"NUMBER UNIT, for instance {EXAMPLES[dimension]}"
+        ),
+        "pattern": f"^ *{single}{spread} *$",
     }
 
 
@@ -182,7 +185,7 @@ def _figure(
     def read(value: Any) -> Quantity:
         return read_quantity(value, dimension, lowest, above, tolerance)
 
-    return Reader(read, quantity_schema(dimension))
+    return Reader(read, quantity_schema(dimension, tolerance))
 
 
 Length = Annotated[float, _figure(Dimension.LENGTH)]
@@ -239,7 +242,7 @@ def axes(dimension: Dimension, names: tuple[str, ...]) -> Reader:
             raise refusal("wrong number of axes", wanted, f"{len(value)} figures")
         return tuple(_each(value, one))
 
-    schema = quantity_schema(dimension)
+    schema = quantity_schema(dimension, tolerance=True)
     several = {"type": "array", "items": schema, "minItems": count, "maxItems": count}
     return Reader(read, {"anyOf": [schema, several]})
 
