@@ -19,6 +19,7 @@ from syncline_design.model.system import RoleName, Stage
 Array = NDArray[np.float64]
 Target = RoleName | Literal["target"]
 Values = Mapping[str, float]
+Rng = np.random.Generator | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +68,8 @@ class Departures:
     range_m (n,), range_scale (n,): measured r = r (1 + range_scale) + range_m.
     azimuth_rad, elevation_rad (n,): added to the measured bearing.
     target_m (n, 3): surveyed object minus true object, NED.
+    position_noise, attitude_noise, ranging_noise (n,): the noise draw of that sensor is taken
+    times (1 + this).
     """
 
     position_shift_s: Array = field(default_factory=lambda: _ZERO)
@@ -83,6 +86,9 @@ class Departures:
     azimuth_rad: Array = field(default_factory=lambda: _ZERO)
     elevation_rad: Array = field(default_factory=lambda: _ZERO)
     target_m: Array = field(default_factory=lambda: _ZERO3)
+    position_noise: Array = field(default_factory=lambda: _ZERO)
+    attitude_noise: Array = field(default_factory=lambda: _ZERO)
+    ranging_noise: Array = field(default_factory=lambda: _ZERO)
 
     def __add__(self, other: Departures) -> Departures:
         """Both departures at once; rotation vectors add, which is exact to second order."""
@@ -96,13 +102,19 @@ NOTHING = Departures()
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
-    """One parameter: its name carries the unit; [low, high] is its plausible magnitude."""
+    """One parameter: its name carries the unit; [low, high] is its plausible magnitude.
+
+    choices: what a discrete parameter may be; its value is then a text.
+    located: the error depends on it only through where along the log something happens.
+    """
 
     name: str
     low: float
     high: float
     unit: str = ""
     signed: bool = True
+    choices: tuple[str, ...] = ()
+    located: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +125,42 @@ class Contribution:
     systematic_m: float = 0.0
 
 
-Depart = Callable[[StageRows, Values, Target, "np.random.Generator | None"], Departures]
-Sensitivity = Callable[[StageRows, Target], Array]
+@dataclass(frozen=True, slots=True)
+class Wander:
+    """Gauss-Markov noise of the error: e += loading x, x of std_m and time_constant_s.
+
+    loading (3,): NED axis, or (3, 3) with a column per independent process.
+    """
+
+    loading: Array
+    std_m: float
+    time_constant_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Covariance:
+    """What a stochastic effect adds to the covariance of the error.
+
+    directions (n, 3, k): white noise with covariance directions directions' [m2] per row.
+    factors: (sensor, factor): that sensor's standard deviations are times factor.
+    wander: a Gauss-Markov process.
+    """
+
+    directions: Array | None = None
+    factors: tuple[tuple[Target, float], ...] = ()
+    wander: Wander | None = None
+
+
+Depart = Callable[[StageRows, Values, Target, Rng], Departures]
+Sensitivity = Callable[[StageRows, Values, Target], Array]
 Contribute = Callable[[Stage, Values, Target], Contribution]
+Spread = Callable[[StageRows, Values, Target], Covariance]
+Applies = Callable[[Stage, Target], bool]
+
+
+def everywhere(stage: Stage, sensor: Target) -> bool:
+    """Whether the stage has the sensor at all; the default of `Effect.applies`."""
+    return sensor == "target" or getattr(stage, sensor) is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,20 +170,28 @@ class Effect:
     kind: deterministic (a departure given the rows), stochastic (a departure drawn anew, seen as
     covariance) or discrete (a convention; re-simulated, never linearised).
     depart: exact departures; stochastic effects draw from the generator they are given.
-    sensitivity: (n, 3, p) derivative of the error [m] by each parameter at zero, NED, to first
-    order; None where an effect has none (discrete), the standard deviation per unit parameter
-    along its axis for stochastic ones.
+    sensitivity: (n, 3, p) slope of the (mean) error [m], NED, by each parameter that is neither
+    located nor discrete, at zero of these; None where the mean does not move.
+    spread: covariance of a stochastic effect.
     contribute: what it adds to the Syncline of a stage.
+    applies: whether a stage can have it.
+    sentence: for people, a format string over {sensor} and the parameters.
     """
 
     name: str
     sensors: tuple[Target, ...]
     kind: Literal["deterministic", "stochastic", "discrete"]
     parameters: tuple[Parameter, ...]
-    sentence: str  # for people, a format string over the parameters
+    sentence: str
     confused_with: str
     separated_by: str
     source: str
     depart: Depart
     sensitivity: Sensitivity | None
     contribute: Contribute
+    spread: Spread | None = None
+    applies: Applies = everywhere
+
+    def slopes(self) -> tuple[Parameter, ...]:
+        """The parameters that `sensitivity` has a column for."""
+        return tuple(p for p in self.parameters if not p.located and not p.choices)

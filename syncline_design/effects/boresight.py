@@ -10,6 +10,7 @@ from syncline_design.effects.base import (
     Departures,
     Effect,
     Parameter,
+    Rng,
     StageRows,
     Target,
     Values,
@@ -18,16 +19,14 @@ from syncline_design.effects.kinematics import ranging_vector, rotate, row_vecto
 from syncline_design.model.system import Stage
 
 
-def _depart(
-    rows: StageRows, values: Values, sensor: Target, _: np.random.Generator | None
-) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """beta [rad], body axes: the true mounting is the spec's times exp(S(beta))."""
     return Departures(
         bearing_rotation_rad=row_vector(values["x_rad"], values["y_rad"], values["z_rad"])
     )
 
 
-def _sensitivity(rows: StageRows, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     """d error / d beta_k = -R (e_k x b) [m/rad]; (n, 3, 3)."""
     b = ranging_vector(rows)
     return np.stack([-rotate(rows.rotation, np.cross(axis, b)) for axis in np.eye(3)], axis=-1)

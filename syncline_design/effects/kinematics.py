@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.base import Array, StageRows
+from syncline_design.effects.base import Array, Departures, StageRows, Target
 
 
 def bearing(azimuth_rad: Array, elevation_rad: Array) -> Array:
@@ -59,3 +59,41 @@ def column(value: float, rows: StageRows) -> Array:
 def row_vector(x: float, y: float, z: float) -> Array:
     """A constant vector as one (1, 3) row, for broadcasting."""
     return np.array([[x, y, z]])
+
+
+def shifted(sensor: Target, shift_s: Array) -> Departures:
+    """mu of one sensor changed by shift_s (n,)."""
+    if sensor == "position":
+        return Departures(position_shift_s=shift_s)
+    if sensor == "attitude":
+        return Departures(attitude_shift_s=shift_s)
+    return Departures(ranging_shift_s=shift_s)
+
+
+def shift_slope(rows: StageRows, sensor: Target) -> Array:
+    """d error / d mu of a sensor [m/s], NED, (n, 3): V, W, or -(V + W) for the reference."""
+    if sensor == "position":
+        return antenna_velocity(rows)
+    if sensor == "attitude":
+        return sweep_velocity(rows)
+    return -(antenna_velocity(rows) + sweep_velocity(rows))
+
+
+def elapsed(rows: StageRows) -> Array:
+    """t - t0 [s] since the first row, (n,)."""
+    since: Array = rows.time_s - rows.time_s[0]
+    return since
+
+
+def gauss_markov(time_s: Array, time_constant_s: float, draws: Array) -> Array:
+    """First-order Gauss-Markov process of unit variance at the stamps, (n, k), from normal draws.
+
+    x_i = phi x_{i-1} + sqrt(1 - phi^2) draw_i, phi = exp(-dt / T).
+    """
+    phi = np.exp(-np.abs(np.diff(time_s)) / time_constant_s)
+    fresh = np.sqrt(1.0 - phi * phi)[:, None] * draws[1:]
+    walk = np.empty_like(draws)
+    walk[0] = draws[0]
+    for i in range(1, len(draws)):
+        walk[i] = phi[i - 1] * walk[i - 1] + fresh[i - 1]
+    return walk

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from syncline_design.effects.base import (
     Array,
     Contribution,
     Departures,
     Effect,
     Parameter,
+    Rng,
     StageRows,
     Target,
     Values,
@@ -18,9 +17,7 @@ from syncline_design.effects.kinematics import antenna_velocity, column, sweep_v
 from syncline_design.model.system import Stage
 
 
-def _depart(
-    rows: StageRows, values: Values, sensor: Target, _: np.random.Generator | None
-) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """mu = -latency for every row of the sensor (paper, eq. state_space_y)."""
     shift = column(-values["latency_s"], rows)
     if sensor == "position":
@@ -30,7 +27,7 @@ def _depart(
     return Departures(ranging_shift_s=shift)
 
 
-def _sensitivity(rows: StageRows, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     """d error / d latency [m/s]: -V, -W, or V + W for the reference itself; (n, 3, 1)."""
     if sensor == "position":
         slope = -antenna_velocity(rows)

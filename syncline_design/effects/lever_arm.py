@@ -10,6 +10,7 @@ from syncline_design.effects.base import (
     Departures,
     Effect,
     Parameter,
+    Rng,
     StageRows,
     Target,
     Values,
@@ -18,15 +19,13 @@ from syncline_design.effects.kinematics import row_vector
 from syncline_design.model.system import Stage
 
 
-def _depart(
-    rows: StageRows, values: Values, sensor: Target, _: np.random.Generator | None
-) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """dl [m], body axes: the true lever arm is the spec's plus dl."""
     offset = row_vector(values["x_m"], values["y_m"], values["z_m"])
     return Departures(antenna_m=offset) if sensor == "position" else Departures(ranging_m=offset)
 
 
-def _sensitivity(rows: StageRows, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     """d error / d dl = R for the antenna, -R for the ranging sensor; (n, 3, 3).
 
     The antenna reads p + R (l_G + dl) while the spec takes off R l_G; the object is at

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from syncline_design.effects.base import (
     Array,
     Contribution,
     Departures,
     Effect,
     Parameter,
+    Rng,
     StageRows,
     Target,
     Values,
@@ -18,14 +17,12 @@ from syncline_design.effects.kinematics import bearing, column, rotate
 from syncline_design.model.system import Stage
 
 
-def _depart(
-    rows: StageRows, values: Values, sensor: Target, _: np.random.Generator | None
-) -> Departures:
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """measured r = true r + bias [m]."""
     return Departures(range_m=column(values["bias_m"], rows))
 
 
-def _sensitivity(rows: StageRows, sensor: Target) -> Array:
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     """d error / d bias = R n; (n, 3, 1)."""
     return rotate(rows.rotation, bearing(rows.azimuth_rad, rows.elevation_rad))[:, :, None]
 

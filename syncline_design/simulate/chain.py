@@ -153,7 +153,7 @@ def stage_error(
     antenna_error = (
         motion.displacement(shift_p)
         + rotate(motion.rotation(shift_p), rows.antenna_m + departures.antenna_m)
-        + noise.position_m
+        + noise.position_m * (1 + departures.position_noise[:, None])
         + departures.position_m
     )
     if carried_m is not None:
@@ -170,7 +170,8 @@ def _measured_rotation(rotation: Array, noise: Noise, departures: Departures) ->
     """R_hat: the turned attitude sensor's Euler angles plus their noise."""
     if np.any(departures.attitude_rotation_rad):
         rotation = rotation @ rotation_exp(departures.attitude_rotation_rad)
-    offset = noise.attitude_rad + departures.attitude_euler_rad
+    scatter = noise.attitude_rad * (1 + departures.attitude_noise[:, None])
+    offset = scatter + departures.attitude_euler_rad
     if not np.any(offset):
         return rotation
     return euler_to_rotation(rotation_to_euler(rotation) + offset)
@@ -186,8 +187,11 @@ def _measured_vector(rows: StageRows, noise: Noise, departures: Departures) -> A
         )
         azimuth = np.arctan2(turned[:, 1], turned[:, 0])
         elevation = -np.arcsin(np.clip(turned[:, 2], -1.0, 1.0))
-    distance = rows.range_m * (1 + departures.range_scale) + departures.range_m + noise.range_m
+    scatter = 1 + departures.ranging_noise
+    distance = (
+        rows.range_m * (1 + departures.range_scale) + departures.range_m + noise.range_m * scatter
+    )
     return distance[:, None] * bearing(
-        azimuth + noise.azimuth_rad + departures.azimuth_rad,
-        elevation + noise.elevation_rad + departures.elevation_rad,
+        azimuth + noise.azimuth_rad * scatter + departures.azimuth_rad,
+        elevation + noise.elevation_rad * scatter + departures.elevation_rad,
     )

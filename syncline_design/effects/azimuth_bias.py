@@ -1,0 +1,50 @@
+"""A constant added to every azimuth of the ranging sensor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from syncline_design.effects.base import (
+    Array,
+    Contribution,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.effects.kinematics import column, ranging_vector, rotate
+from syncline_design.model.system import Stage
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+    """measured azimuth = true + bias [rad]."""
+    return Departures(azimuth_rad=column(values["bias_rad"], rows))
+
+
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+    """d error / d bias = R (z x b), z down [m/rad]; (n, 3, 1)."""
+    turned = np.cross(np.array([0.0, 0.0, 1.0]), ranging_vector(rows))
+    return rotate(rows.rotation, turned)[:, :, None]
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+    """|bias| d."""
+    return Contribution(systematic_m=abs(values["bias_rad"]) * stage.platform.distance_m)
+
+
+EFFECT = Effect(
+    name="azimuth_bias",
+    sensors=("ranging",),
+    kind="deterministic",
+    parameters=(Parameter("bias_rad", 1e-6, 0.2, "rad"),),
+    sentence="azimuths of the ranging sensor are {bias_rad} too large",
+    confused_with="boresight",
+    separated_by="bearings all around",
+    source="paper, bearing vector before eq. bear_posvec; measured = true + bias",
+    depart=_depart,
+    sensitivity=_sensitivity,
+    contribute=_contribute,
+)

@@ -1,0 +1,49 @@
+"""The sensor's clock runs fast or slow, so its data age as the log goes on."""
+
+from __future__ import annotations
+
+from syncline_design.effects.base import (
+    Array,
+    Contribution,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.effects.kinematics import elapsed, shift_slope, shifted
+from syncline_design.model.system import Stage
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+    """stamp = true + rate (t - t0), so mu = -rate (t - t0), t0 the first row's stamp."""
+    return shifted(sensor, -values["rate"] * elapsed(rows))
+
+
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+    """d error / d rate = -V (t - t0) or -W (t - t0) [m]; (n, 3, 1)."""
+    return (-shift_slope(rows, sensor) * elapsed(rows)[:, None])[:, :, None]
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+    """tau grows by |rate| times an hour: a drift without end needs a period, and this is ours."""
+    return Contribution(tau_s=abs(values["rate"]) * PERIOD_S)
+
+
+PERIOD_S = 3600.0
+
+EFFECT = Effect(
+    name="clock_drift",
+    sensors=("position", "attitude"),
+    kind="deterministic",
+    parameters=(Parameter("rate", 1e-7, 1e-2),),
+    sentence="the clock that stamps the {sensor} data runs fast by {rate}",
+    confused_with="timestamp_step; heading_drift (attitude)",
+    separated_by="repeating the same manoeuvre early and late",
+    source="ITU-T G.810, frequency offset; stamp = true + rate (t - t0)",
+    depart=_depart,
+    sensitivity=_sensitivity,
+    contribute=_contribute,
+)

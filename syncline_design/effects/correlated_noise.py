@@ -1,0 +1,60 @@
+"""Positions wander slowly, as one process per axis."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from syncline_design.effects.base import (
+    Contribution,
+    Covariance,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+    Wander,
+)
+from syncline_design.effects.kinematics import gauss_markov
+from syncline_design.model.system import Stage
+
+AXES = np.ones(3)
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+    """The antenna reading wanders by a first-order Gauss-Markov process per axis."""
+    if rng is None:
+        return Departures()
+    draws = rng.standard_normal((len(rows), 3)) * AXES
+    wander = gauss_markov(rows.time_s, values["time_constant_s"], draws)
+    return Departures(position_m=values["std_m"] * wander)
+
+
+def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
+    """Cov(t, t') += std^2 exp(-|t - t'| / T) per axis."""
+    return Covariance(wander=Wander(np.diag(AXES), values["std_m"], values["time_constant_s"]))
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+    """sqrt(3) std: one standard deviation, as the sensor's own term."""
+    return Contribution(systematic_m=values["std_m"] * float(np.linalg.norm(AXES)))
+
+
+EFFECT = Effect(
+    name="correlated_noise",
+    sensors=("position",),
+    kind="stochastic",
+    parameters=(
+        Parameter("std_m", 1e-4, 50.0, "m", signed=False),
+        Parameter("time_constant_s", 0.1, 1e4, "s", signed=False),
+    ),
+    sentence="positions wander by {std_m} per axis, with a time constant of {time_constant_s}",
+    confused_with="every slow effect: datum_offset, clock_drift, heading_drift",
+    separated_by="a log many time constants long",
+    source="first-order Gauss-Markov process (Gelb, Applied Optimal Estimation, 1974)",
+    depart=_depart,
+    sensitivity=None,
+    contribute=_contribute,
+    spread=_spread,
+)

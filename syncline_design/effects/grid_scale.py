@@ -1,0 +1,56 @@
+"""The survey's grid has another scale than the positions."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from syncline_design.effects.base import (
+    Array,
+    Contribution,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.model.system import Stage
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+    """surveyed object = true (1 + scale), horizontally, about the local origin."""
+    return Departures(target_m=values["scale"] * _level(rows))
+
+
+def _level(rows: StageRows) -> Array:
+    """North and east of the object [m], NED with down 0, (n, 3)."""
+    level: Array = rows.target_m * np.array([1.0, 1.0, 0.0])
+    return level
+
+
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+    """d error / d scale = -(p_north, p_east, 0) [m]; (n, 3, 1)."""
+    return -_level(rows)[:, :, None]
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+    """|scale| times a kilometre of baseline: the spec does not say how far the survey goes."""
+    return Contribution(systematic_m=abs(values["scale"]) * BASELINE_M)
+
+
+BASELINE_M = 1000.0
+
+EFFECT = Effect(
+    name="grid_scale",
+    sensors=("target",),
+    kind="deterministic",
+    parameters=(Parameter("scale", 1e-7, 0.01),),
+    sentence="the survey's grid is too large by a share of {scale}",
+    confused_with="datum_offset on a short baseline",
+    separated_by="a long baseline",
+    source="map projection point scale; surveyed = true (1 + scale)",
+    depart=_depart,
+    sensitivity=_sensitivity,
+    contribute=_contribute,
+)

@@ -1,0 +1,62 @@
+"""Some positions are far off: Student's t instead of normal noise, or outliers."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from syncline_design.effects.base import (
+    Contribution,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.model.system import Stage
+
+OUTLIER_FACTOR = 10.0  # an outlier's standard deviation over the others'
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+    """Noise times sqrt(nu / chi2_nu) per row, and ten times that in a share of the rows."""
+    if rng is None:
+        return Departures()
+    freedom = values["degrees_of_freedom"]
+    factor = np.sqrt(freedom / rng.chisquare(freedom, len(rows)))
+    struck = rng.random(len(rows)) < values["outlier_rate"]
+    return Departures(position_noise=factor * np.where(struck, OUTLIER_FACTOR, 1.0) - 1.0)
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+    """What the standard deviation grows by: sqrt(nu / (nu - 2) (1 + 99 rate)) - 1 times sigma_p."""
+    if stage.position is None:
+        return Contribution()
+    freedom = max(values["degrees_of_freedom"], LEAST_FREEDOM)
+    outliers = 1.0 + (OUTLIER_FACTOR**2 - 1.0) * values["outlier_rate"]
+    growth = math.sqrt(freedom / (freedom - 2.0) * outliers) - 1.0
+    return Contribution(systematic_m=growth * math.hypot(*stage.position.sigma))
+
+
+LEAST_FREEDOM = 2.1  # the variance of Student's t is infinite at 2
+
+EFFECT = Effect(
+    name="heavy_tails",
+    sensors=("position",),
+    kind="stochastic",
+    parameters=(
+        Parameter("degrees_of_freedom", 1.0, 30.0, signed=False),
+        Parameter("outlier_rate", 0.0, 0.3, signed=False),
+    ),
+    sentence="positions have heavy tails: {degrees_of_freedom} degrees of freedom, a share of "
+    "{outlier_rate} outliers",
+    confused_with="timestamp_jitter, noise_understated",
+    separated_by="speed: tails are not linked to it",
+    source="Student's t as normal over chi-square (Lange, Little, Taylor, JASA 84, 1989)",
+    depart=_depart,
+    sensitivity=None,
+    contribute=_contribute,
+)

@@ -1,0 +1,77 @@
+"""Heave is measured away from where it is used, so roll and pitch add to it."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from syncline_design.effects.base import (
+    Array,
+    Contribution,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.model.system import Stage
+
+VESSEL_WORDS = ("vessel", "ship", "boat", "usv", "ferry")
+ACOUSTIC = ("usbl", "mbes", "sbes", "sonar")
+
+
+def _applies(stage: Stage, sensor: Target) -> bool:
+    """Vessels: by the stage's or vehicle's name, or by an acoustic ranging sensor."""
+    if stage.position is None:
+        return False
+    words = f"{stage.name} {stage.vehicle}".lower()
+    kind = "" if stage.ranging is None else stage.ranging.type.lower()
+    return kind in ACOUSTIC or any(word in words for word in VESSEL_WORDS)
+
+
+def _heave(rows: StageRows) -> Array:
+    """Down component of (R - I) l per unit l [-], (n, 3): -sin p, sin r cos p, cos r cos p - 1."""
+    slope: Array = rows.rotation[:, 2, :] - np.array([0.0, 0.0, 1.0])
+    return slope
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+    """The down reading is off by the down component of (R - I) l."""
+    lever = np.array([values["x_m"], values["y_m"], values["z_m"]])
+    added = np.zeros((len(rows), 3))
+    added[:, 2] = _heave(rows) @ lever
+    return Departures(position_m=added)
+
+
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+    """d error / d l: the down row only [-]; (n, 3, 3)."""
+    slope = np.zeros((len(rows), 3, 3))
+    slope[:, 2, :] = _heave(rows)
+    return slope
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+    """|l| sin 10 deg: what a vessel's usual roll and pitch make of the lever."""
+    lever = math.hypot(values["x_m"], values["y_m"], values["z_m"])
+    return Contribution(systematic_m=lever * math.sin(math.radians(USUAL_TILT_DEG)))
+
+
+USUAL_TILT_DEG = 10.0
+
+EFFECT = Effect(
+    name="induced_heave",
+    sensors=("position",),
+    kind="deterministic",
+    parameters=tuple(Parameter(f"{axis}_m", 1e-2, 50.0, "m") for axis in "xyz"),
+    sentence="heave is measured {x_m} forward, {y_m} right, {z_m} down of where it is used",
+    confused_with="height_drift; lever_arm",
+    separated_by="roll and pitch at different headings",
+    source="rigid-body kinematics of remote heave",
+    depart=_depart,
+    sensitivity=_sensitivity,
+    contribute=_contribute,
+    applies=_applies,
+)

@@ -1,0 +1,65 @@
+"""A sensor scatters more than its data sheet says."""
+
+from __future__ import annotations
+
+import math
+
+from syncline_design.effects.base import (
+    Contribution,
+    Covariance,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.effects.kinematics import column
+from syncline_design.model.system import Stage
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
+    """The sensor's noise is factor times the spec's."""
+    extra = column(values["factor"] - 1.0, rows)
+    if sensor == "position":
+        return Departures(position_noise=extra)
+    if sensor == "attitude":
+        return Departures(attitude_noise=extra)
+    return Departures(ranging_noise=extra)
+
+
+def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
+    """Standard deviations of the sensor times factor."""
+    return Covariance(factors=((sensor, values["factor"]),))
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+    """(factor - 1) times the sensor's term of the sensor error."""
+    part = getattr(stage, sensor, None)
+    if part is None:
+        return Contribution()
+    d = stage.platform.distance_m
+    if sensor == "position":
+        size = math.hypot(*part.sigma)
+    elif sensor == "attitude":
+        size = math.hypot(*part.sigma) * d
+    else:
+        size = part.sigma[0] + math.hypot(part.sigma[1], part.sigma[2]) * d
+    return Contribution(systematic_m=max(values["factor"] - 1.0, 0.0) * size)
+
+
+EFFECT = Effect(
+    name="noise_understated",
+    sensors=("position", "attitude", "ranging"),
+    kind="stochastic",
+    parameters=(Parameter("factor", 1.0, 100.0, signed=False),),
+    sentence="{sensor} data scatter {factor} times as much as the spec says",
+    confused_with="heavy_tails, correlated_noise, timestamp_jitter",
+    separated_by="a longer log; standing still",
+    source="paper, eq. sensor_error_ub, with the standard deviations times factor",
+    depart=_depart,
+    sensitivity=None,
+    contribute=_contribute,
+    spread=_spread,
+)

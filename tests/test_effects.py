@@ -1,0 +1,207 @@
+"""One contract over all effects, whatever they are."""
+
+from __future__ import annotations
+
+import dataclasses
+import string
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import syncline_design.effects as effects_package
+from syncline_design.effects import NOT_EFFECTS, registry
+from syncline_design.effects.base import Departures, Effect, StageRows, Target
+from syncline_design.effects.frame_convention import conventions
+from syncline_design.model.system import Platform, Sensor, Stage
+from syncline_design.simulate.chain import (
+    ConstantTwist,
+    euler_to_rotation,
+    no_noise,
+    rotation_to_euler,
+    stage_error,
+)
+from syncline_design.timing import NO_ERROR
+
+Array = NDArray[np.float64]
+PAIRS = [(e, s) for e in registry().values() for s in e.sensors]
+IDS = [f"{effect.name}-{sensor}" for effect, sensor in PAIRS]
+ROWS = 60
+MARGIN = 2e-3  # of the largest slope: what second-order terms leave at the small step taken
+
+
+def rows() -> StageRows:
+    rng = np.random.default_rng(7)
+    euler = rng.uniform([-0.6, -0.6, -3.0], [0.6, 0.6, 3.0], (ROWS, 3))
+    rotation = euler_to_rotation(euler)
+    azimuth, elevation = rng.uniform(-3, 3, ROWS), rng.uniform(-1.2, 1.2, ROWS)
+    distance = rng.uniform(5.0, 60.0, ROWS)
+    cos_el = np.cos(elevation)
+    pointing = np.stack([np.cos(azimuth) * cos_el, np.sin(azimuth) * cos_el, -np.sin(elevation)], 1)
+    position = rng.uniform(-300, 300, (ROWS, 3))
+    arm = np.array([-0.4, 0.1, 0.6])
+    body = arm + distance[:, None] * pointing
+    return StageRows(
+        time_s=np.arange(ROWS) * 0.1,
+        position_m=position,
+        rotation=rotation,
+        euler_rad=rotation_to_euler(rotation),
+        velocity_mps=rng.uniform(-10, 10, (ROWS, 3)),
+        acceleration_mps2=rng.uniform(-3, 3, (ROWS, 3)),
+        rate_radps=rng.uniform(-1, 1, (ROWS, 3)),
+        range_m=distance,
+        azimuth_rad=azimuth,
+        elevation_rad=elevation,
+        antenna_m=np.array([0.3, -0.2, -1.0]),
+        ranging_m=arm,
+        target_m=position + np.einsum("nij,nj->ni", rotation, body),
+    )
+
+
+def stage(ranging_type: str = "usbl") -> Stage:
+    return Stage(
+        name="vessel",
+        vehicle="vessel",
+        platform=Platform(5.0, 0.5, 40.0, 1.0),
+        position=Sensor("gnss", "position", (0.01, 0.01, 0.02), NO_ERROR),
+        attitude=Sensor("ins", "attitude", (1e-3, 1e-3, 2e-3), NO_ERROR),
+        ranging=Sensor("r", "ranging", (0.02, 1e-3, 1e-3), NO_ERROR, type=ranging_type),
+    )
+
+
+def values_of(effect: Effect, sensor: Target, size: float = 0.0) -> dict[str, float]:
+    """Every continuous parameter `size` of its plausible least, located ones in the middle."""
+    values: dict[str, float] = {}
+    for p in effect.parameters:
+        if p.choices:
+            values[p.name] = conventions(sensor)[0]  # type: ignore[assignment]
+        else:
+            values[p.name] = 3.0 if p.located else size * max(p.low, 1e-6)
+    return values
+
+
+def error_of(state: StageRows, departures: Departures) -> Array:
+    motion = ConstantTwist(state.rotation, state.velocity_mps, state.rate_radps)
+    return stage_error(state, motion, no_noise(len(state)), departures)
+
+
+def test_every_file_of_the_folder_is_one_effect_of_its_name() -> None:
+    folder = Path(next(iter(effects_package.__path__)))
+    files = {p.stem for p in folder.glob("*.py")} - NOT_EFFECTS - {"__init__"}
+    assert files == set(registry())
+    assert len(files) == 31  # the rows of the dictionary, a name per row or more
+
+
+@pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
+def test_sensitivity_is_the_slope_of_the_exact_term(effect: Effect, sensor: Target) -> None:
+    if effect.sensitivity is None:
+        assert effect.kind != "deterministic"
+        return
+    state, base = rows(), values_of(effect, sensor)
+    analytic = effect.sensitivity(state, base, sensor)
+    assert analytic.shape == (ROWS, 3, len(effect.slopes()))
+    scale = np.abs(analytic).max()
+    assert scale > 0
+    for k, parameter in enumerate(effect.slopes()):
+        step = 1e-6
+        ends = []
+        for sign in (1.0, -1.0):
+            values = {**base, parameter.name: base[parameter.name] + sign * step}
+            ends.append(error_of(state, effect.depart(state, values, sensor, None)))
+        slope = (ends[0] - ends[1]) / (2 * step)
+        assert np.abs(slope - analytic[:, :, k]).max() <= MARGIN * scale
+
+
+@pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
+def test_nothing_departs_at_zero(effect: Effect, sensor: Target) -> None:
+    if effect.kind == "discrete" or effect.name in {"noise_understated", "heavy_tails"}:
+        return  # a convention has no zero; a factor's neutral value is 1, tails' is infinity
+    state = rows()
+    values = values_of(effect, sensor) | {"time_constant_s": 1.0} if effect.spread else None
+    departed = effect.depart(
+        state, values or values_of(effect, sensor), sensor, np.random.default_rng(1)
+    )
+    assert np.abs(error_of(state, departed)).max() < 1e-9
+
+
+@pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
+def test_it_says_what_people_need(effect: Effect, sensor: Target) -> None:
+    for text in (effect.sentence, effect.confused_with, effect.separated_by, effect.source):
+        assert text.strip()
+    named = {field for _, field, _, _ in string.Formatter().parse(effect.sentence) if field}
+    assert named - {"sensor"} <= {p.name for p in effect.parameters}
+    for p in effect.parameters:
+        assert p.low <= p.high
+
+
+@pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
+def test_it_adds_to_the_budget(effect: Effect, sensor: Target) -> None:
+    small, large = (
+        effect.contribute(stage(), values_of(effect, sensor, size) | neutral(effect, size), sensor)
+        for size in (2.0, 4.0)
+    )
+    assert small.tau_s + small.systematic_m > 0
+    assert large.tau_s >= small.tau_s >= 0
+    assert large.systematic_m >= small.systematic_m >= 0
+    assert (small.tau_s > 0) != (small.systematic_m > 0)
+
+
+def neutral(effect: Effect, size: float) -> dict[str, float]:
+    if effect.name == "heavy_tails":
+        return {"degrees_of_freedom": 12.0 / size, "outlier_rate": 0.01 * size}
+    return {}
+
+
+STOCHASTIC = [(e, s) for e, s in PAIRS if e.spread is not None and e.name != "noise_understated"]
+
+
+@pytest.mark.parametrize(("effect", "sensor"), STOCHASTIC, ids=lambda x: getattr(x, "name", x))
+def test_spread_is_the_covariance_of_what_is_drawn(effect: Effect, sensor: Target) -> None:
+    """400 draws: every diagonal entry within 5 of its standard errors (2/400)^0.5 = 7 %.
+
+    180 entries at 5 sigma: a true covariance fails one run in 10 000 (chi-square's skew included).
+    """
+    assert effect.spread is not None
+    state, rng, draws = rows(), np.random.default_rng(3), 400
+    values = {"std_s": 1e-4, "interval_s": 1e-4, "std_m": 0.1, "time_constant_s": 2.0}
+    kept = {p.name: values[p.name] for p in effect.parameters}
+    sample = np.stack(
+        [error_of(state, effect.depart(state, kept, sensor, rng)) for _ in range(draws)]
+    )
+    spread = effect.spread(state, kept, sensor)
+    if spread.directions is not None:
+        expected = (spread.directions**2).sum(axis=2)
+    else:
+        assert spread.wander is not None
+        loading = np.atleast_2d(spread.wander.loading)
+        expected = np.broadcast_to((loading**2).sum(axis=1) * spread.wander.std_m**2, (ROWS, 3))
+    measured = sample.var(axis=0)
+    assert np.all(np.abs(measured - expected) <= 5 * (2 / draws) ** 0.5 * expected + 1e-15)
+
+
+def test_understated_noise_scales_the_draw() -> None:
+    state = rows()
+    rng = np.random.default_rng(5)
+    noise = dataclasses.replace(no_noise(ROWS), position_m=rng.standard_normal((ROWS, 3)))
+    motion = ConstantTwist(state.rotation, state.velocity_mps, state.rate_radps)
+    depart = registry()["noise_understated"].depart(state, {"factor": 3.0}, "position", rng)
+    once, scaled = (stage_error(state, motion, noise, d) for d in (Departures(), depart))
+    assert scaled == pytest.approx(3.0 * once, abs=1e-9)
+
+
+def test_gross_conventions_are_their_own_inverse_where_they_should_be() -> None:
+    """A transposed attitude read as a rotation is the transpose, exactly."""
+    state = rows()
+    effect = registry()["frame_convention"]
+    depart = effect.depart(state, {"convention": "transposed"}, "attitude", None)  # type: ignore[dict-item]
+    held = euler_to_rotation(state.euler_rad + depart.attitude_euler_rad)
+    assert held == pytest.approx(np.swapaxes(state.rotation, 1, 2), abs=1e-12)
+
+
+def test_acoustic_effects_ask_for_acoustic_sensors() -> None:
+    applies = {name: registry()[name].applies for name in ("sound_speed", "turnaround_delay")}
+    assert all(a(stage("usbl"), "ranging") for a in applies.values())
+    assert applies["sound_speed"](stage("mbes"), "ranging")
+    assert not applies["turnaround_delay"](stage("mbes"), "ranging")
+    assert not any(a(stage("lidar"), "ranging") for a in applies.values())
