@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from syncline_design.report.overview_page import render_verdicts
 from syncline_design.report.verdict_page import render_verdict
 
-__all__ = ["render_verdict"]
+__all__ = ["render_verdict", "render_verdicts"]

@@ -1,0 +1,39 @@
+"""The outputs of `check`: one or several verdicts in every format."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Final
+
+CHECK_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown", "csv")
+
+
+def render_checks(name: str, verdicts: Sequence[dict[str, Any]]) -> str:
+    """The text of one format for these verdicts (schema syncline-design/verdict/v1).
+
+    A file that could not be read may stand among them as {"verdict": "refused", "file": ...,
+    "problems": [{"file", "line", "column", "path", "message"}]}.
+    """
+    return _renderer(name)(verdicts)
+
+
+def _renderer(name: str) -> Callable[[Sequence[dict[str, Any]]], str]:
+    """Each format's module loads only when it is asked for."""
+    match name:
+        case "json":
+            from syncline_design.report.json_out import verdicts_json as render
+        case "html":
+            from syncline_design.report.pages import render_verdicts as render
+        case "junit":
+            from syncline_design.report.junit import render_junit as render
+        case "sarif":
+            from syncline_design.report.sarif import render_sarif as render
+        case "github":
+            from syncline_design.report.github import render_github as render
+        case "markdown":
+            from syncline_design.report.markdown import render_markdown as render
+        case "csv":
+            from syncline_design.report.csv_out import render_csv as render
+        case _:
+            raise ValueError(f"unknown format {name}")
+    return render

@@ -1,0 +1,49 @@
+"""CSV (RFC 4180) that no spreadsheet runs: text is quoted, what looks like a formula disarmed."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from syncline_design.report.findings import spec_file, spec_name
+from syncline_design.report.json_out import json_text
+from syncline_design.report.text import spreadsheet_safe
+from syncline_design.report.verdict_words import Json, items
+
+_COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value", "limit", "unit",
+            "margin", "line")  # fmt: skip
+
+
+def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
+    """Rows under a header; figures in full precision, missing ones empty."""
+    stream = io.StringIO(newline="")
+    writer = csv.writer(stream, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\r\n")
+    writer.writerow([spreadsheet_safe(column) for column in columns])
+    for row in rows:
+        writer.writerow([_cell(row.get(column)) for column in columns])
+    return stream.getvalue()
+
+
+def _cell(value: Any) -> Any:
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, int | float):
+        return float(value) if isinstance(value, float) else value
+    if isinstance(value, Mapping | list | tuple):
+        return spreadsheet_safe(json_text(value).strip())
+    return spreadsheet_safe(value)
+
+
+def render_csv(verdicts: Sequence[Json]) -> str:
+    """A row per requirement of every spec; a spec without any still gets its row."""
+    rows: list[dict[str, Any]] = []
+    for verdict in verdicts:
+        head = {"spec": spec_name(verdict), "file": spec_file(verdict),
+                "verdict": verdict.get("verdict")}  # fmt: skip
+        found = items(verdict, "requirements")
+        rows += [{**row, **head, "requirement": row.get("id")} for row in found] or [head]
+    return csv_text(_COLUMNS, rows)

@@ -1,0 +1,134 @@
+"""A verdict as a list of findings with their place in the spec: what CI formats are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from syncline_design.report import numbers
+from syncline_design.report.verdict_words import (
+    Json,
+    is_waived,
+    items,
+    kind_text,
+    margin_text,
+    outcome,
+    part,
+    value_text,
+    waiver_text,
+)
+
+Level = Literal["pass", "fail", "undecided", "waived", "warning"]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing said about a spec: rule (the requirement's kind), id, place, one sentence."""
+
+    level: Level
+    rule: str
+    id: str
+    file: str
+    line: int
+    column: int
+    message: str
+    justification: str = ""
+
+
+def spec_file(verdict: Json) -> str:
+    """The path the user gave."""
+    return str(part(verdict, "spec").get("file") or verdict.get("file") or "spec.yaml")
+
+
+def spec_name(verdict: Json) -> str:
+    """The system's name, or its file where it could not be read."""
+    return str(part(verdict, "spec").get("name") or spec_file(verdict))
+
+
+def findings(verdict: Json) -> list[Finding]:
+    """Every requirement, problem, reason of infeasibility and warning of a verdict."""
+    file = spec_file(verdict)
+    found = [_problem(entry, file) for entry in items(verdict, "problems")]
+    found += [_requirement(row, file) for row in items(verdict, "requirements")]
+    if verdict.get("verdict") in ("infeasible", "indeterminate") and not found_failure(found):
+        found.insert(0, _no_design(verdict, file))
+    found += [
+        Finding("warning", str(entry.get("code") or "warning"), "", file, _place(entry, "line"),
+                _place(entry, "column"), str(entry.get("message")))
+        for entry in items(verdict, "warnings")
+    ]  # fmt: skip
+    return found
+
+
+def found_failure(found: list[Finding]) -> bool:
+    """Whether something already fails a job."""
+    return any(finding.level == "fail" for finding in found)
+
+
+def _place(entry: Json, key: str) -> int:
+    value = numbers.finite(entry.get(key))
+    return 1 if value is None or value < 1 else int(value)
+
+
+def _problem(entry: Json, file: str) -> Finding:
+    path = entry.get("path")
+    message = (f"{path}: " if path else "") + str(entry.get("message"))
+    return Finding("fail", "spec", "", str(entry.get("file") or file), _place(entry, "line"),
+                   _place(entry, "column"), message)  # fmt: skip
+
+
+def _requirement(row: Json, file: str) -> Finding:
+    levels: dict[str, Level] = {"pass": "pass", "fail": "fail"}
+    level = levels.get(str(row.get("status")), "undecided")
+    if level == "fail" and is_waived(row):
+        level = "waived"
+    return Finding(level, str(row.get("kind")), str(row.get("id")), file, _place(row, "line"),
+                   _place(row, "column"), requirement_sentence(row), waiver_text(row))  # fmt: skip
+
+
+def requirement_sentence(row: Json) -> str:
+    """`ACC-1: worst-case error (Syncline) 93.9 mm exceeds its limit 50 mm (87.8 % over)`."""
+    status = str(row.get("status"))
+    limit = value_text(row, "limit")
+    if numbers.finite(row.get("value")) is None:
+        text = f"{row.get('id')}: {kind_text(row)} limited to {limit}; no value"
+    else:
+        verb = {"pass": "keeps", "fail": "does not keep"}.get(status, "is undecided against")
+        text = (
+            f"{row.get('id')}: {kind_text(row)} {value_text(row, 'value')} {verb} its limit "
+            f"{limit} ({margin_text(row)})"
+        )
+    return text + (f"; {row['note']}" if row.get("note") else "")
+
+
+def _no_design(verdict: Json, file: str) -> Finding:
+    word = str(verdict.get("verdict"))
+    level: Level = "fail" if word == "infeasible" else "undecided"
+    line, column = _conflict_place(verdict)
+    return Finding(level, word, "", file, line, column, no_design_text(verdict))
+
+
+def _conflict_place(verdict: Json) -> tuple[int, int]:
+    conflict = part(part(verdict, "infeasibility"), "conflict")
+    for entry in items(conflict, "requirements"):
+        return _place(entry, "line"), _place(entry, "column")
+    return 1, 1
+
+
+def no_design_text(verdict: Json) -> str:
+    """Why there is no design, and what would give one."""
+    from syncline_design.report.verdict_words import design_sentence
+
+    fixes = [str(entry.get("text")) for entry in items(part(verdict, "infeasibility"), "fixes")]
+    text = f"{outcome(verdict).word}. {design_sentence({**verdict, 'design': None})}"
+    reason = verdict.get("reason")
+    if reason:
+        text += f" {reason}"
+    return text + (f" Either of these would do: {'; '.join(fixes)}." if fixes else "")
+
+
+def all_findings(verdicts: list[Any]) -> Iterator[Finding]:
+    """Findings of several verdicts, in their order."""
+    for verdict in verdicts:
+        yield from findings(verdict)

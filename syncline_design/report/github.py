@@ -1,0 +1,46 @@
+"""GitHub workflow commands: annotations at the spec's line in a pull request.
+
+Source: GitHub Docs, "Workflow commands for GitHub Actions" (error, warning, notice; escaping of
+%, CR, LF, and in properties of : and ,).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import PurePath
+
+from syncline_design.report.findings import Finding, all_findings, spec_file, spec_name
+from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import Json, design_sentence, outcome
+
+_COMMANDS = {"fail": "error", "undecided": "error", "waived": "warning", "warning": "warning"}
+
+
+def render_github(verdicts: Sequence[Json]) -> str:
+    """One command per finding that is no pass, then a notice with each spec's outcome."""
+    lines = [_command(f) for f in all_findings(list(verdicts)) if f.level != "pass"]
+    for verdict in verdicts:
+        text = f"{outcome(verdict).word}. {design_sentence(verdict)}"
+        place = f"file={_property(PurePath(spec_file(verdict)).as_posix())},line=1"
+        lines.append(f"::notice {place},title={_property(spec_name(verdict))}::{_data(text)}")
+    return "\n".join(lines) + "\n"
+
+
+def _command(finding: Finding) -> str:
+    title = f"{finding.id} {finding.rule}".strip()
+    if finding.level == "waived":
+        title += " (waived)"
+    message = finding.message + (f"; {finding.justification}" if finding.justification else "")
+    file = PurePath(finding.file).as_posix()
+    return (
+        f"::{_COMMANDS[finding.level]} file={_property(file)},line={finding.line},"
+        f"col={finding.column},title={_property(title)}::{_data(message)}"
+    )
+
+
+def _data(text: str) -> str:
+    return visible(text).replace("%", "%25").replace("\r", "%0D").replace("\n", "%0A")
+
+
+def _property(text: str) -> str:
+    return _data(text).replace(":", "%3A").replace(",", "%2C")

@@ -1,0 +1,75 @@
+"""JUnit XML as GitLab, Jenkins and GitHub actions read it: a suite per spec, a case per limit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree import ElementTree
+
+from syncline_design.report.findings import Finding, findings, spec_file, spec_name
+from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import Json, outcome
+
+
+def render_junit(verdicts: Sequence[Json]) -> str:
+    """A JUnit document; failures fail, what is undecided errors, what is waived is skipped.
+
+    Times are 0 and no timestamp is given: the same verdict gives the same bytes.
+    """
+    suites = ElementTree.Element("testsuites", {"name": "syncline-design"})
+    for verdict in verdicts:
+        suites.append(_suite(verdict))
+    for key in ("tests", "failures", "errors", "skipped"):
+        total = sum(int(suite.get(key, "0")) for suite in suites)
+        suites.set(key, str(total))
+    suites.set("time", "0")
+    ElementTree.indent(suites)
+    body = ElementTree.tostring(suites, encoding="unicode")
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + body + "\n"
+
+
+def _suite(verdict: Json) -> ElementTree.Element:
+    found = findings(verdict)
+    cases = [finding for finding in found if finding.level != "warning"]
+    counts = {
+        "tests": len(cases),
+        "failures": sum(f.level == "fail" for f in cases),
+        "errors": sum(f.level == "undecided" for f in cases),
+        "skipped": sum(f.level == "waived" for f in cases),
+    }
+    suite = ElementTree.Element("testsuite", {"name": visible(spec_name(verdict))})
+    for key, value in counts.items():
+        suite.set(key, str(value))
+    suite.set("time", "0")
+    for finding in cases:
+        suite.append(_case(finding, spec_file(verdict)))
+    lines = [outcome(verdict).word]
+    lines += [f"warning: {visible(f.message)}" for f in found if f.level == "warning"]
+    ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)
+    return suite
+
+
+def _case(finding: Finding, file: str) -> ElementTree.Element:
+    name = f"{finding.id} {finding.rule}" if finding.id else finding.rule
+    case = ElementTree.Element(
+        "testcase",
+        {
+            "name": visible(name),
+            "classname": visible(file),
+            "file": visible(finding.file),
+            "line": str(finding.line),
+            "time": "0",
+        },
+    )
+    message = visible(finding.message)
+    place = f"{visible(finding.file)}:{finding.line}:{finding.column}"
+    if finding.level == "fail":
+        failure = ElementTree.SubElement(case, "failure", {"type": finding.rule})
+        failure.set("message", message)
+        failure.text = f"{place}: {message}"
+    elif finding.level == "undecided":
+        error = ElementTree.SubElement(case, "error", {"type": finding.rule, "message": message})
+        error.text = f"{place}: {message}"
+    elif finding.level == "waived":
+        reason = f"{visible(finding.justification)}; {message}"
+        ElementTree.SubElement(case, "skipped", {"message": reason})
+    return case

@@ -1,0 +1,102 @@
+"""SARIF 2.1.0, as code scanning reads it: a result per failing requirement, at its line.
+
+Source: OASIS Static Analysis Results Interchange Format (SARIF) Version 2.1.0, 27 March 2020,
+sections 3.13 (sarifLog), 3.14 (run), 3.27 (result), 3.35 (suppression), 3.49 (reportingDescriptor).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import PurePath
+from typing import Any, Final
+from urllib.parse import quote
+
+from syncline_design import __version__
+from syncline_design.report.findings import Finding, all_findings
+from syncline_design.report.json_out import json_text
+from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import Json
+
+SCHEMA_URI: Final = (
+    "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
+)
+_RULES: Final[dict[str, str]] = {
+    "accuracy": "The Syncline of the design keeps the required accuracy.",
+    "sync": "Every timestamp error stays below its critical value.",
+    "cost": "The price keeps its limit.",
+    "mass": "The mass keeps its limit.",
+    "power": "The power keeps its limit.",
+    "monte_carlo": "A quantile of the simulated error keeps its limit.",
+    "infeasible": "Some design meets every requirement.",
+    "indeterminate": "A verdict could be reached.",
+    "spec": "The spec can be read.",
+}
+_LEVELS: Final = {"fail": "error", "waived": "error", "undecided": "warning", "warning": "note"}
+
+
+def render_sarif(verdicts: Sequence[Json]) -> str:
+    """A SARIF log with one run; what passes is left out, what is waived is suppressed."""
+    found = [f for f in all_findings(list(verdicts)) if f.level != "pass"]
+    rules = sorted({_rule_id(f) for f in found})
+    run = {
+        "tool": {
+            "driver": {
+                "name": "syncline-design",
+                "version": __version__,
+                "rules": [_rule(rule) for rule in rules],
+            }
+        },
+        "columnKind": "unicodeCodePoints",
+        "results": [_result(finding, rules) for finding in found],
+    }
+    return json_text({"$schema": SCHEMA_URI, "version": "2.1.0", "runs": [run]})
+
+
+def _rule_id(finding: Finding) -> str:
+    return visible(finding.rule)
+
+
+def _rule(rule: str) -> dict[str, Any]:
+    text = _RULES.get(rule, "What the reader of a verdict should know.")
+    return {"id": rule, "shortDescription": {"text": text}}
+
+
+def _result(finding: Finding, rules: list[str]) -> dict[str, Any]:
+    rule = _rule_id(finding)
+    result: dict[str, Any] = {
+        "ruleId": rule,
+        "ruleIndex": rules.index(rule),
+        "kind": "fail",
+        "level": _LEVELS[finding.level],
+        "message": {"text": visible(finding.message)},
+        "locations": [_location(finding)],
+        "partialFingerprints": {"requirement/v1": _fingerprint(finding)},
+    }
+    if finding.level == "waived":
+        result["suppressions"] = [
+            {"kind": "external", "justification": visible(finding.justification)}
+        ]
+    return result
+
+
+def _location(finding: Finding) -> dict[str, Any]:
+    return {
+        "physicalLocation": {
+            "artifactLocation": {"uri": artifact_uri(finding.file)},
+            "region": {"startLine": finding.line, "startColumn": finding.column},
+        }
+    }
+
+
+def artifact_uri(file: str) -> str:
+    """A path as a URI reference: forward slashes, percent-encoded; absolute ones as file:."""
+    path = PurePath(file)
+    encoded = quote(path.as_posix().encode("utf-8", "replace"), safe="/")
+    return f"file://{encoded}" if path.is_absolute() else encoded
+
+
+def _fingerprint(finding: Finding) -> str:
+    """Stable under changes of the figures: file, rule and requirement."""
+    parts = (finding.file, finding.rule, finding.id or finding.message)
+    return hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]
