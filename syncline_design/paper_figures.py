@@ -77,6 +77,44 @@ class Figure:
         return tuple(10.0 ** (low + (high - low) * i / (points - 1)) for i in range(points))
 
 
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A simulated point of a figure: the worst case found at tau, beside the Syncline there."""
+
+    tau_s: float
+    worst_case_m: float
+    syncline_m: float
+
+    @property
+    def ratio(self) -> float:
+        """Worst case over Syncline; the paper finds no significant deviation from 1."""
+        return self.worst_case_m / self.syncline_m
+
+
+def compare(figure: Figure, points: int = 13, seed: int = 0) -> tuple[Comparison, ...]:
+    """The simulated points of a figure: nonlinear chain, magnitudes bounded, directions free.
+
+    Empty for a figure that the paper does not set beside a simulation.  Lever arms of the length
+    of the platform's baseline take part, as in the paper's simulator, so that the worst case may
+    exceed the Syncline, which leaves them out.
+    """
+    if not figure.simulated:
+        return ()
+    import numpy as np
+
+    from syncline_design.simulate.worst_case import worst_cases
+
+    (curve,) = figure.curves
+    if curve.system is None:
+        raise ValueError(f"figure {figure.number} has no system to simulate")
+    grid = figure.tau_grid_s(points)
+    found = worst_cases(curve.system, np.array(grid), seed)
+    return tuple(
+        Comparison(tau, float(worst.value_m), error)
+        for tau, worst, error in zip(grid, found, curve.error_m(grid), strict=True)
+    )
+
+
 def sigma_axes(entry: SensorEntry) -> tuple[float, float, float]:
     """Standard deviations per axis; a single figure holds for every axis."""
     if entry.modality == "ranging":

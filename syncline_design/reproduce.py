@@ -20,14 +20,16 @@ from syncline_design.model.budget import budget
 from syncline_design.paper_figures import (
     FIGURE_1_SENSOR_ERROR_M,
     SURVEY_PAYLOAD,
+    Comparison,
     Figure,
+    compare,
     figures,
     platform_of,
     sigma_axes,
     survey_system,
 )
 from syncline_design.paper_tables import PRINTED
-from syncline_design.units import Dimension, Quantity, parse_quantity
+from syncline_design.units import Dimension, Quantity, format_quantity, parse_quantity
 
 SCHEMA = "syncline-design/reproduction/v1"
 TAU_CRIT_TABLES = ("tau_crit_georeferencing", "tau_crit_survey")
@@ -116,11 +118,16 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Reproduction:
-    """cells: the paper's results; inputs: its platform and sensor figures against the catalog."""
+    """What came out.
+
+    cells: the paper's results; inputs: its platform and sensor figures against the catalog;
+    comparisons: figure number to its simulated points (figures 3 and 7).
+    """
 
     cells: tuple[Cell, ...]
     inputs: tuple[Cell, ...]
     figures: tuple[Figure, ...]
+    comparisons: Mapping[int, tuple[Comparison, ...]]
 
     @property
     def ok(self) -> bool:
@@ -128,8 +135,11 @@ class Reproduction:
         return all(cell.status != "differs" for cell in (*self.cells, *self.inputs))
 
 
-def reproduce(catalog: Catalog | None = None) -> Reproduction:
-    """Compute every printed figure from a catalog, the built-in one unless another is given."""
+def reproduce(catalog: Catalog | None = None, simulate: bool = True) -> Reproduction:
+    """Compute every printed figure from a catalog, the built-in one unless another is given.
+
+    simulate: whether to add the simulated points of figures 3 and 7 (takes a second or two).
+    """
     catalog = load_builtin() if catalog is None else catalog
     cells = tuple(
         _cell((table, row, column), text, _computed_si(catalog, table, row, column))
@@ -141,7 +151,10 @@ def reproduce(catalog: Catalog | None = None) -> Reproduction:
         for table in ("platforms", "sensors")
         for row, column, text in _entries(table)
     )
-    return Reproduction(cells, inputs, figures(catalog))
+    plotted = figures(catalog)
+    beside = [figure for figure in plotted if figure.simulated and simulate]
+    simulated = {figure.number: compare(figure) for figure in beside}
+    return Reproduction(cells, inputs, plotted, simulated)
 
 
 def _entries(table: str) -> Iterator[tuple[str, str, str]]:
@@ -268,7 +281,7 @@ def as_json(result: Reproduction) -> dict[str, Any]:
             {"id": e.id, "where": e.where, "reason": e.reason, "cells": [k for k, _ in e.cells]}
             for e in ERRATA
         ],
-        "figures": [_figure_json(figure) for figure in result.figures],
+        "figures": [_figure_json(f, result.comparisons.get(f.number, ())) for f in result.figures],
     }
 
 
@@ -277,7 +290,7 @@ def _cell_json(cell: Cell) -> dict[str, Any]:
     return {name: getattr(cell, name) for name in (*names, "status", "note")}
 
 
-def _figure_json(figure: Figure) -> dict[str, Any]:
+def _figure_json(figure: Figure, simulated: tuple[Comparison, ...]) -> dict[str, Any]:
     grid = figure.tau_grid_s()
     return {
         "number": figure.number,
@@ -293,6 +306,10 @@ def _figure_json(figure: Figure) -> dict[str, Any]:
                 "error_m": list(curve.error_m(grid)),
             }
             for curve in figure.curves
+        ],
+        "simulated": [
+            {"tau_s": p.tau_s, "worst_case_m": p.worst_case_m, "ratio_to_syncline": p.ratio}
+            for p in simulated
         ],
     }
 
@@ -318,6 +335,7 @@ def as_text(result: Reproduction) -> str:
         lines += [table, *_rows([cell for cell in result.cells if cell.table == table]), ""]
     disputed = [cell for cell in result.inputs if cell.status != "agrees"]
     lines += ["inputs that are not as printed", *_rows(disputed), ""]
+    lines += ["figures set beside a simulation", *_comparison_lines(result), ""]
     lines += ["errata of the paper", *(f"  {e.id}: {e.where}. {e.reason}" for e in ERRATA), ""]
     words = {"tau_crit": "printed tau_crit cells", "text": "figures of the text"}
     for name, count in _counts(result).items():
@@ -328,6 +346,20 @@ def as_text(result: Reproduction) -> str:
         else "Some printed figures are NOT accounted for: see the rows that say differs."
     )
     return "\n".join(lines)
+
+
+def _comparison_lines(result: Reproduction) -> Iterator[str]:
+    for number, points in result.comparisons.items():
+        ratios = sorted(point.ratio for point in points)
+        yield (
+            f"  figure {number}: worst simulated error {ratios[0]:.3f} to {ratios[-1]:.3f} of the "
+            f"Syncline over {len(points)} values of tau, {_time_text(points[0].tau_s)} to "
+            f"{_time_text(points[-1].tau_s)}"
+        )
+
+
+def _time_text(value_s: float) -> str:
+    return format_quantity(value_s, Dimension.TIME, digits=2)
 
 
 def _count_line(count: Mapping[str, int], what: str) -> str:
