@@ -1,0 +1,1 @@
+"""The choice of a design: exact over the whole design space, by three roads that must agree."""

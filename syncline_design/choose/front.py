@@ -1,0 +1,217 @@
+"""The exact front by merging: what couples the roles is fixed or carried along, the rest adds up.
+
+Fixed: each vehicle's clock and, stage by stage, the timing class (tau, timeline) of the ranging
+option, the reference of that stage.  Carried along: sums of resources, channels in use, sensor
+error E and the largest pair bound M so far.  With the `syncline` model the total is
+E + rate max(M, what follows), so a partial design with no larger sums, E and E + rate M replaces
+another: whatever follows, it ends no worse.
+
+One constraint bounds the sensor error from below: tau_sys < limit * E / rate.  There the better
+sensor can be the one that fails.  The merge first ignores that constraint; if nothing on the
+result breaks it, the result is exact.  Otherwise a second, guarded merge lets only those partial
+designs replace others that satisfy the constraint whatever follows.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from syncline_design.choose.arrays import MARGIN, Tables, tabulate, useful_options
+from syncline_design.choose.evaluate import error_key, evaluate
+from syncline_design.choose.labels import Labels, concatenate
+from syncline_design.choose.merge import Ceiling, Merge
+from syncline_design.choose.outcome import FrontPoint, TooLarge
+from syncline_design.choose.pareto import Bools, Column, Columns, Floats, undominated
+from syncline_design.problem import ClockOption, Design, Problem, ResourceName
+
+
+@dataclass(frozen=True, slots=True)
+class _Finished:
+    """Complete designs by rising resource; `clocks` lists the combinations of clocks."""
+
+    labels: Labels  # the last column of `choice` is a place in `clocks`
+    total: Floats
+    clocks: tuple[tuple[int, ...], ...]
+
+
+def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint, ...]:
+    """The exact front of a resource against error, over designs that meet all but accuracy.
+
+    By rising amount and falling error; errors that agree to 12 figures count as equal.
+    """
+    return merged_front(problem, resource, accuracy=False)
+
+
+def merged_front(
+    problem: Problem, resource: ResourceName, *, accuracy: bool
+) -> tuple[FrontPoint, ...]:
+    """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12)."""
+    demand_structure(problem)
+    if any(not role.options for role in problem.roles):
+        return ()
+    tables = tabulate(problem, resource)
+    relaxed = _merge_all(_reduced(tables), accuracy, guarded=False, ceiling=None)
+    holds = _hold_sync(tables, relaxed)
+    points = _points(tables, relaxed, holds)
+    if bool(holds.all()):
+        return points
+    ceiling = None
+    if bool(holds.any()):
+        ceiling = Ceiling(relaxed.labels.resources[0][holds], relaxed.total[holds])
+    guarded = _merge_all(tables, accuracy, guarded=True, ceiling=ceiling)
+    found = _points(tables, guarded, np.ones(len(guarded.total), dtype=bool))
+    return _joined([*points, *found])
+
+
+def _reduced(tables: Tables) -> Tables:
+    """Tables without the options that others make superfluous when nothing bounds E from below."""
+    problem = tables.problem
+    per_sensor = problem.sync_model == "per_sensor"
+    roles = []
+    for r, role in enumerate(tables.roles):
+        rates = [p.rate_mps for p in problem.pairs if r in (p.role, p.reference)]
+        rate = math.fsum(rates) if per_sensor else problem.sync_rate_mps * bool(rates)
+        roles.append(useful_options(role, rate, per_sensor))
+    return replace(tables, roles=tuple(roles))
+
+
+def demand_structure(problem: Problem) -> None:
+    """Refuse couplings that merging does not remove: the MILP takes those."""
+    for pair in problem.pairs:
+        own = problem.roles[pair.role]
+        if pair.reference is None:
+            continue
+        other = problem.roles[pair.reference]
+        same = own.stage == other.stage and own.role != "ranging"
+        chain = own.stage == other.stage - 1 and own.role == "ranging"
+        if other.role != "ranging" or not (same or chain):
+            raise TooLarge("pairs of timestamps that do not form a chain of stages")
+    stages = [role.stage for role in problem.roles]
+    if stages != sorted(stages):
+        raise TooLarge("roles that are not in the order of the stages")
+
+
+def _merge_all(
+    tables: Tables, accuracy: bool, *, guarded: bool, ceiling: Ceiling | None
+) -> _Finished:
+    """Complete designs of every combination of clocks that may matter, the front of them."""
+    combinations = tuple(clock_combinations(tables.problem))
+    parts: list[Labels] = []
+    for place, clocks in enumerate(combinations):
+        merge = Merge(tables, clocks, accuracy=accuracy, guarded=guarded, ceiling=ceiling)
+        labels = merge.run()
+        if labels is not None and len(labels):
+            clock = np.full((len(labels), 1), place, dtype=np.intp)
+            parts.append(replace(labels, choice=np.column_stack([labels.choice, clock])))
+    if not parts:
+        return _Finished(_no_labels(len(tables.keys)), np.zeros(0), combinations)
+    finished = _with_total(tables, concatenate(parts), combinations)
+    if guarded:
+        rows = np.flatnonzero(_hold_sync(tables, finished))
+        finished = _Finished(finished.labels.take(rows), finished.total[rows], combinations)
+    ties = _tie_columns(tables, finished.labels)
+    rows = undominated(Columns((finished.labels.resources[0], finished.total), tie=ties))
+    labels, total = finished.labels.take(rows), finished.total[rows]
+    order = np.argsort(-total, kind="stable")
+    return _Finished(labels.take(order), total[order], combinations)
+
+
+def _no_labels(keys: int) -> Labels:
+    none = np.zeros(0)
+    whole = tuple(np.zeros(0, dtype=np.int64) for _ in range(keys))
+    return Labels(whole, (), none, none, none, (), np.zeros((0, 1), dtype=np.intp), none, none > 0)
+
+
+def _with_total(
+    tables: Tables, labels: Labels, combinations: tuple[tuple[int, ...], ...]
+) -> _Finished:
+    """Complete designs with their total error [m], added in one fixed order."""
+    problem = tables.problem
+    caused = labels.sync
+    if problem.sync_model == "syncline":
+        caused = problem.sync_rate_mps * labels.bound
+    return _Finished(labels, labels.error + problem.fixed_error_m + caused, combinations)
+
+
+def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
+    """Which complete designs keep tau_sys below their limit; close calls are decided exactly."""
+    problem, labels = tables.problem, finished.labels
+    limit = problem.limits.sync
+    if math.isinf(limit) or len(labels) == 0:
+        return np.ones(len(labels), dtype=bool)
+    caused, allowed = problem.sync_rate_mps * labels.bound, limit * labels.error
+    holds = np.asarray(caused < allowed * (1.0 - MARGIN))
+    close = np.flatnonzero(~holds & (caused <= allowed * (1.0 + MARGIN)))
+    for row in close:
+        holds[row] = evaluate(problem, _design(tables, finished, int(row))).sync_ratio < limit
+    return holds
+
+
+def _design(tables: Tables, finished: _Finished, row: int) -> Design:
+    places = finished.labels.choice[row].tolist()
+    options = tuple(tables.order[r][place] for r, place in enumerate(places[:-1]))
+    return Design(options, finished.clocks[places[-1]])
+
+
+def _tie_columns(tables: Tables, labels: Labels) -> list[Column]:
+    """Cost, mass, power in this order as far as they are not the front's own resource."""
+    named = dict(zip((s.name for s in tables.keys), labels.resources, strict=True))
+    named.update(zip((s.name for s in tables.ties), labels.ties, strict=True))
+    own = tables.keys[0].name
+    return [named[n] for n in ("cost", "mass", "power") if n in named and n != own]
+
+
+def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
+    """Clock indices per vehicle, without clocks that another one of the vehicle replaces."""
+    useful = []
+    for vehicle in problem.vehicles:
+        order = sorted(range(len(vehicle.clocks)), key=lambda i: vehicle.clocks[i].id or "")
+        kept: list[int] = []
+        for i in order:
+            clock = vehicle.clocks[i]
+            if not any(
+                _replaces(vehicle.clocks[j], clock, j in order[: order.index(i)])
+                for j in order
+                if j != i
+            ):
+                kept.append(i)
+        useful.append(kept)
+    yield from itertools.product(*useful)
+
+
+def _replaces(one: ClockOption, other: ClockOption, earlier: bool) -> bool:
+    """Whether a clock is nowhere worse, and better in resources or earlier by name."""
+    ours = [getattr(one.resources, n) or 0 for n in ("cost", "mass", "power")]
+    theirs = [getattr(other.resources, n) or 0 for n in ("cost", "mass", "power")]
+    worse = any(a > b for a, b in zip(ours, theirs, strict=True))
+    if worse or one.offset_bound_s > other.offset_bound_s:
+        return False
+    if set(one.requires) - set(other.requires):
+        return False
+    return ours != theirs or earlier
+
+
+def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoint, ...]:
+    """Front points of complete designs, by rising amount."""
+    bottom = tables.keys[0].denominator
+    amounts, totals = finished.labels.resources[0].tolist(), finished.total.tolist()
+    points = [
+        FrontPoint(Fraction(amounts[row], bottom), totals[row], _design(tables, finished, int(row)))
+        for row in np.flatnonzero(rows)
+    ]
+    return _joined(points)
+
+
+def _joined(points: list[FrontPoint]) -> tuple[FrontPoint, ...]:
+    """Points as one front; errors equal to 12 figures count as equal."""
+    out: list[FrontPoint] = []
+    for point in sorted(points, key=lambda p: (p.amount, error_key(p.error_m))):
+        if not out or error_key(point.error_m) < error_key(out[-1].error_m):
+            out.append(point)
+    return tuple(out)
