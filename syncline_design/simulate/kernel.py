@@ -1,0 +1,283 @@
+"""The chain component by component: the same equations as `chain.stage_error`, about ten times
+faster, for level vehicles (roll = pitch = 0, any yaw) that move with constant twist.
+
+Everything is (3, n) or (n,): each row of an array is contiguous, so a chunk that fits the cache
+is worked through at the speed of the cache.  Sines of draws never appear: a uniform angle comes
+from the tangent of its half, and small angles from their series, cut where the next term is below
+double precision.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.effects.base import Array, StageRows
+from syncline_design.simulate.chain import ConstantTwist, Noise
+
+_SERIES_LIMIT = 1.0  # squared angle up to which the series is used
+_GIMBAL_LOCK = 1e-9  # cos(pitch) below which roll is taken as 0, as in chain.rotation_to_euler
+
+
+@dataclass(frozen=True, slots=True)
+class Draw:
+    """n draws of one stage: true state, noise, timestamp errors.
+
+    yaw as cos_yaw, sin_yaw (n,) (roll = pitch = 0); velocity_mps, rate_radps (3, n) body;
+    range_m (n,); bearing (3, n): the true n = [cos az cos el, sin az cos el, -sin el];
+    antenna_m, ranging_m: lever arms l_G, l_L (3, n) or (3, 1) [m], body.
+    position_noise_m (3, n) NED; angle_noise_rad (5, n): roll, pitch, yaw, azimuth, elevation;
+    range_noise_m (n,); mu_position_s, mu_attitude_s, mu_ranging_s (n,): timestamp errors.
+    """
+
+    cos_yaw: Array
+    sin_yaw: Array
+    velocity_mps: Array
+    rate_radps: Array
+    range_m: Array
+    bearing: Array
+    antenna_m: Array
+    ranging_m: Array
+    position_noise_m: Array
+    angle_noise_rad: Array
+    range_noise_m: Array
+    mu_position_s: Array
+    mu_attitude_s: Array
+    mu_ranging_s: Array
+
+
+def stage_error(draw: Draw, carried_m: Array | None = None) -> Array:
+    """Georeferenced minus true position [m], NED, (3, n); see `chain.stage_error`.
+
+    With R = Rz(yaw) taken out on the left:
+    e = dp + (R_p - I) l_G + l_G + R_hat (l_L - l_G + r_hat n_hat) - l_L - r n, then yaw, then the
+    position noise and the error of the chain before.
+    """
+    level = _antenna_shift(draw)
+    level += draw.antenna_m - draw.ranging_m
+    level -= draw.range_m * draw.bearing
+    level += _believed_object(draw)
+    error = np.empty_like(level)
+    np.multiply(draw.cos_yaw, level[0], out=error[0])
+    error[0] -= draw.sin_yaw * level[1]
+    np.multiply(draw.sin_yaw, level[0], out=error[1])
+    error[1] += draw.cos_yaw * level[1]
+    error[2] = level[2]
+    error += draw.position_noise_m
+    if carried_m is not None:
+        error += carried_m
+    return error
+
+
+def norm(vector: Array) -> Array:
+    """|v| of (3, n) columns, (n,)."""
+    square = vector[0] * vector[0]
+    square += vector[1] * vector[1]
+    square += vector[2] * vector[2]
+    length: Array = np.sqrt(square, out=square)
+    return length
+
+
+def cross(first: Array, second: Array) -> Array:
+    """first x second of (3, n) columns."""
+    out = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        np.multiply(first[j], second[k], out=out[i])
+        out[i] -= first[k] * second[j]
+    return out
+
+
+def series(square: Array, start: int) -> Array:
+    """sum over k of (-x)^k / (2k + start)!, x = a^2 [rad^2] >= 0, any shape.
+
+    start 1: sin a / a; 2: (1 - cos a) / a^2; 3: (a - sin a) / a^3.  Cut after the term below which
+    nothing is left in double precision for the largest x of the array.
+    """
+    largest = float(square.max(initial=0.0))
+    terms = 1
+    while largest**terms * math.factorial(start) > 2e-17 * math.factorial(2 * terms + start):
+        terms += 1
+    total = np.full_like(square, (-1) ** (terms - 1) / math.factorial(2 * terms - 2 + start))
+    for k in range(terms - 2, -1, -1):
+        total *= square
+        total += (-1) ** k / math.factorial(2 * k + start)
+    return total
+
+
+def rotation_terms(square: Array) -> tuple[Array, Array, Array]:
+    """sin a / a, (1 - cos a) / a^2, (a - sin a) / a^3 for a^2 of any size, (n,)."""
+    if not np.max(square, initial=0.0) > _SERIES_LIMIT:
+        return series(square, 1), series(square, 2), series(square, 3)
+    small = np.minimum(square, _SERIES_LIMIT)
+    large = np.maximum(square, _SERIES_LIMIT)
+    angle = np.sqrt(large)
+    sine, half = np.sin(angle), np.sin(0.5 * angle)
+    near = square <= _SERIES_LIMIT
+    return (
+        np.where(near, series(small, 1), sine / angle),
+        np.where(near, series(small, 2), 2 * half * half / large),
+        np.where(near, series(small, 3), (angle - sine) / (large * angle)),
+    )
+
+
+def sin_cos(angle: Array) -> tuple[Array, Array]:
+    """sin and cos [-] of angles [rad], any shape; fast where all of them are small."""
+    square = angle * angle
+    if not np.max(square, initial=0.0) <= _SERIES_LIMIT:
+        return np.sin(angle), np.cos(angle)
+    sine = series(square, 1)
+    sine *= angle
+    cosine = series(square, 2)
+    cosine *= square
+    np.subtract(1.0, cosine, out=cosine)
+    return sine, cosine
+
+
+def _antenna_shift(draw: Draw) -> Array:
+    """Displacement of the antenna while it is shifted, level axes, (3, n).
+
+    s v + t x (u1 + t x u2), t = w s, u1 = A l + s B v, u2 = B l + s C v: screw displacement plus
+    (exp(S(t)) - I) l by Rodrigues' formula, A, B, C of `rotation_terms`.
+    """
+    shift = draw.mu_position_s - draw.mu_ranging_s
+    turn = draw.rate_radps * shift
+    a, b, c = rotation_terms(_square(turn))
+    moved = draw.velocity_mps * shift
+    inner = moved * c
+    inner += b * draw.antenna_m
+    inner = cross(turn, inner)
+    inner += moved * b
+    inner += a * draw.antenna_m
+    moved += cross(turn, inner)
+    return moved
+
+
+def _square(vector: Array) -> Array:
+    square: Array = vector[0] * vector[0]
+    square += vector[1] * vector[1]
+    square += vector[2] * vector[2]
+    return square
+
+
+def _believed_object(draw: Draw) -> Array:
+    """R_hat (l_L - l_G + r_hat n_hat), level axes, (3, n)."""
+    sine, cosine = sin_cos(draw.angle_noise_rad)
+    vector = _measured_bearing(draw.bearing, sine[3:], cosine[3:])
+    vector *= draw.range_m + draw.range_noise_m
+    vector += draw.ranging_m - draw.antenna_m
+    for axis, (sin_angle, cos_angle) in enumerate(_measured_attitude(draw, sine, cosine)):
+        _turn(vector, axis, sin_angle, cos_angle)
+    return vector
+
+
+def _measured_bearing(bearing: Array, sine: Array, cosine: Array) -> Array:
+    """n at azimuth and elevation plus their noise: angle addition on the components of n."""
+    sin_el = -bearing[2]
+    cos_el = np.sqrt(bearing[0] ** 2 + bearing[1] ** 2)
+    flat = cos_el > 0.0
+    scale = 1.0 / np.where(flat, cos_el, 1.0)
+    cos_az = np.where(flat, bearing[0] * scale, 1.0)
+    sin_az = bearing[1] * scale
+    new_cos_el = cos_el * cosine[1] - sin_el * sine[1]
+    out = np.empty((3, new_cos_el.shape[0]))
+    np.multiply(cos_az * cosine[0] - sin_az * sine[0], new_cos_el, out=out[0])
+    np.multiply(sin_az * cosine[0] + cos_az * sine[0], new_cos_el, out=out[1])
+    np.add(sin_el * cosine[1], cos_el * sine[1], out=out[2])
+    np.negative(out[2], out=out[2])
+    return out
+
+
+def attitude_angles(turn: Array) -> tuple[tuple[Array, Array], ...]:
+    """(sin, cos) of roll, pitch and yaw of exp(S(t)), t (3, n) [rad].
+
+    Straight from the matrix elements, no inverse trigonometry; at gimbal lock roll is 0.
+    """
+    a, b, _ = rotation_terms(_square(turn))
+    x, y, z = turn
+    bx, by = b * x, b * y
+    r10 = bx * y + a * z
+    r20 = bx * z - a * y
+    r21 = by * z + a * x
+    xx = bx * x
+    yy_zz = by * y
+    r22 = 1.0 - xx - yy_zz
+    yy_zz += b * z * z
+    r00 = 1.0 - yy_zz
+    cos_pitch = np.sqrt(r21 * r21 + r22 * r22)
+    locked = cos_pitch < _GIMBAL_LOCK
+    if np.any(locked):
+        r01, r11 = bx * y - a * z, 1.0 - xx - b * z * z
+        level = np.hypot(r01, r11)
+        r21, r22 = np.where(locked, 0.0, r21), np.where(locked, 1.0, r22)
+        scale = 1.0 / np.where(locked, 1.0, cos_pitch)
+        sin_yaw = np.where(locked, -r01 / level, r10 * scale)
+        cos_yaw = np.where(locked, r11 / level, r00 * scale)
+        return (r21 * scale, r22 * scale), (-r20, cos_pitch), (sin_yaw, cos_yaw)
+    scale = 1.0 / cos_pitch
+    return (r21 * scale, r22 * scale), (-r20, cos_pitch), (r10 * scale, r00 * scale)
+
+
+def _measured_attitude(draw: Draw, sine: Array, cosine: Array) -> tuple[tuple[Array, Array], ...]:
+    """(sin, cos) of the measured roll, pitch and yaw (yaw less the true one)."""
+    turn = draw.rate_radps * (draw.mu_attitude_s - draw.mu_ranging_s)
+    return tuple(
+        (s * cosine[k] + c * sine[k], c * cosine[k] - s * sine[k])
+        for k, (s, c) in enumerate(attitude_angles(turn))
+    )
+
+
+def _turn(vector: Array, axis: int, sine: Array, cosine: Array) -> None:
+    """Rotate (3, n) columns about a coordinate axis, in place."""
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    first = vector[i] * cosine
+    first -= vector[j] * sine
+    vector[j] *= cosine
+    vector[j] += vector[i] * sine
+    vector[i] = first
+
+
+def as_rows(draw: Draw) -> tuple[StageRows, ConstantTwist, Noise]:
+    """The same draw for the row-wise chain: (rows, motion, noise), arrays (n, ...)."""
+    count = draw.bearing.shape[1]
+    yaw = np.arctan2(draw.sin_yaw, draw.cos_yaw)
+    rotation = np.zeros((count, 3, 3))
+    rotation[:, 0, 0] = rotation[:, 1, 1] = draw.cos_yaw
+    rotation[:, 1, 0], rotation[:, 0, 1] = draw.sin_yaw, -draw.sin_yaw
+    rotation[:, 2, 2] = 1.0
+    azimuth = np.arctan2(draw.bearing[1], draw.bearing[0])
+    elevation = np.arctan2(-draw.bearing[2], np.hypot(draw.bearing[0], draw.bearing[1]))
+    antenna, ranging = (
+        np.broadcast_to(lever, (3, count)).T for lever in (draw.antenna_m, draw.ranging_m)
+    )
+    vector = draw.range_m * draw.bearing + ranging.T
+    target = np.einsum("nij,jn->ni", rotation, vector)
+    zero = np.zeros((count, 3))
+    velocity, rate = draw.velocity_mps.T, draw.rate_radps.T
+    rows = StageRows(
+        time_s=np.zeros(count),
+        position_m=zero,
+        rotation=rotation,
+        euler_rad=np.stack([np.zeros(count), np.zeros(count), yaw], axis=-1),
+        velocity_mps=velocity,
+        acceleration_mps2=np.cross(rate, velocity),
+        rate_radps=rate,
+        range_m=draw.range_m,
+        azimuth_rad=azimuth,
+        elevation_rad=elevation,
+        antenna_m=antenna,
+        ranging_m=ranging,
+        target_m=target,
+    )
+    noise = Noise(
+        position_m=draw.position_noise_m.T,
+        attitude_rad=draw.angle_noise_rad[:3].T,
+        range_m=draw.range_noise_m,
+        azimuth_rad=draw.angle_noise_rad[3],
+        elevation_rad=draw.angle_noise_rad[4],
+        mu_position_s=draw.mu_position_s,
+        mu_attitude_s=draw.mu_attitude_s,
+        mu_ranging_s=draw.mu_ranging_s,
+    )
+    return rows, ConstantTwist(rotation, velocity, rate), noise

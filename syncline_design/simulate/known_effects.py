@@ -1,0 +1,120 @@
+"""The spec's known systematic effects, as the simulator and the budget take them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.effects.base import NOTHING, Array, Departures, Effect, StageRows, Values
+from syncline_design.model.system import EffectEntry, RoleName, System
+from syncline_design.simulate import kernel
+from syncline_design.simulate.chain import stage_error
+from syncline_design.simulate.settings import SimulationError
+
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """One effect where it acts: the record, its sensor, its parameters in SI."""
+
+    effect: Effect
+    sensor: str
+    values: Values
+
+
+ByStage = Mapping[str, tuple[Acting, ...]]
+
+
+def by_stage(system: System) -> ByStage:
+    """Effects of each stage by its name; stages without any are left out."""
+    if not system.effects:
+        return {}
+    from syncline_design.effects import registry
+
+    known = registry()
+    names = {stage.name for stage in system.stages}
+    found: dict[str, tuple[Acting, ...]] = {}
+    for number, entry in enumerate(system.effects):
+        _demand_entry(number, entry, known, names)
+        values = dict(entry.parameters)
+        acting = Acting(known[entry.effect], entry.sensor, values)  # type: ignore[arg-type]
+        found[entry.stage] = (*found.get(entry.stage, ()), acting)
+    return found
+
+
+def _demand_entry(
+    number: int, entry: EffectEntry, known: Mapping[str, Effect], stages: set[str]
+) -> None:
+    path = f"effects[{number}]"
+    if entry.effect not in known:
+        raise SimulationError(
+            f"{path}.effect: expected one of {', '.join(known)}, found {entry.effect!r}"
+        )
+    if entry.stage not in stages:
+        raise SimulationError(
+            f"{path}.stage: expected one of {', '.join(sorted(stages))}, found {entry.stage!r}"
+        )
+    effect = known[entry.effect]
+    if entry.sensor not in effect.sensors:
+        expected = ", ".join(effect.sensors)
+        raise SimulationError(
+            f"{path}.sensor: {entry.effect} acts on {expected}, found {entry.sensor!r}"
+        )
+    missing = {p.name for p in effect.parameters} - {name for name, _ in entry.parameters}
+    if missing:
+        raise SimulationError(f"{path}.parameters: missing {', '.join(sorted(missing))}")
+
+
+def departures(
+    acting: tuple[Acting, ...],
+    rows: StageRows,
+    generator: np.random.Generator | None,
+    systematic_only: bool = False,
+) -> Departures:
+    """All departures of a stage at once; stochastic effects draw from `generator`."""
+    total = NOTHING
+    for one in acting:
+        if systematic_only and one.effect.kind == "stochastic":
+            continue
+        total = total + one.effect.depart(
+            rows,
+            one.values,
+            one.sensor,  # type: ignore[arg-type]
+            generator,
+        )
+    return total
+
+
+def drawn_error(
+    draw: kernel.Draw,
+    acting: tuple[Acting, ...],
+    generator: np.random.Generator | None,
+    carried_m: Array | None,
+    systematic_only: bool = False,
+) -> Array:
+    """Error [m] of one stage, NED, (3, n): the fast kernel, or with effects the row-wise chain."""
+    if not acting:
+        return kernel.stage_error(draw, carried_m)
+    rows, motion, noise = kernel.as_rows(draw)
+    world = departures(acting, rows, generator, systematic_only)
+    carried = None if carried_m is None else carried_m.T
+    return np.ascontiguousarray(stage_error(rows, motion, noise, world, carried).T)
+
+
+def contributions(
+    system: System,
+) -> tuple[dict[tuple[str, RoleName], float], tuple[tuple[str, str, float], ...]]:
+    """What the effects add to the budget: (tau [s] by stage and role, systematic terms [m])."""
+    extra: dict[tuple[str, RoleName], float] = {}
+    systematic: list[tuple[str, str, float]] = []
+    stages = {stage.name: stage for stage in system.stages}
+    for name, acting in by_stage(system).items():
+        for one in acting:
+            added = one.effect.contribute(stages[name], one.values, one.sensor)  # type: ignore[arg-type]
+            if added.tau_s and one.sensor != "target":
+                key: tuple[str, RoleName] = (name, one.sensor)  # type: ignore[assignment]
+                extra[key] = extra.get(key, 0.0) + added.tau_s
+            if added.systematic_m:
+                systematic.append((f"{one.effect.name} ({one.sensor})", name, added.systematic_m))
+    return extra, tuple(systematic)

@@ -1,0 +1,205 @@
+"""The simulator's questions, answered: cross_check, simulate, decide."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from syncline_design.effects.base import Array
+from syncline_design.model.budget import budget
+from syncline_design.model.system import System
+from syncline_design.simulate import distribution
+from syncline_design.simulate.distribution import Binned, Values
+from syncline_design.simulate.intervals import proportion_interval, quantile_ranks
+from syncline_design.simulate.kernel import norm
+from syncline_design.simulate.results import (
+    MonteCarlo,
+    ProportionEstimate,
+    QuantileEstimate,
+    SimulationResult,
+    histogram,
+)
+from syncline_design.simulate.sampling import JOB, error_distribution, run_jobs
+from syncline_design.simulate.settings import (
+    DEFAULT_MANOEUVRE,
+    SimulationSettings,
+    demand_simulable,
+)
+from syncline_design.simulate.worst_case import WorstCase, worst_cases
+
+DEFAULT_SETTINGS = SimulationSettings()
+DEFAULT_CAP = 4_000_000
+LOOK_GROWTH = 4  # each further look of `decide` has this many times the samples
+CROSS_CHECK_GAP = 1e-4  # the worst case of a cross-check may be this much, relatively, too low
+
+
+def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> MonteCarlo:
+    """Quantiles, P(|error| <= limit) and the worst case at the system's own tau.
+
+    Raises SimulationError for a system or settings that cannot be simulated.
+    """
+    demand_simulable(system)
+    (worst,) = worst_cases(
+        system, np.array([budget(system).tau_s]), settings.seed, enough_gap=CROSS_CHECK_GAP
+    )
+    if settings.estimator == "conditioned":
+        from syncline_design.simulate.conditioned import conditioned_monte_carlo
+
+        return conditioned_monte_carlo(system, settings, worst)
+    return _monte_carlo(settings, error_distribution(system, settings), worst)
+
+
+def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> SimulationResult:
+    """Monte Carlo and the worst case against the Syncline over the grid of tau."""
+    from syncline_design.simulate.comparison import DEFAULT_GRID_S, comparison
+
+    found = cross_check(system, settings)
+    figures = budget(system)
+    grid = settings.tau_grid_s or DEFAULT_GRID_S
+    trajectory = None
+    if settings.envelope == "trajectory":
+        trajectory = str(settings.trajectory or DEFAULT_MANOEUVRE)
+    return SimulationResult(
+        monte_carlo=found,
+        grid=comparison(system, grid, settings.seed),
+        tau_crit_s=figures.tau_crit_s,
+        sensor_error_m=figures.sensor_error_m,
+        sync_rate_mps=figures.sync_rate_mps,
+        trajectory=trajectory,
+    )
+
+
+def _monte_carlo(
+    settings: SimulationSettings, found: Values | Binned, worst: WorstCase
+) -> MonteCarlo:
+    estimates = tuple(
+        quantile_estimate(found, quantile, settings.confidence) for quantile in settings.quantiles
+    )
+    within = None
+    if settings.limit_m is not None:
+        count = found.within(settings.limit_m)
+        low, high = proportion_interval(count, found.count, settings.confidence)
+        within = ProportionEstimate(settings.limit_m, count / found.count, low, high)
+    return MonteCarlo(
+        samples=settings.samples,
+        seed=settings.seed,
+        envelope=settings.envelope,
+        estimator="plain",
+        effective_samples=settings.samples,
+        confidence=settings.confidence,
+        quantiles=estimates,
+        within_target=within,
+        worst_case=worst,
+        histogram=histogram(found),
+        distribution=found,
+    )
+
+
+def quantile_estimate(
+    found: Values | Binned, quantile: float, confidence: float
+) -> QuantileEstimate:
+    """A quantile between two order statistics that enclose it with `confidence`."""
+    ranks = quantile_ranks(quantile, found.count, confidence)
+    low, value, high = (found.order_statistic(rank) for rank in ranks)
+    return QuantileEstimate(quantile, value, low, high)
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Whether a quantile of |error| is at most a limit.
+
+    status `indeterminate`: after `samples` the interval still straddles the limit.  estimate: of
+    the quantile; within: of P(|error| <= limit), what the decision rests on.  Each of `looks`
+    looks was taken at `look_confidence`, so that all of them together are right with at least
+    `confidence` (Bonferroni).
+    """
+
+    status: Literal["pass", "fail", "indeterminate"]
+    limit_m: float
+    samples: int
+    looks: int
+    confidence: float
+    look_confidence: float
+    estimate: QuantileEstimate
+    within: ProportionEstimate
+
+
+def decide(
+    system: System,
+    settings: SimulationSettings,
+    quantile: float,
+    limit_m: float,
+    cap_samples: int = DEFAULT_CAP,
+    first: MonteCarlo | None = None,
+) -> Decision:
+    """Whether the quantile of |error| is at most limit_m, sampling on while it is undecided.
+
+    Passes when P(|error| <= limit) >= quantile for the whole interval, fails when for none of it.
+    Starts with `settings.samples` (those of `first`, when given, are not drawn again) and takes
+    four times as many at each further look, up to `cap_samples`.  An error that is not a number
+    counts as beyond the limit.
+    """
+    demand_simulable(system)
+    sizes = look_sizes(settings.samples, cap_samples)
+    look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
+    counts, within, drawn = distribution.no_counts(), 0, 0
+    if first is not None and isinstance(first.distribution, Values):
+        distribution.add_counts(counts, first.distribution.sorted_m)
+        within, drawn = first.distribution.within(limit_m), first.samples
+    for look, size in enumerate(sizes, 1):
+        if drawn < size:
+            # a shorter first run may have ended inside a job: that job is drawn again
+            if drawn % JOB:
+                counts, within, drawn = distribution.no_counts(), 0, 0
+            within += _tally(system, settings, (drawn, size), limit_m, counts)
+            drawn = size
+        low, high = proportion_interval(within, size, look_confidence)
+        undecided = low < quantile <= high
+        if not undecided or look == len(sizes):
+            break
+    status: Literal["pass", "fail", "indeterminate"] = "indeterminate"
+    if not undecided:
+        status = "pass" if low >= quantile else "fail"
+    return Decision(
+        status=status,
+        limit_m=limit_m,
+        samples=size,
+        looks=look,
+        confidence=settings.confidence,
+        look_confidence=look_confidence,
+        estimate=quantile_estimate(Binned(counts), quantile, look_confidence),
+        within=ProportionEstimate(limit_m, within / size, low, high),
+    )
+
+
+def look_sizes(samples: int, cap_samples: int) -> list[int]:
+    """Sample counts of the looks: growing by LOOK_GROWTH, the last one the cap."""
+    sizes = [samples]
+    while sizes[-1] < cap_samples:
+        sizes.append(min(sizes[-1] * LOOK_GROWTH, cap_samples))
+    return sizes
+
+
+def _tally(
+    system: System,
+    settings: SimulationSettings,
+    span: tuple[int, int],
+    limit_m: float,
+    counts: distribution.Counts,
+) -> int:
+    """Count the samples of a span into bins (in place); how many are at most limit_m."""
+    lock = threading.Lock()
+    found: list[int] = []
+
+    def count(_: int, errors: Array) -> None:
+        lengths = norm(errors)
+        with lock:
+            distribution.add_counts(counts, lengths)
+            found.append(int(np.count_nonzero(lengths <= limit_m)))
+
+    run_jobs(system, dataclasses.replace(settings, samples=span[1]), *span, count)
+    return sum(found)

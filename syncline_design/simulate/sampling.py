@@ -1,0 +1,124 @@
+"""Plain Monte Carlo: jobs of fixed size, each with its own stream, on all cores.
+
+A job's numbers depend on the seed and the job's number only, so neither the number of workers nor
+the order in which they finish changes a bit of the result, and a longer run begins with the
+samples of a shorter one.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable
+
+import numpy as np
+
+from syncline_design.effects.base import Array
+from syncline_design.model.system import System
+from syncline_design.simulate import distribution, known_effects
+from syncline_design.simulate.distribution import KEPT_VALUES, Binned, Values
+from syncline_design.simulate.draws import RandomSource, generator, stage_draw, timing_draws
+from syncline_design.simulate.kernel import norm
+from syncline_design.simulate.settings import SimulationSettings, demand_simulable
+
+JOB = 8192  # samples: what a job works on stays in the second-level cache
+PLAIN_STREAM = 1  # first word of the stream key, see draws.generator
+Consume = Callable[[int, Array], None]
+
+
+def job_errors(system: System, settings: SimulationSettings, job: int) -> Array:
+    """Errors [m] of the whole chain, NED, (3, JOB), of one job."""
+    stream = generator(settings.seed, PLAIN_STREAM, job)
+    if settings.envelope == "trajectory":
+        from syncline_design.simulate.trajectory import trajectory_errors
+
+        return trajectory_errors(system, settings, stream, JOB)
+    source = RandomSource(stream, JOB)
+    acting = known_effects.by_stage(system)
+    shifts = timing_draws(system, source)
+    carried: Array | None = None
+    for index, stage in enumerate(system.stages):
+        draw = stage_draw(system, index, shifts, source, settings.envelope == "inside")
+        carried = known_effects.drawn_error(draw, acting.get(stage.name, ()), stream, carried)
+    assert carried is not None
+    return carried
+
+
+def sample_errors(system: System, settings: SimulationSettings) -> Array:
+    """Errors [m] of every sample, NED, (samples, 3)."""
+    demand_simulable(system)
+    out = np.empty((settings.samples, 3))
+
+    def keep(start: int, errors: Array) -> None:
+        out[start : start + errors.shape[1]] = errors.T
+
+    run_jobs(system, settings, 0, settings.samples, keep)
+    return out
+
+
+def error_distribution(system: System, settings: SimulationSettings) -> Values | Binned:
+    """Distribution of |error| over `settings.samples` samples; memory does not grow beyond
+    `KEPT_VALUES` of them."""
+    demand_simulable(system)
+    if settings.samples <= KEPT_VALUES:
+        kept = np.empty(settings.samples)
+
+        def keep(start: int, errors: Array) -> None:
+            kept[start : start + errors.shape[1]] = norm(errors)
+
+        run_jobs(system, settings, 0, settings.samples, keep)
+        kept.sort()
+        return Values(kept)
+    counts = distribution.no_counts()
+    lock = threading.Lock()
+
+    def count(_: int, errors: Array) -> None:
+        lengths = norm(errors)
+        with lock:
+            distribution.add_counts(counts, lengths)
+
+    run_jobs(system, settings, 0, settings.samples, count)
+    return Binned(counts)
+
+
+def run_jobs(
+    system: System, settings: SimulationSettings, first: int, last: int, consume: Consume
+) -> None:
+    """Hand the samples first .. last - 1 to `consume`, job by job, in any order.
+
+    `first` must begin a job.  consume(start, errors (3, n)): the samples from `start` on.  Threads
+    share the work: NumPy frees the interpreter in every operation on a job's arrays.
+    """
+    jobs = iter(range(first // JOB, -(-last // JOB)))
+    failures: list[BaseException] = []
+    lock = threading.Lock()
+
+    def work() -> None:
+        try:
+            while not failures:
+                with lock:
+                    job = next(jobs, None)
+                if job is None:
+                    return
+                errors = job_errors(system, settings, job)
+                consume(job * JOB, errors[:, : last - job * JOB])
+        except BaseException as failure:
+            failures.append(failure)
+
+    count = min(workers(settings), -(-(last - first) // JOB))
+    threads = [threading.Thread(target=work) for _ in range(count - 1)]
+    for thread in threads:
+        thread.start()
+    work()
+    for thread in threads:
+        thread.join()
+    if failures:
+        raise failures[0]
+
+
+def workers(settings: SimulationSettings) -> int:
+    """Threads to use: as asked for, else one per core this process may use."""
+    if settings.workers is not None:
+        return settings.workers
+    affinity = getattr(os, "sched_getaffinity", None)
+    return len(affinity(0)) if affinity else os.cpu_count() or 1

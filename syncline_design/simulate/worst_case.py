@@ -1,0 +1,283 @@
+"""The largest error when every magnitude is at most its Syncline term and directions are free.
+
+Maximises |e| of the nonlinear chain over all directions, signs and relative shifts by a
+multi-start ascent, and bounds it from above by geometry, so that the gap between both is a
+certificate of how much a better direction could still add.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from syncline_design.effects.base import Array
+from syncline_design.model.system import Stage, System
+from syncline_design.simulate import kernel, known_effects
+from syncline_design.simulate.bounds import references
+from syncline_design.simulate.draws import generator, lever_arms, position_lever_arm
+
+WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
+_STEP = 1e-6  # of the forward differences, in units of each block
+_MOVES = (1.0, 0.5, 0.2, 0.05, 0.01, 0.002)  # fractions of the way to the ascent direction
+_SETTLED = 1e-13  # relative gain of an iteration below which a start has arrived
+Kind = Literal["ball", "sphere"]
+
+
+@dataclass(frozen=True, slots=True)
+class Block:
+    """A vector to choose: of length at most 1 (ball) or exactly 1 (sphere)."""
+
+    stage: int
+    name: str
+    kind: Kind
+    rows: slice
+
+
+@dataclass(frozen=True, slots=True)
+class WorstCase:
+    """The largest error found at relative shifts of at most tau_s.
+
+    value_m: |e| of the best directions found; bound_m: no directions give more; triangle_m: the
+    terms' sum, lever arms included; syncline_m: the Syncline at tau_s plus systematic terms.
+    gap: 1 - value / bound.
+    """
+
+    tau_s: float
+    value_m: float
+    bound_m: float
+    triangle_m: float
+    syncline_m: float
+
+    @property
+    def ratio(self) -> float:
+        """value / Syncline; 1 where both are 0."""
+        if self.syncline_m == 0.0:
+            return 1.0 if self.value_m == 0.0 else math.inf
+        return self.value_m / self.syncline_m
+
+    @property
+    def gap(self) -> float:
+        """How far, relatively, the bound is above what was found."""
+        return 1.0 - self.value_m / self.bound_m if self.bound_m > 0.0 else 0.0
+
+
+def blocks(system: System) -> tuple[Block, ...]:
+    """What may be chosen, stage by stage."""
+    found: list[Block] = []
+    start = 0
+    for index, stage in enumerate(system.stages):
+        for name, kind, size in _stage_blocks(stage, index):
+            found.append(Block(index, name, kind, slice(start, start + size)))
+            start += size
+    return tuple(found)
+
+
+def _stage_blocks(stage: Stage, index: int) -> list[tuple[str, Kind, int]]:
+    found: list[tuple[str, Kind, int]] = [
+        ("velocity", "ball", 3),
+        ("rate", "ball", 3),
+        ("position_shift", "ball", 1),
+    ]
+    if index == 0:
+        found.append(("position_noise", "ball", 3))
+    else:
+        found.append(("yaw", "sphere", 2))
+    if position_lever_arm(stage, index == 0) is None:
+        found.append(("lever_arm", "sphere", 3))
+    if stage.ranging is not None:
+        found += [
+            ("bearing", "sphere", 3),
+            ("attitude_noise", "ball", 3),
+            ("bearing_noise", "ball", 2),
+            ("range_noise", "ball", 1),
+            ("attitude_shift", "ball", 1),
+        ]
+    return found
+
+
+def worst_cases(
+    system: System,
+    taus_s: Array,
+    seed: int = 0,
+    starts: int = 16,
+    iterations: int = 200,
+    enough_gap: float = 1e-6,
+) -> tuple[WorstCase, ...]:
+    """The worst case at each tau (n,) [s], all ascents of all taus at once.
+
+    A tau is done when its best ascent is within `enough_gap` of the bound, or when all have
+    settled.
+    """
+    taus = np.asarray(taus_s, dtype=np.float64)
+    figures = [references(system, float(tau)) for tau in taus]
+    search = _Search(system, np.repeat(taus, starts), starts)
+    enough = np.array([bound * (1.0 - enough_gap) for bound, _, _ in figures])
+    value = search.ascend(search.starting_points(seed), enough, iterations)
+    best = value.reshape(-1, starts).max(axis=1)
+    return tuple(
+        WorstCase(float(tau), float(found), *reference)
+        for tau, found, reference in zip(taus, best, figures, strict=True)
+    )
+
+
+class _Search:
+    """Ascents from many points at once; column k of a point belongs to tau_s[k]."""
+
+    def __init__(self, system: System, tau_s: Array, starts: int) -> None:
+        self.system = system
+        self.tau_s = tau_s
+        self.starts = starts
+        self.blocks = blocks(system)
+        self.acting = known_effects.by_stage(system)
+        self.size = self.blocks[-1].rows.stop
+
+    def error_m(self, point: Array, tau_s: Array) -> Array:
+        """|e| [m] of points (p, n) at tau (n,)."""
+        carried: Array | None = None
+        for index, stage in enumerate(self.system.stages):
+            chosen = {b.name: point[b.rows] for b in self.blocks if b.stage == index}
+            draw = _bounded_draw(stage, index == 0, chosen, tau_s)
+            acting = self.acting.get(stage.name, ())
+            carried = known_effects.drawn_error(draw, acting, None, carried, systematic_only=True)
+        assert carried is not None
+        return kernel.norm(carried)
+
+    def starting_points(self, seed: int) -> Array:
+        """(p, n): directions at random, every second start with its terms lined up.
+
+        Half of the starts turn by less than half a turn, where more would only lead back.
+        """
+        stream = generator(seed, WORST_CASE_STREAM)
+        point = stream.standard_normal((self.size, self.starts))
+        for start in range(0, self.starts, 2):
+            self._line_up(point[:, start], stream)
+        part = np.where(np.arange(self.starts) % 4 < 2, stream.random(self.starts), math.inf)
+        taus = self.tau_s.shape[0] // self.starts
+        point, part = self._feasible(np.tile(point, taus)), np.tile(part, taus)
+        for block in self.blocks:
+            if block.name == "rate":
+                turn = self.tau_s * self.system.stages[block.stage].platform.omega_max_radps
+                point[block.rows] *= np.minimum(1.0, part * math.pi / np.maximum(turn, 1e-300))
+        return point
+
+    def _line_up(self, column: Array, stream: np.random.Generator) -> None:
+        """Directions that make every term point the same way, to first order."""
+        across, along = np.linalg.qr(stream.standard_normal((3, 2)))[0].T
+        turn = np.cross(across, along)  # turn x across = along
+        aligned = {
+            "velocity": along,
+            "rate": turn,
+            "position_noise": along,
+            "lever_arm": across,
+            "bearing": across,
+            "attitude_noise": turn,
+        }
+        for block in self.blocks:
+            if block.name in aligned:
+                column[block.rows] = aligned[block.name]
+
+    def _feasible(self, point: Array) -> Array:
+        """Every block at length 1."""
+        for block in self.blocks:
+            length = np.sqrt(np.sum(point[block.rows] ** 2, axis=0))
+            point[block.rows] /= np.where(length > 0.0, length, 1.0)
+        return point
+
+    def ascend(self, point: Array, enough_m: Array, iterations: int) -> Array:
+        """Largest |e| [m] of each ascent, (n,); `point` ends where it was found."""
+        value = self.error_m(point, self.tau_s)
+        moving = np.ones(value.shape, dtype=bool)
+        for _ in range(iterations):
+            reached = value.reshape(-1, self.starts).max(axis=1) >= enough_m
+            active = np.flatnonzero(moving & ~np.repeat(reached, self.starts))
+            if active.size == 0:
+                break
+            better, gained = self._step(point[:, active], value[active], self.tau_s[active])
+            moving[active] = gained - value[active] > _SETTLED * gained
+            point[:, active] = better
+            value[active] = gained
+        return value
+
+    def _step(self, point: Array, value: Array, tau_s: Array) -> tuple[Array, Array]:
+        """The best of several moves along the ascent direction, and its |e|."""
+        target = self._target(point, value, tau_s)
+        moves = np.stack([*self._moves(point, target), point])
+        count, size, columns = moves.shape
+        flat = np.moveaxis(moves, 0, 1).reshape(size, count * columns)
+        found = self.error_m(flat, np.tile(tau_s, count)).reshape(count, columns)
+        best = np.nanargmax(found, axis=0)
+        column = np.arange(columns)
+        return np.ascontiguousarray(moves[best, :, column].T), found[best, column]
+
+    def _moves(self, point: Array, target: Array) -> list[Array]:
+        """All blocks some of the way to their targets, and each block alone all of the way."""
+        moves = []
+        for fraction in _MOVES:
+            move = point + fraction * (target - point)
+            for block in self.blocks:
+                if block.kind == "sphere":
+                    move[block.rows] /= np.sqrt(np.sum(move[block.rows] ** 2, axis=0))
+            moves.append(move)
+        for block in self.blocks:
+            move = point.copy()
+            move[block.rows] = target[block.rows]
+            moves.append(move)
+        return moves
+
+    def _target(self, point: Array, value: Array, tau_s: Array) -> Array:
+        """Each block's gradient at length 1 (where it vanishes: the block as it is).
+
+        For a convex |e| moving a block there never lowers it (Journee et al., J. Mach. Learn.
+        Res. 11 (2010) 517-553, the generalised power method).
+        """
+        size, columns = point.shape
+        shifted = np.repeat(point[:, None, :], size, axis=1)
+        shifted[np.arange(size), np.arange(size)] += _STEP
+        found = self.error_m(shifted.reshape(size, -1), np.tile(tau_s, size))
+        slope = found.reshape(size, columns) - value
+        target = point.copy()
+        for block in self.blocks:
+            length = np.sqrt(np.sum(slope[block.rows] ** 2, axis=0))
+            felt = length > 1e-13 * value
+            scaled = slope[block.rows] / np.where(felt, length, 1.0)
+            target[block.rows] = np.where(felt, scaled, point[block.rows])
+        return target
+
+
+def _bounded_draw(
+    stage: Stage, first: bool, chosen: Mapping[str, Array], tau_s: Array
+) -> kernel.Draw:
+    """The chosen directions at their Syncline magnitudes, as a draw (n columns)."""
+    n = tau_s.shape[0]
+    zero, zero3 = np.zeros(n), np.zeros((3, n))
+    ranging, attitude, position = stage.ranging, stage.attitude, stage.position
+    yaw = chosen.get("yaw")
+    angles = np.zeros((5, n))
+    distance = 0.0
+    if ranging is not None and attitude is not None:
+        distance = float(stage.platform.distance_m)
+        np.multiply(chosen["attitude_noise"], math.hypot(*attitude.sigma), out=angles[:3])
+        np.multiply(chosen["bearing_noise"], math.hypot(*ranging.sigma[1:]), out=angles[3:])
+    antenna, ranging_arm = lever_arms(stage, first, chosen.get("lever_arm", zero3))
+    return kernel.Draw(
+        cos_yaw=np.ones(n) if yaw is None else yaw[0],
+        sin_yaw=zero if yaw is None else yaw[1],
+        velocity_mps=chosen["velocity"] * float(stage.platform.v_max_mps),
+        rate_radps=chosen["rate"] * float(stage.platform.omega_max_radps),
+        range_m=np.full(n, distance),
+        bearing=chosen.get("bearing", zero3),
+        antenna_m=antenna,
+        ranging_m=ranging_arm,
+        position_noise_m=(
+            zero3 if position is None else chosen["position_noise"] * math.hypot(*position.sigma)
+        ),
+        angle_noise_rad=angles,
+        range_noise_m=zero if ranging is None else chosen["range_noise"][0] * ranging.sigma[0],
+        mu_position_s=chosen["position_shift"][0] * tau_s,
+        mu_attitude_s=zero if ranging is None else chosen["attitude_shift"][0] * tau_s,
+        mu_ranging_s=zero,
+    )
