@@ -11,6 +11,7 @@ from typing import Any
 from syncline_design.catalog import SECTIONS, Catalog, CatalogFile
 from syncline_design.units import Dimension, Quantity, UnitError, parse_quantity
 from syncline_design.validation import validate
+from syncline_design.values import did_you_mean
 from syncline_design.yaml_reader import (
     Document,
     KeyPath,
@@ -63,45 +64,41 @@ def add_builtin(collection: Collection) -> None:
     for resource in sorted(folder.iterdir(), key=lambda r: r.name):
         if resource.name.endswith(".yaml"):
             path = Path(str(resource))
-            _add_document(collection, read(path, f"builtin:{resource.name}"), path.parent)
+            _add_document(
+                collection, read(path, f"builtin:{resource.name}"), path.parent, path.parent
+            )
 
 
-def add_own(collection: Collection, spec: Document, folder: Path, key: str = "catalogs") -> None:
+def add_own(collection: Collection, spec: Document, folder: Path) -> None:
     """Draw in the catalogs that a spec names, and those that these name."""
-    _add_listed(collection, spec, folder, folder.resolve(), (spec.file,), key)
+    _add_listed(collection, spec, folder, folder.resolve(), (spec.file,))
 
 
 def _add_listed(
-    collection: Collection, lister: Document, folder: Path, root: Path, chain: tuple[str, ...],
-    key: str = "catalogs",
-) -> None:  # fmt: skip
-    listed = lister.data.get(key, ()) if isinstance(lister.data, dict) else ()
+    collection: Collection, lister: Document, folder: Path, root: Path, chain: tuple[str, ...]
+) -> None:
+    listed = lister.data.get("catalogs", ()) if isinstance(lister.data, dict) else ()
     for index, name in enumerate(listed if isinstance(listed, tuple) else ()):
         if not isinstance(name, str) or not name:
             continue  # the model of the listing file says so
-        inside = inside_folder(lister, (key, index), name, folder, root)
+        inside = inside_folder(lister, ("catalogs", index), name, folder, root)
         if isinstance(inside, Problem):
             collection.problems.append(inside)
             continue
         shown = str(Path(chain[0]).parent / inside.relative_to(root))
         if shown in chain or inside == (root / Path(chain[0]).name):
-            circle = " -> ".join((*chain, shown))
-            problem = problem_at(lister, (key, index), "catalogs include each other in a circle",
-                                 found=circle)  # fmt: skip
-            # The chain is the message: it must not be shortened.
-            collection.problems.append(_with_found(problem, circle))
+            circle = "catalogs include each other in a circle: " + " -> ".join((*chain, shown))
+            collection.problems.append(problem_at(lister, ("catalogs", index), circle))
             continue
         if any(shown == digest.partition(" ")[2] for digest in collection.digests):
             continue  # drawn in already by another file
         document = read(inside, shown)
-        _add_document(collection, document, root)
+        if not document.sha256:  # never opened: say where it is named
+            reason = f"{shown}: {document.problems[0].message}"
+            collection.problems.append(problem_at(lister, ("catalogs", index), reason))
+            continue
+        _add_document(collection, document, inside.parent, root)
         _add_listed(collection, document, inside.parent, root, (*chain, shown))
-
-
-def _with_found(problem: Problem, found: str) -> Problem:
-    from dataclasses import replace
-
-    return replace(problem, found=found)
 
 
 def inside_folder(
@@ -119,13 +116,11 @@ def inside_folder(
         return problem_at(document, path, "a path that leaves the spec's folder", wanted, name)
     if not target.exists():
         near = [p.name for p in sorted(root.glob("*.yaml"))]
-        from syncline_design.values import did_you_mean
-
         return problem_at(document, path, "no such file", wanted, name, did_you_mean(name, near))
     return target
 
 
-def _add_document(collection: Collection, document: Document, root: Path) -> None:
+def _add_document(collection: Collection, document: Document, folder: Path, root: Path) -> None:
     collection.digests.append(f"{document.sha256} {document.file}")
     collection.problems.extend(document.problems)
     if document.data is None:
@@ -135,7 +130,7 @@ def _add_document(collection: Collection, document: Document, root: Path) -> Non
             problem_at(document, (), "not a catalog", f"a mapping of {', '.join(SECTIONS)}")
         )
         return
-    filled = fill_empirical(document, root, collection)
+    filled = fill_empirical(document, folder, root, collection)
     model, problems = validate(CatalogFile, document, filled)
     collection.problems.extend(problems)
     for section in SECTIONS:
@@ -162,48 +157,47 @@ def _add_entry(
         collection.entries[section][identity] = getattr(model, section)[identity]
 
 
-def fill_empirical(document: Document, root: Path, collection: Collection) -> Any:
-    """The document's data with the values of empirical error files put in."""
-    return _filled(document.data, (), document, root, collection)
+def fill_empirical(document: Document, folder: Path, root: Path, collection: Collection) -> Any:
+    """The document's data with the values of empirical error files put in.
+
+    Their names are relative to `folder`, where the document lies, and stay inside `root`.
+    """
+
+    def filled(data: Any, path: KeyPath) -> Any:
+        if isinstance(data, tuple):
+            return tuple(filled(item, (*path, index)) for index, item in enumerate(data))
+        if not isinstance(data, dict):
+            return data
+        if data.get("distribution") == "empirical" and isinstance(data.get("file"), str):
+            values = _empirical_values(document, data, path, (folder, root.resolve()), collection)
+            return data if values is None else {**data, "values": values}
+        return {key: filled(item, (*path, key)) for key, item in data.items()}
+
+    return filled(document.data, ())
 
 
-def _filled(
-    data: Any, path: KeyPath, document: Document, root: Path, collection: Collection
-) -> Any:
-    if isinstance(data, tuple):
-        return tuple(
-            _filled(item, (*path, i), document, root, collection) for i, item in enumerate(data)
-        )
-    if not isinstance(data, dict):
-        return data
-    if data.get("distribution") == "empirical" and isinstance(data.get("file"), str):
-        return _with_values(data, path, document, root, collection)
-    return {
-        key: _filled(item, (*path, key), document, root, collection) for key, item in data.items()
-    }
-
-
-def _with_values(
-    data: dict[str, Any], path: KeyPath, document: Document, root: Path, collection: Collection
-) -> dict[str, Any]:
+def _empirical_values(
+    document: Document, data: dict[str, Any], path: KeyPath, folders: tuple[Path, Path],
+    collection: Collection,
+) -> tuple[Quantity, ...] | None:  # fmt: skip
     at = (*path, "file")
     if "values" in data:
         error = problem_at(document, at, "both values and file", "one of them", hint="delete one")
         collection.problems.append(error)
-        return data
-    inside = inside_folder(document, at, data["file"], root, root.resolve())
+        return None
+    inside = inside_folder(document, at, data["file"], *folders)
     if isinstance(inside, Problem):
         collection.problems.append(inside)
-        return data
+        return None
     try:
         content = read_bytes(inside)
         values = tuple(_read_values(content.decode("utf-8-sig"), data["file"]))
     except (OSError, UnicodeDecodeError, StopReadingError, UnitError) as error:
         message = f"cannot read the values: {error}"
         collection.problems.append(problem_at(document, at, message))
-        return data
+        return None
     collection.digests.append(f"{hashlib.sha256(content).hexdigest()} {data['file']}")
-    return {**data, "values": values}
+    return values
 
 
 def _read_values(text: str, name: str) -> list[Quantity]:

@@ -105,7 +105,7 @@ def _loaded(document: Document, path: Path, builtin: bool) -> LoadedSpec:
     if builtin:
         add_builtin(collection)
     add_own(collection, document, path.parent)
-    filled = fill_empirical(document, path.parent, collection)
+    filled = fill_empirical(document, path.parent, path.parent, collection)
     spec, problems = validate(Spec, document, filled)
     problems = [*document.problems, *problems, *collection.problems]
     problems += unknown_ids(document, collection)

@@ -91,7 +91,8 @@ class Document:
     """One file as plain data.
 
     positions: key path to (line, column) of the value; key_positions: of the key.  Both from 1.
-    problems: what was refused; where data is None nothing could be read.
+    problems: what was refused; where data is None nothing could be read, where sha256 is empty
+    the file was not even opened.
     """
 
     file: str
@@ -136,18 +137,18 @@ def read(path: str | Path, shown_as: str | None = None) -> Document:
         raw = read_bytes(Path(path))
     except OSError as error:
         reason = error.strerror or str(error)
-        return _unreadable(Problem(file, 0, 0, "", f"cannot read the file: {reason.lower()}"))
+        return _unreadable(Problem(file, 1, 1, "", f"cannot read the file: {reason.lower()}"))
     except StopReadingError as refused:
-        return _unreadable(Problem(file, 0, 0, "", str(refused)))
+        return _unreadable(Problem(file, 1, 1, "", str(refused)))
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        return _unreadable(_encoding_problem(file, raw, error))
+        return _unreadable(_encoding_problem(file, raw, error), hashlib.sha256(raw).hexdigest())
     return parse(text, file)
 
 
-def _unreadable(problem: Problem) -> Document:
-    return Document(problem.file, None, {}, {}, "", "", (problem,), ((),))
+def _unreadable(problem: Problem, sha256: str = "") -> Document:
+    return Document(problem.file, None, {}, {}, sha256, "", (problem,), ((),))
 
 
 def read_bytes(path: Path) -> bytes:

@@ -1,0 +1,80 @@
+"""`init`: a starter spec that runs, with its schema beside it for the editor."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from syncline_design.loading import BadInput
+from syncline_design.schema import schema_text
+from syncline_design.yaml_reader import Problem
+
+SPEC_NAME = "system.yaml"
+SCHEMA_NAME = "syncline-spec.schema.json"
+
+STARTER = f"""\
+# yaml-language-server: $schema=./{SCHEMA_NAME}
+#
+# A system spec. Check it with:  syncline-design check {SPEC_NAME}
+# Every figure is NUMBER UNIT (10 ns, 77.9 deg/s, 400 EUR); angles say deg or rad.
+syncline: 1                          # format version
+name: My first mapping system
+
+# What the design has to meet. Each line gets a verdict of its own.
+requirements:
+  - {{id: ACC-1,  kind: accuracy, limit: 0.30 m}}      # sensor errors plus synchronisation error
+  - {{id: SYNC-1, kind: sync, limit: 1.0}}             # timestamp error / critical one stays below
+  - {{id: COST-1, kind: cost, limit: 80000 EUR}}
+
+# One stage per vehicle that georeferences something.
+stages:
+  - name: uav
+    platform: {{use: uav_fixed_wing, distance: 100 m}} # a catalog platform, single keys overridden
+    position:
+      candidates: [ublox_f9p_pvt, ublox_f9p_rtk]      # open: the cheapest that works is chosen
+      lever_arm: [0.30 m, 0 m, -0.20 m]               # forward, right, down
+    attitude:
+      candidates: {{modality: attitude}}                # a query: every attitude sensor
+    ranging:
+      candidates: [velodyne_hdl32e, riegl_vux1uav]
+      lever_arm: [0.05 m, 0 m, 0.12 m]
+      # pinned instead of open:
+      # sensor: riegl_vux1uav
+      # primitive: pps
+      # timestamping: hardware
+
+# How measurements may get their timestamps; also per stage or per role.
+timestamping: {{candidates: [hardware, gpio, arrival]}}
+
+coverage_factor: 3                   # k of a normal timing error's bound, |mean| + k std
+objective: cost                      # or mass, power, error
+
+# Your own sensors, platforms and methods, in files beside this one:
+# catalogs: [my_sensors.yaml]
+"""
+
+
+def init_project(directory: str | Path) -> tuple[Path, ...]:
+    """Write the starter spec and its schema into a folder; nothing is ever overwritten."""
+    folder = Path(directory)
+    contents = {folder / SPEC_NAME: STARTER, folder / SCHEMA_NAME: schema_text("spec")}
+    taken = [path for path in contents if os.path.lexists(path)]
+    if taken:
+        raise BadInput(tuple(_refused(path, "this file is there already") for path in taken))
+    written: list[Path] = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for path, text in contents.items():
+            with path.open("x", encoding="utf-8", newline="\n") as stream:
+                written.append(path)
+                stream.write(text)
+    except OSError as error:
+        for path in written:
+            path.unlink(missing_ok=True)
+        reason = (error.strerror or str(error)).lower()
+        raise BadInput((_refused(folder, f"cannot write here: {reason}"),)) from None
+    return tuple(contents)
+
+
+def _refused(path: Path, reason: str) -> Problem:
+    return Problem(str(path), 0, 0, "", reason, hint="choose another folder")
