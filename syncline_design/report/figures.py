@@ -44,7 +44,9 @@ def _tau_span(curve: SynclineCurve) -> tuple[float, float]:
     return low, high
 
 
-def syncline(curve: SynclineCurve, name: str = "fig-syncline") -> InlineFigure:
+def syncline(
+    curve: SynclineCurve, name: str = "fig-syncline", title: str = "Syncline of the design"
+) -> InlineFigure:
     """Accuracy against synchronisation accuracy, log-log, as in the paper's figure 1."""
     low, high = _tau_span(curve)
 
@@ -68,7 +70,7 @@ def syncline(curve: SynclineCurve, name: str = "fig-syncline") -> InlineFigure:
         _syncline_labels(axes)
         return axes
 
-    return draw(name, "Syncline of the design", _describe(curve), (WIDTH, 372.0), build)
+    return draw(name, title, _describe(curve), (WIDTH, 372.0), build)
 
 
 def _set_accuracy_limits(axes: Axes, curve: SynclineCurve, worst_m: float) -> None:

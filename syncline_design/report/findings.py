@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from syncline_design.report import numbers
+from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_words import (
     Json,
+    design_sentence,
     is_waived,
     items,
     kind_text,
@@ -19,7 +21,9 @@ from syncline_design.report.verdict_words import (
     waiver_text,
 )
 
-Level = Literal["pass", "fail", "undecided", "waived", "warning"]
+Level = Literal["pass", "fail", "undecided", "not_reached", "waived", "warning"]
+
+SILENT: Final = ("pass", "not_reached")  # nothing to annotate
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +54,8 @@ def findings(verdict: Json) -> list[Finding]:
     """Every requirement, problem, reason of infeasibility and warning of a verdict."""
     file = spec_file(verdict)
     found = [_problem(entry, file) for entry in items(verdict, "problems")]
-    found += [_requirement(row, file) for row in items(verdict, "requirements")]
+    conflict = _conflict_ids(verdict)
+    found += [_requirement(row, file, verdict, conflict) for row in items(verdict, "requirements")]
     if verdict.get("verdict") in ("infeasible", "indeterminate") and not found_failure(found):
         found.insert(0, _no_design(verdict, file))
     found += [
@@ -78,13 +83,35 @@ def _problem(entry: Json, file: str) -> Finding:
                    _place(entry, "column"), message)  # fmt: skip
 
 
-def _requirement(row: Json, file: str) -> Finding:
+def _requirement(row: Json, file: str, verdict: Json, conflict: list[str]) -> Finding:
     levels: dict[str, Level] = {"pass": "pass", "fail": "fail"}
     level = levels.get(str(row.get("status")), "undecided")
+    message = requirement_sentence(row)
     if level == "fail" and is_waived(row):
         level = "waived"
+    elif level == "undecided" and str(row.get("id")) in conflict:
+        others = [name for name in conflict if name != str(row.get("id"))]
+        level, message = "fail", _conflict_text(row, others, verdict)
+    elif level == "undecided" and not part(verdict, "design"):
+        level = "not_reached"
     return Finding(level, str(row.get("kind")), str(row.get("id")), file, _place(row, "line"),
-                   _place(row, "column"), requirement_sentence(row), waiver_text(row))  # fmt: skip
+                   _place(row, "column"), message, waiver_text(row))  # fmt: skip
+
+
+def _conflict_ids(verdict: Json) -> list[str]:
+    conflict = part(part(verdict, "infeasibility"), "conflict")
+    return [str(entry.get("id")) for entry in items(conflict, "requirements")]
+
+
+def _conflict_text(row: Json, others: list[str], verdict: Json) -> str:
+    limit = f"{row.get('id')}: {kind_text(row)} limited to {value_text(row, 'limit')}"
+    with_others = f" together with {sentence_list(others)}" if others else ""
+    return f"{limit} cannot be met{with_others}.{_fixes(verdict)}"
+
+
+def _fixes(verdict: Json) -> str:
+    texts = [str(entry.get("text")) for entry in items(part(verdict, "infeasibility"), "fixes")]
+    return f" Either of these would do: {'; '.join(texts)}." if texts else ""
 
 
 def requirement_sentence(row: Json) -> str:
@@ -105,27 +132,14 @@ def requirement_sentence(row: Json) -> str:
 def _no_design(verdict: Json, file: str) -> Finding:
     word = str(verdict.get("verdict"))
     level: Level = "fail" if word == "infeasible" else "undecided"
-    line, column = _conflict_place(verdict)
-    return Finding(level, word, "", file, line, column, no_design_text(verdict))
-
-
-def _conflict_place(verdict: Json) -> tuple[int, int]:
-    conflict = part(part(verdict, "infeasibility"), "conflict")
-    for entry in items(conflict, "requirements"):
-        return _place(entry, "line"), _place(entry, "column")
-    return 1, 1
+    return Finding(level, word, "", file, 1, 1, no_design_text(verdict))
 
 
 def no_design_text(verdict: Json) -> str:
     """Why there is no design, and what would give one."""
-    from syncline_design.report.verdict_words import design_sentence
-
-    fixes = [str(entry.get("text")) for entry in items(part(verdict, "infeasibility"), "fixes")]
     text = f"{outcome(verdict).word}. {design_sentence({**verdict, 'design': None})}"
     reason = verdict.get("reason")
-    if reason:
-        text += f" {reason}"
-    return text + (f" Either of these would do: {'; '.join(fixes)}." if fixes else "")
+    return text + (f" {reason}" if reason else "") + _fixes(verdict)
 
 
 def all_findings(verdicts: list[Any]) -> Iterator[Finding]:

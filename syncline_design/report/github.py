@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from syncline_design.report.findings import Finding, all_findings, spec_file, spec_name
+from syncline_design.report.findings import SILENT, Finding, all_findings, spec_file, spec_name
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import Json, design_sentence, outcome
 
@@ -18,7 +18,7 @@ _COMMANDS = {"fail": "error", "undecided": "error", "waived": "warning", "warnin
 
 def render_github(verdicts: Sequence[Json]) -> str:
     """One command per finding that is no pass, then a notice with each spec's outcome."""
-    lines = [_command(f) for f in all_findings(list(verdicts)) if f.level != "pass"]
+    lines = [_command(f) for f in all_findings(list(verdicts)) if f.level not in SILENT]
     for verdict in verdicts:
         text = f"{outcome(verdict).word}. {design_sentence(verdict)}"
         place = f"file={_property(PurePath(spec_file(verdict)).as_posix())},line=1"

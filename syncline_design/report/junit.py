@@ -34,7 +34,7 @@ def _suite(verdict: Json) -> ElementTree.Element:
         "tests": len(cases),
         "failures": sum(f.level == "fail" for f in cases),
         "errors": sum(f.level == "undecided" for f in cases),
-        "skipped": sum(f.level == "waived" for f in cases),
+        "skipped": sum(f.level in ("waived", "not_reached") for f in cases),
     }
     suite = ElementTree.Element("testsuite", {"name": visible(spec_name(verdict))})
     for key, value in counts.items():
@@ -72,4 +72,6 @@ def _case(finding: Finding, file: str) -> ElementTree.Element:
     elif finding.level == "waived":
         reason = f"{visible(finding.justification)}; {message}"
         ElementTree.SubElement(case, "skipped", {"message": reason})
+    elif finding.level == "not_reached":
+        ElementTree.SubElement(case, "skipped", {"message": message})
     return case

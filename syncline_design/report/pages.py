@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from syncline_design.report.overview_page import render_verdicts
+from syncline_design.report.reproduction_page import render_reproduction
 from syncline_design.report.verdict_page import render_verdict
 
-__all__ = ["render_verdict", "render_verdicts"]
+__all__ = ["render_reproduction", "render_verdict", "render_verdicts"]

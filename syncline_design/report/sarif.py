@@ -13,7 +13,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from syncline_design import __version__
-from syncline_design.report.findings import Finding, all_findings
+from syncline_design.report.findings import SILENT, Finding, all_findings
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import Json
@@ -37,7 +37,7 @@ _LEVELS: Final = {"fail": "error", "waived": "error", "undecided": "warning", "w
 
 def render_sarif(verdicts: Sequence[Json]) -> str:
     """A SARIF log with one run; what passes is left out, what is waived is suppressed."""
-    found = [f for f in all_findings(list(verdicts)) if f.level != "pass"]
+    found = [f for f in all_findings(list(verdicts)) if f.level not in SILENT]
     rules = sorted({_rule_id(f) for f in found})
     run = {
         "tool": {

@@ -18,6 +18,7 @@ class Cell:
     tone: Tone = ""
     mark: str = ""
     code: bool = False
+    sub: str = ""  # a second, quieter line
 
 
 @dataclass(frozen=True, slots=True)
