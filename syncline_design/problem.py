@@ -1,245 +1,352 @@
-"""The design problem as tables: options per role, every constant resolved, no physics left in it.
+"""A loaded spec to a Problem: tables of options with every constant resolved.
 
-Floats are what the fast roads add up; `exact_*` hold the same figure as a fraction where the
-spec's decimal text gives more (None: the float itself is exact).  `option_tables.build_problem`
-makes a Problem from a loaded spec.
+Formulas (E. R. Jellum et al., arXiv:2209.01136v2, and the design rules):
+sensor error per role: sigma_p; sigma_Theta d; sigma_r + sigma_u d (eq. sensor_error_ub);
+own tau_crit = that error / rate, rate v_max for position, v_max + d omega_max otherwise
+(eq. t_crit per sensor).  Every figure is worked out in fractions and rounded once.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Literal
 
-from syncline_design.model.system import RoleName
+from syncline_design.catalog import (
+    ClockEntry,
+    InfrastructureEntry,
+    PlatformEntry,
+    SensorEntry,
+    TimestampingEntry,
+)
+from syncline_design.chosen_system import system_of
+from syncline_design.design_space import (
+    NO_CLOCK,
+    RESOURCES,
+    ClockOption,
+    Design,
+    Excluded,
+    Infrastructure,
+    Limits,
+    Objective,
+    Option,
+    Pair,
+    Problem,
+    ResourceName,
+    Resources,
+    RoleTable,
+    SyncModel,
+    VehicleTable,
+    breaks_own_tau_crit,
+    exactly,
+    sync_ratio,
+    with_limits,
+)
+from syncline_design.exact_figures import fraction_of, norm, tau_bound
+from syncline_design.loading import LoadedSpec
+from syncline_design.model.system import ROLES, RoleName
+from syncline_design.resolution import (
+    candidate_sensors,
+    clocks_of,
+    platform_of,
+    timestamping_of,
+    usable_primitives,
+)
+from syncline_design.selection import ClockSelection, RoleSelection, Selection
+from syncline_design.spec import InlineTimestamping, Role, RoleChoice, StageChoice
+from syncline_design.units import Quantity
 
-Objective = Literal["cost", "mass", "power", "error"]
-ResourceName = Literal["cost", "mass", "power"]
-SyncModel = Literal["syncline", "per_sensor"]
-RESOURCES: tuple[ResourceName, ...] = ("cost", "mass", "power")
+__all__ = [
+    "NO_CLOCK",
+    "RESOURCES",
+    "ClockOption",
+    "Design",
+    "Excluded",
+    "Infrastructure",
+    "Limits",
+    "Objective",
+    "Option",
+    "Pair",
+    "Problem",
+    "ResourceName",
+    "Resources",
+    "RoleTable",
+    "SyncModel",
+    "VehicleTable",
+    "build_problem",
+    "exactly",
+    "selection_of",
+    "sole_design",
+    "sync_ratio",
+    "system_of",
+    "with_limits",
+]
 
-
-@dataclass(frozen=True, slots=True)
-class Resources:
-    """What a choice uses up, exactly as written; None: the catalog does not say."""
-
-    cost: Fraction | None = None  # in the spec's currency
-    mass: Fraction | None = None  # kg
-    power: Fraction | None = None  # W
-
-    def of(self, name: ResourceName) -> Fraction | None:
-        """The amount of one resource."""
-        if name == "cost":
-            return self.cost
-        return self.mass if name == "mass" else self.power
-
-
-@dataclass(frozen=True, slots=True)
-class Option:
-    """One (sensor, primitive, timestamping method) for a role, every constant resolved."""
-
-    sensor: str
-    primitive: str
-    method: str
-    sensor_error_m: float  # this sensor's term of the roof
-    tau_s: float  # bound of its timestamp error
-    tau_crit_s: float  # inf when motion does not matter
-    timeline: Literal["host", "utc"]
-    resources: Resources  # sensor plus timestamping, per sensor
-    requires: tuple[tuple[str, int], ...] = ()  # (infrastructure id, channels)
-    exact_error_m: Fraction | None = None
-    exact_tau_s: Fraction | None = None
-
-    @property
-    def names(self) -> tuple[str, str, str]:
-        """What tells this option from the others of its role; ties are broken by it."""
-        return (self.sensor, self.primitive, self.method)
-
-    def error(self) -> Fraction:
-        """Sensor error [m], exactly."""
-        return exactly(self.sensor_error_m, self.exact_error_m)
-
-    def tau(self) -> Fraction:
-        """Bound of the timestamp error [s], exactly."""
-        return exactly(self.tau_s, self.exact_tau_s)
-
-
-@dataclass(frozen=True, slots=True)
-class Excluded:
-    """A candidate removed before the choice, with the reason in words and by how much it misses."""
-
-    sensor: str
-    primitive: str
-    method: str
-    reason: str
-    ratio: float | None = None  # tau / tau_crit where that is the reason
-    option: Option | None = None  # what it would be, were the sync limit relaxed
-
-
-@dataclass(frozen=True, slots=True)
-class RoleTable:
-    """Options of one role; no two of them have the same names."""
-
-    stage: int
-    stage_name: str
-    role: RoleName
-    vehicle: int
-    options: tuple[Option, ...]
-    excluded: tuple[Excluded, ...] = ()
+INLINE = "inline"
+NO_EXTRA: Mapping[tuple[str, RoleName], float] = {}
 
 
-@dataclass(frozen=True, slots=True)
-class ClockOption:
-    """How a vehicle's host clock is disciplined; id None: timelines taken as common."""
+def build_problem(
+    loaded: LoadedSpec,
+    extra_tau_s: Mapping[tuple[str, RoleName], float] = NO_EXTRA,
+    systematic: Sequence[tuple[str, str, float]] = (),
+) -> Problem:
+    """Tables of everything a loaded spec leaves to choose.
 
-    id: str | None
-    offset_bound_s: float
-    resources: Resources
-    requires: tuple[tuple[str, int], ...] = ()
-    exact_offset_s: Fraction | None = None
-
-    def offset(self) -> Fraction:
-        """Bound of the host clock's offset against UTC [s], exactly."""
-        return exactly(self.offset_bound_s, self.exact_offset_s)
-
-
-NO_CLOCK = ClockOption(None, 0.0, Resources(Fraction(0), Fraction(0), Fraction(0)))
-
-
-@dataclass(frozen=True, slots=True)
-class VehicleTable:
-    name: str
-    stages: tuple[int, ...]
-    clocks: tuple[ClockOption, ...]  # never empty
-
-
-@dataclass(frozen=True, slots=True)
-class Infrastructure:
-    """Shared hardware: bought once per vehicle and per full set of channels."""
-
-    id: str
-    channels: int
-    resources: Resources
-
-
-@dataclass(frozen=True, slots=True)
-class Pair:
-    """Two roles whose timestamps meet: relative error bound tau_a + tau_b + timeline offset.
-
-    role, reference: indices into Problem.roles; reference None: against the role's own stamp.
-    rate_mps: how fast the estimate moves with that relative error (per_sensor model).
+    extra_tau_s: what known effects add to the tau of (stage name, role) [s]; systematic: known
+    systematic errors as (term, stage name, value [m]), the same for every design.
     """
-
-    role: int
-    reference: int | None
-    rate_mps: float
-    exact_rate_mps: Fraction | None = None
-
-    def rate(self) -> Fraction:
-        """Rate [m/s], exactly."""
-        return exactly(self.rate_mps, self.exact_rate_mps)
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """The tightest limit of each kind with its requirement ids; None: not required.
-
-    accuracy: total <= accuracy_m.  sync: every tau_i < sync * tau_crit_i and
-    tau_sys < sync * tau_crit of the system (strict).  Budgets: sum <= limit, exact.
-    """
-
-    accuracy_m: float | None
-    sync: float
-    cost: Fraction | None = None
-    mass: Fraction | None = None
-    power: Fraction | None = None
-    ids: tuple[tuple[str, str], ...] = field(default=())  # (kind, requirement id)
-
-    def budget(self, name: ResourceName) -> Fraction | None:
-        """The budget of one resource, None when there is none."""
-        if name == "cost":
-            return self.cost
-        return self.mass if name == "mass" else self.power
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    roles: tuple[RoleTable, ...]
-    pairs: tuple[Pair, ...]
-    vehicles: tuple[VehicleTable, ...]
-    infrastructure: tuple[Infrastructure, ...]
-    sync_rate_mps: float  # sum over stages of v_max + d omega_max
-    fixed_error_m: float  # systematic terms of known effects, the same for every design
-    limits: Limits
-    sync_model: SyncModel
-    objective: Objective
-    exact_sync_rate_mps: Fraction | None = None
-
-    def sync_rate(self) -> Fraction:
-        """Sync rate of the chain [m/s], exactly."""
-        return exactly(self.sync_rate_mps, self.exact_sync_rate_mps)
-
-    @property
-    def combinations(self) -> int:
-        """How many designs there are before any requirement."""
-        count = 1
-        for role in self.roles:
-            count *= len(role.options)
-        for vehicle in self.vehicles:
-            count *= len(vehicle.clocks)
-        return count
-
-
-@dataclass(frozen=True, slots=True)
-class Design:
-    """What was chosen: an option index per role, a clock index per vehicle."""
-
-    options: tuple[int, ...]
-    clocks: tuple[int, ...]
-
-
-def exactly(value: float, fraction: Fraction | None) -> Fraction:
-    """The exact figure behind a float: the fraction where there is one, else the float itself."""
-    return Fraction(value) if fraction is None else fraction
-
-
-def with_limits(problem: Problem, limits: Limits) -> Problem:
-    """The same problem under other limits; a relaxed sync limit brings excluded options back."""
-    if limits.sync == problem.limits.sync:
-        return replace(problem, limits=limits)
-    roles = tuple(_under_sync_limit(table, limits.sync) for table in problem.roles)
-    return replace(problem, roles=roles, limits=limits)
-
-
-def sync_ratio(option: Option) -> float:
-    """tau / tau_crit of one option, rounded once; 0 where motion does not matter."""
-    if option.tau_crit_s == float("inf"):
-        return 0.0
-    return option.tau_s / option.tau_crit_s if option.tau_crit_s > 0.0 else float("inf")
-
-
-def breaks_own_tau_crit(option: Option, ratio: float) -> Excluded:
-    """The record of an option whose timestamps are too poor for its own noise."""
-    reason = (
-        f"its timestamp error reaches {ratio:.3g} times its own tau_crit: the sensor would be "
-        "limited by its timestamps, not by its noise"
+    spec = loaded.spec
+    motions = [_motion(loaded, stage) for stage in spec.stages]
+    limits = _limits(loaded)
+    vehicles = list(dict.fromkeys(stage.vehicle_name for stage in spec.stages))
+    tables = tuple(
+        _role_table(loaded, index, role, motions[index], limits.sync, vehicles, extra_tau_s)
+        for index, stage in enumerate(spec.stages)
+        for role in ROLES
+        if not _is_empty(stage.role(role))
     )
-    return Excluded(*option.names, reason=reason, ratio=ratio, option=option)
+    rate = sum((motion.rate for motion in motions), Fraction(0))
+    return Problem(
+        roles=tables,
+        pairs=_pairs(tables, motions),
+        vehicles=tuple(_vehicle(loaded, name) for name in vehicles),
+        infrastructure=tuple(_infrastructure(loaded)),
+        sync_rate_mps=float(rate),
+        fixed_error_m=math.fsum(value for _, _, value in systematic),
+        limits=limits,
+        sync_model=spec.sync_model,
+        objective=spec.objective,
+        exact_sync_rate_mps=rate,
+    )
 
 
-def _under_sync_limit(table: RoleTable, limit: float) -> RoleTable:
-    """Options and exclusions of a role sorted anew under another sync limit."""
-    pool = [(option, sync_ratio(option)) for option in table.options]
-    pool += [
-        (one.option, one.ratio)
-        for one in table.excluded
-        if one.option is not None and one.ratio is not None
+def selection_of(problem: Problem, design: Design) -> Selection:
+    """The names of a design."""
+    roles = []
+    for table, place in zip(problem.roles, design.options, strict=True):
+        option = table.options[place]
+        roles.append(RoleSelection(table.stage_name, table.role, *option.names))
+    clocks = [
+        ClockSelection(vehicle.name, vehicle.clocks[place].id)
+        for vehicle, place in zip(problem.vehicles, design.clocks, strict=True)
     ]
-    pool.sort(key=lambda entry: entry[0].names)
-    keep = tuple(option for option, ratio in pool if ratio < limit)
-    out = tuple(breaks_own_tau_crit(option, ratio) for option, ratio in pool if not ratio < limit)
-    return replace(
-        table,
-        options=keep,
-        excluded=(*(one for one in table.excluded if one.option is None), *out),
+    return Selection(tuple(roles), tuple(clocks))
+
+
+def sole_design(problem: Problem) -> tuple[Problem, Design] | None:
+    """The one design of a spec that leaves nothing open, sync requirement or not.
+
+    Comes with the problem in which its indices hold: an option that breaks its own tau_crit is
+    part of it, so that the design can be verified and found to fail.
+    """
+    everything = with_limits(problem, replace(problem.limits, sync=math.inf))
+    if everything.combinations != 1:
+        return None
+    return everything, Design((0,) * len(everything.roles), (0,) * len(everything.vehicles))
+
+
+@dataclass(frozen=True, slots=True)
+class _Motion:
+    """How a stage moves, exactly: v_max [m/s], d [m] (0 without ranging), d omega_max [m/s]."""
+
+    speed: Fraction
+    distance: Fraction
+    turning: Fraction
+    ranges: bool
+
+    @property
+    def rate(self) -> Fraction:
+        """v_max + d omega_max [m/s]."""
+        return self.speed + self.turning
+
+
+def _is_empty(choice: RoleChoice | None) -> bool:
+    return choice is None or choice.is_empty
+
+
+def _motion(loaded: LoadedSpec, stage: StageChoice) -> _Motion:
+    platform: PlatformEntry = platform_of(stage.platform, loaded.catalog)
+    ranges = not _is_empty(stage.ranging)
+    distance = fraction_of(platform.distance) if ranges else Fraction(0)
+    speed = fraction_of(platform.v_max)
+    return _Motion(speed, distance, distance * fraction_of(platform.omega_max), ranges)
+
+
+def _limits(loaded: LoadedSpec) -> Limits:
+    """The tightest limit of each kind; without a sync requirement 1.0 is implied."""
+    spec = loaded.spec
+    tightest: dict[str, tuple[Fraction, str]] = {}
+    for requirement in spec.requirements:
+        limit = requirement.limit
+        exact = fraction_of(limit)
+        if requirement.kind == "cost" and isinstance(limit, Quantity):
+            exact = spec.in_currency(limit)
+        known = tightest.get(requirement.kind)
+        if known is None or exact < known[0]:
+            tightest[requirement.kind] = (exact, requirement.id)
+    budgets = {name: tightest[name][0] if name in tightest else None for name in RESOURCES}
+    accuracy = float(tightest["accuracy"][0]) if "accuracy" in tightest else None
+    sync = float(tightest["sync"][0]) if "sync" in tightest else 1.0
+    ids = tuple((kind, name) for kind, (_, name) in tightest.items() if kind != "monte_carlo")
+    return Limits(accuracy, sync, budgets["cost"], budgets["mass"], budgets["power"], ids)
+
+
+def _sensor_error(sensor: SensorEntry, role: RoleName, motion: _Motion) -> Fraction:
+    """The role's term of the sensor-induced error [m] (eq. sensor_error_ub)."""
+    if role == "position":
+        return norm(sensor.sigma_position or 0.0, 3)
+    if role == "attitude":
+        return norm(sensor.sigma_attitude or 0.0, 3) * motion.distance
+    bearing = norm(sensor.sigma_bearing or 0.0, 2) * motion.distance
+    return fraction_of(sensor.sigma_range or 0.0) + bearing
+
+
+def _role_table(
+    loaded: LoadedSpec,
+    index: int,
+    role: Role,
+    motion: _Motion,
+    sync_limit: float,
+    vehicles: list[str],
+    extra_tau_s: Mapping[tuple[str, RoleName], float],
+) -> RoleTable:
+    stage = loaded.spec.stages[index]
+    extra = Fraction(extra_tau_s.get((stage.name, role), 0.0))
+    options: list[Option] = []
+    excluded: list[Excluded] = []
+    for one in _candidates(loaded, stage, role, motion, extra):
+        ratio = sync_ratio(one) if isinstance(one, Option) else 0.0
+        if isinstance(one, Excluded):
+            excluded.append(one)
+        elif ratio < sync_limit:
+            options.append(one)
+        else:
+            excluded.append(breaks_own_tau_crit(one, ratio))
+    options.sort(key=lambda option: option.names)
+    vehicle = vehicles.index(stage.vehicle_name)
+    return RoleTable(index, stage.name, role, vehicle, tuple(options), tuple(excluded))
+
+
+def _candidates(
+    loaded: LoadedSpec, stage: StageChoice, role: Role, motion: _Motion, extra: Fraction
+) -> Iterator[Option | Excluded]:
+    """Every (sensor, primitive, method) that the spec lets a role take, or why it cannot."""
+    spec, catalog = loaded.spec, loaded.catalog
+    choice = stage.role(role)
+    assert choice is not None
+    methods = timestamping_of(spec, stage, choice, catalog)
+    for name, sensor in candidate_sensors(spec, stage, role, catalog):
+        figures = _Figures(loaded, role, motion, extra, name, sensor)
+        if isinstance(methods, InlineTimestamping):
+            tau = tau_bound(methods.error, spec.coverage_factor)
+            primitive = choice.primitive or INLINE
+            yield figures.option(primitive, INLINE, tau, methods.timeline, None)
+            continue
+        for method_id, method in methods:
+            primitives = usable_primitives(sensor, method, choice.primitive)
+            tau = tau_bound(method.error, spec.coverage_factor)
+            for primitive in primitives:
+                yield figures.option(primitive, method_id, tau, method.timeline, method)
+            if not primitives:
+                offers = choice.primitive or ", ".join(sensor.serves)
+                reason = f"{method_id} serves {', '.join(method.primitives)}; {name} has {offers}"
+                yield Excluded(name, "", method_id, reason)
+
+
+@dataclass(frozen=True, slots=True)
+class _Figures:
+    """A sensor in a role, before it is known how it is stamped."""
+
+    loaded: LoadedSpec
+    role: RoleName
+    motion: _Motion
+    extra: Fraction
+    name: str
+    sensor: SensorEntry
+
+    def option(
+        self,
+        primitive: str,
+        method: str,
+        tau: Fraction,
+        timeline: str,
+        entry: TimestampingEntry | None,
+    ) -> Option:
+        """The option with one way of stamping."""
+        enters = self.motion.ranges or self.role == "position"
+        error = _sensor_error(self.sensor, self.role, self.motion) if enters else Fraction(0)
+        rate = self.motion.speed if self.role == "position" else self.motion.rate
+        crit = float(error / rate) if enters and rate > 0 else math.inf
+        tau = tau + self.extra
+        return Option(
+            sensor=self.name,
+            primitive=primitive,
+            method=method,
+            sensor_error_m=float(error),
+            tau_s=float(tau),
+            tau_crit_s=crit,
+            timeline="utc" if timeline == "utc" else "host",
+            resources=_resources(self.loaded, self.sensor, entry),
+            requires=tuple(sorted(entry.requires.items())) if entry else (),
+            exact_error_m=error,
+            exact_tau_s=tau,
+        )
+
+
+def _resources(
+    loaded: LoadedSpec,
+    *entries: SensorEntry | TimestampingEntry | ClockEntry | InfrastructureEntry | None,
+) -> Resources:
+    """Sums over entries; None where one of them does not say."""
+    sums: dict[str, Fraction | None] = {}
+    for name in RESOURCES:
+        amounts = [getattr(entry, name) for entry in entries if entry is not None]
+        known = [_amount(loaded, name, amount) for amount in amounts if amount is not None]
+        sums[name] = sum(known, Fraction(0)) if len(known) == len(amounts) else None
+    return Resources(**sums)
+
+
+def _amount(loaded: LoadedSpec, name: str, amount: float) -> Fraction:
+    if name == "cost" and isinstance(amount, Quantity):
+        return loaded.spec.in_currency(amount)
+    return fraction_of(amount)
+
+
+def _pairs(tables: tuple[RoleTable, ...], motions: list[_Motion]) -> tuple[Pair, ...]:
+    """Pairs of timestamps that meet: (position, ranging) and (attitude, ranging) of each stage."""
+    place = {(table.stage, table.role): r for r, table in enumerate(tables)}
+    pairs = []
+    for stage, motion in enumerate(motions):
+        reference = place.get((stage, "ranging"))
+        before = place[0, "position"] if stage == 0 else place[stage - 1, "ranging"]
+        pairs.append(Pair(before, reference, float(motion.speed), motion.speed))
+        if reference is not None:
+            own = place[stage, "attitude"]
+            pairs.append(Pair(own, reference, float(motion.turning), motion.turning))
+    return tuple(pairs)
+
+
+def _vehicle(loaded: LoadedSpec, name: str) -> VehicleTable:
+    spec = loaded.spec
+    stages = [i for i, stage in enumerate(spec.stages) if stage.vehicle_name == name]
+    entries = next(
+        (c for i in stages if (c := clocks_of(spec.stages[i], loaded.catalog))),
+        (),
     )
+    clocks = tuple(_clock(loaded, identity, entry) for identity, entry in entries)
+    return VehicleTable(name, tuple(stages), clocks or (NO_CLOCK,))
+
+
+def _clock(loaded: LoadedSpec, identity: str, entry: ClockEntry) -> ClockOption:
+    offset = tau_bound(entry.offset, loaded.spec.coverage_factor)
+    if entry.drift is not None and entry.holdover is not None:
+        offset += abs(fraction_of(entry.drift)) * fraction_of(entry.holdover)
+    requires = tuple(sorted(entry.requires.items()))
+    return ClockOption(identity, float(offset), _resources(loaded, entry), requires, offset)
+
+
+def _infrastructure(loaded: LoadedSpec) -> Iterator[Infrastructure]:
+    for identity, entry in loaded.catalog.infrastructure.items():
+        yield Infrastructure(identity, int(entry.channels), _resources(loaded, entry))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from fractions import Fraction
 
-from syncline_design.problem import (
+from syncline_design.design_space import (
     NO_CLOCK,
     ClockOption,
     Infrastructure,
@@ -43,7 +43,7 @@ def random_problem(rng: random.Random, most: int = 400) -> Problem:
         )
         for v in range(max(vehicles) + 1)
     )
-    problem = Problem(
+    return Problem(
         roles=roles,
         pairs=pairs,
         vehicles=tables,
@@ -54,7 +54,6 @@ def random_problem(rng: random.Random, most: int = 400) -> Problem:
         sync_model=rng.choice(["syncline", "per_sensor"]),
         objective=rng.choice(["cost", "cost", "mass", "power", "error"]),
     )
-    return problem
 
 
 def with_random_limits(rng: random.Random, problem: Problem, errors: list[float]) -> Problem:

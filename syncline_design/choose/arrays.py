@@ -10,7 +10,14 @@ from typing import Any
 import numpy as np
 
 from syncline_design.choose.pareto import Bools, Column, Columns, Floats, Indices, undominated
-from syncline_design.problem import RESOURCES, Option, Problem, ResourceName, Resources, RoleTable
+from syncline_design.design_space import (
+    RESOURCES,
+    Option,
+    Problem,
+    ResourceName,
+    Resources,
+    RoleTable,
+)
 
 MARGIN = 1e-12  # sums of floats are trusted to this; what lies closer to a limit is decided exactly
 INT64_ROOM = 2**61

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from syncline_design.choose.evaluate import Evaluation, broken, error_key, evaluate, rank
 from syncline_design.choose.outcome import FrontPoint, TooLarge
-from syncline_design.problem import Design, Problem, ResourceName
+from syncline_design.design_space import Design, Problem, ResourceName
 
 MOST_COMBINATIONS = 300_000
 

@@ -10,7 +10,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from syncline_design.problem import (
+from syncline_design.design_space import (
     RESOURCES,
     ClockOption,
     Design,

@@ -28,7 +28,7 @@ from syncline_design.choose.labels import Labels, concatenate
 from syncline_design.choose.merge import Ceiling, Merge
 from syncline_design.choose.outcome import FrontPoint, TooLarge
 from syncline_design.choose.pareto import Bools, Column, Columns, Floats, undominated
-from syncline_design.problem import ClockOption, Design, Problem, ResourceName
+from syncline_design.design_space import ClockOption, Design, Problem, ResourceName
 
 
 @dataclass(frozen=True, slots=True)

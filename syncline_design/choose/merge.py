@@ -24,7 +24,7 @@ from syncline_design.choose.pareto import (
     undominated,
 )
 from syncline_design.choose.safety import Safety, TimingClass
-from syncline_design.problem import Problem, VehicleTable
+from syncline_design.design_space import Problem, VehicleTable
 
 
 @dataclass(frozen=True, slots=True)

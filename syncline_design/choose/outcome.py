@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from syncline_design.problem import Design
+from syncline_design.design_space import Design
 
 Method = Literal["auto", "front", "milp", "enumerate"]
 METHODS: tuple[Method, ...] = ("auto", "front", "milp", "enumerate")

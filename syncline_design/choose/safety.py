@@ -15,7 +15,7 @@ import numpy as np
 from syncline_design.choose.arrays import MARGIN, Tables
 from syncline_design.choose.labels import Labels
 from syncline_design.choose.pareto import Bools, Floats, Indices
-from syncline_design.problem import Pair
+from syncline_design.design_space import Pair
 
 
 @dataclass(frozen=True, slots=True)

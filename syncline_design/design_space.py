@@ -1,0 +1,245 @@
+"""The design problem as tables: options per role, every constant resolved, no physics left in it.
+
+Floats are what the fast roads add up; `exact_*` hold the same figure as a fraction where the
+spec's decimal text gives more (None: the float itself is exact).  `problem.build_problem` makes
+these tables from a loaded spec.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from typing import Literal
+
+from syncline_design.model.system import RoleName
+
+Objective = Literal["cost", "mass", "power", "error"]
+ResourceName = Literal["cost", "mass", "power"]
+SyncModel = Literal["syncline", "per_sensor"]
+RESOURCES: tuple[ResourceName, ...] = ("cost", "mass", "power")
+
+
+@dataclass(frozen=True, slots=True)
+class Resources:
+    """What a choice uses up, exactly as written; None: the catalog does not say."""
+
+    cost: Fraction | None = None  # in the spec's currency
+    mass: Fraction | None = None  # kg
+    power: Fraction | None = None  # W
+
+    def of(self, name: ResourceName) -> Fraction | None:
+        """The amount of one resource."""
+        if name == "cost":
+            return self.cost
+        return self.mass if name == "mass" else self.power
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One (sensor, primitive, timestamping method) for a role, every constant resolved."""
+
+    sensor: str
+    primitive: str
+    method: str
+    sensor_error_m: float  # this sensor's term of the roof
+    tau_s: float  # bound of its timestamp error
+    tau_crit_s: float  # inf when motion does not matter
+    timeline: Literal["host", "utc"]
+    resources: Resources  # sensor plus timestamping, per sensor
+    requires: tuple[tuple[str, int], ...] = ()  # (infrastructure id, channels)
+    exact_error_m: Fraction | None = None
+    exact_tau_s: Fraction | None = None
+
+    @property
+    def names(self) -> tuple[str, str, str]:
+        """What tells this option from the others of its role; ties are broken by it."""
+        return (self.sensor, self.primitive, self.method)
+
+    def error(self) -> Fraction:
+        """Sensor error [m], exactly."""
+        return exactly(self.sensor_error_m, self.exact_error_m)
+
+    def tau(self) -> Fraction:
+        """Bound of the timestamp error [s], exactly."""
+        return exactly(self.tau_s, self.exact_tau_s)
+
+
+@dataclass(frozen=True, slots=True)
+class Excluded:
+    """A candidate removed before the choice, with the reason in words and by how much it misses."""
+
+    sensor: str
+    primitive: str
+    method: str
+    reason: str
+    ratio: float | None = None  # tau / tau_crit where that is the reason
+    option: Option | None = None  # what it would be, were the sync limit relaxed
+
+
+@dataclass(frozen=True, slots=True)
+class RoleTable:
+    """Options of one role; no two of them have the same names."""
+
+    stage: int
+    stage_name: str
+    role: RoleName
+    vehicle: int
+    options: tuple[Option, ...]
+    excluded: tuple[Excluded, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ClockOption:
+    """How a vehicle's host clock is disciplined; id None: timelines taken as common."""
+
+    id: str | None
+    offset_bound_s: float
+    resources: Resources
+    requires: tuple[tuple[str, int], ...] = ()
+    exact_offset_s: Fraction | None = None
+
+    def offset(self) -> Fraction:
+        """Bound of the host clock's offset against UTC [s], exactly."""
+        return exactly(self.offset_bound_s, self.exact_offset_s)
+
+
+NO_CLOCK = ClockOption(None, 0.0, Resources(Fraction(0), Fraction(0), Fraction(0)))
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleTable:
+    name: str
+    stages: tuple[int, ...]
+    clocks: tuple[ClockOption, ...]  # never empty
+
+
+@dataclass(frozen=True, slots=True)
+class Infrastructure:
+    """Shared hardware: bought once per vehicle and per full set of channels."""
+
+    id: str
+    channels: int
+    resources: Resources
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two roles whose timestamps meet: relative error bound tau_a + tau_b + timeline offset.
+
+    role, reference: indices into Problem.roles; reference None: against the role's own stamp.
+    rate_mps: how fast the estimate moves with that relative error (per_sensor model).
+    """
+
+    role: int
+    reference: int | None
+    rate_mps: float
+    exact_rate_mps: Fraction | None = None
+
+    def rate(self) -> Fraction:
+        """Rate [m/s], exactly."""
+        return exactly(self.rate_mps, self.exact_rate_mps)
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """The tightest limit of each kind with its requirement ids; None: not required.
+
+    accuracy: total <= accuracy_m.  sync: every tau_i < sync * tau_crit_i and
+    tau_sys < sync * tau_crit of the system (strict).  Budgets: sum <= limit, exact.
+    """
+
+    accuracy_m: float | None
+    sync: float
+    cost: Fraction | None = None
+    mass: Fraction | None = None
+    power: Fraction | None = None
+    ids: tuple[tuple[str, str], ...] = field(default=())  # (kind, requirement id)
+
+    def budget(self, name: ResourceName) -> Fraction | None:
+        """The budget of one resource, None when there is none."""
+        if name == "cost":
+            return self.cost
+        return self.mass if name == "mass" else self.power
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    roles: tuple[RoleTable, ...]
+    pairs: tuple[Pair, ...]
+    vehicles: tuple[VehicleTable, ...]
+    infrastructure: tuple[Infrastructure, ...]
+    sync_rate_mps: float  # sum over stages of v_max + d omega_max
+    fixed_error_m: float  # systematic terms of known effects, the same for every design
+    limits: Limits
+    sync_model: SyncModel
+    objective: Objective
+    exact_sync_rate_mps: Fraction | None = None
+
+    def sync_rate(self) -> Fraction:
+        """Sync rate of the chain [m/s], exactly."""
+        return exactly(self.sync_rate_mps, self.exact_sync_rate_mps)
+
+    @property
+    def combinations(self) -> int:
+        """How many designs there are before any requirement."""
+        count = 1
+        for role in self.roles:
+            count *= len(role.options)
+        for vehicle in self.vehicles:
+            count *= len(vehicle.clocks)
+        return count
+
+
+@dataclass(frozen=True, slots=True)
+class Design:
+    """What was chosen: an option index per role, a clock index per vehicle."""
+
+    options: tuple[int, ...]
+    clocks: tuple[int, ...]
+
+
+def exactly(value: float, fraction: Fraction | None) -> Fraction:
+    """The exact figure behind a float: the fraction where there is one, else the float itself."""
+    return Fraction(value) if fraction is None else fraction
+
+
+def with_limits(problem: Problem, limits: Limits) -> Problem:
+    """The same problem under other limits; a relaxed sync limit brings excluded options back."""
+    if limits.sync == problem.limits.sync:
+        return replace(problem, limits=limits)
+    roles = tuple(_under_sync_limit(table, limits.sync) for table in problem.roles)
+    return replace(problem, roles=roles, limits=limits)
+
+
+def sync_ratio(option: Option) -> float:
+    """tau / tau_crit of one option, rounded once; 0 where motion does not matter."""
+    if option.tau_crit_s == float("inf"):
+        return 0.0
+    return option.tau_s / option.tau_crit_s if option.tau_crit_s > 0.0 else float("inf")
+
+
+def breaks_own_tau_crit(option: Option, ratio: float) -> Excluded:
+    """The record of an option whose timestamps are too poor for its own noise."""
+    reason = (
+        f"its timestamp error reaches {ratio:.3g} times its own tau_crit: the sensor would be "
+        "limited by its timestamps, not by its noise"
+    )
+    return Excluded(*option.names, reason=reason, ratio=ratio, option=option)
+
+
+def _under_sync_limit(table: RoleTable, limit: float) -> RoleTable:
+    """Options and exclusions of a role sorted anew under another sync limit."""
+    pool = [(option, sync_ratio(option)) for option in table.options]
+    pool += [
+        (one.option, one.ratio)
+        for one in table.excluded
+        if one.option is not None and one.ratio is not None
+    ]
+    pool.sort(key=lambda entry: entry[0].names)
+    keep = tuple(option for option, ratio in pool if ratio < limit)
+    out = tuple(breaks_own_tau_crit(option, ratio) for option, ratio in pool if not ratio < limit)
+    return replace(
+        table,
+        options=keep,
+        excluded=(*(one for one in table.excluded if one.option is None), *out),
+    )
