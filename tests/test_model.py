@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Sequence
+from operator import attrgetter
 from typing import Any
 
 import mpmath
@@ -270,12 +271,13 @@ def obvious(system: System) -> dict[str, mpmath.mpf]:
         return tau + (0 if a.timeline == b.timeline else clock[a.timeline] + clock[b.timeline])
 
     sensor, rate, per_sensor, taus = exact(0), exact(0), exact(0), []
+    lever_rate, lever_per_sensor = exact(0), exact(0)
     before: Sensor | None = system.stages[0].position
     sensor += norm(before.sigma)  # type: ignore[union-attr]
     for stage in system.stages:
-        v, w, d = (
+        v, w, d, b = (
             exact(getattr(stage.platform, key))
-            for key in ("v_max_mps", "omega_max_radps", "distance_m")
+            for key in ("v_max_mps", "omega_max_radps", "distance_m", "baseline_m")
         )
         attitude, ranging = stage.attitude, stage.ranging
         assert attitude is not None
@@ -285,6 +287,8 @@ def obvious(system: System) -> dict[str, mpmath.mpf]:
         rate += v + d * w
         taus += [apart(before, ranging), apart(attitude, ranging)]
         per_sensor += v * taus[-2] + d * w * taus[-1]
+        lever_rate += v + b * w + d * w
+        lever_per_sensor += (v + b * w) * taus[-2] + d * w * taus[-1]
         before = ranging
     return {
         "sensor_error_m": sensor,
@@ -295,6 +299,10 @@ def obvious(system: System) -> dict[str, mpmath.mpf]:
         "sync_error_per_sensor_m": per_sensor,
         "total_m": sensor + rate * max(taus),
         "total_per_sensor_m": sensor + per_sensor,
+        "lever_arm.sync_rate_mps": lever_rate,
+        "lever_arm.tau_crit_s": sensor / lever_rate,
+        "lever_arm.total_m": sensor + lever_rate * max(taus),
+        "lever_arm.total_per_sensor_m": sensor + lever_per_sensor,
     }
 
 
@@ -302,7 +310,8 @@ def agree_with_obvious(system: System) -> None:
     with mpmath.workdps(50):
         result = budget(system)
         for key, value in obvious(system).items():
-            assert getattr(result, key) == pytest.approx(float(value), rel=1e-13, abs=1e-300), key
+            found = attrgetter(key)(result)
+            assert found == pytest.approx(float(value), rel=1e-13, abs=1e-300), key
 
 
 @given(chains())
@@ -450,6 +459,7 @@ def test_stage_without_ranging_locates_itself_only() -> None:
     result = budget(System((stage,), clock_offsets=clocks))
     assert result.tau_s == 1e-3
     assert result.sync_rate_mps == 21.0
+    assert result.stages[0].distance_m == 0.0
     assert result.sensor_error_m == pytest.approx(0.01 * math.sqrt(3))
     assert result.total_m == pytest.approx(0.01 * math.sqrt(3) + 0.021)
     assert result.total_m == result.total_per_sensor_m
@@ -482,6 +492,29 @@ def test_turning_alone_moves_an_antenna_on_a_lever_arm() -> None:
     assert position.tau_crit_s == math.inf
     assert position.tau_crit_lever_arm_s == pytest.approx(0.01 * math.sqrt(3) / 2.0)
     assert lever_arm_m(turning, first=True) == 2.0
+
+
+def test_one_sensor_past_its_own_tau_crit_decides_the_sync_ratio() -> None:
+    """1 ms against the RTK receiver's 0.825 ms; the system's tau_crit is 5.6 ms."""
+    stage = single(
+        sensor_of("f9p_rtk", TimingError(Constant(1e-3))),
+        sensor_of("ellipse", TimingError(Constant(0.0))),
+        sensor_of("alpha_prime", TimingError(Constant(0.0))),
+    )
+    result = budget(System((stage,)))
+    assert result.tau_crit_s == pytest.approx(5.57e-3, abs=5e-6)
+    assert result.sensor_bound
+    assert result.sync_ratio == pytest.approx(1e-3 / 824.786e-6, rel=1e-6)
+
+
+def test_without_any_noise_no_timestamp_error_is_free() -> None:
+    exact = TimingError(Constant(0.0))
+    perfect = Sensor("perfect", "position", (0.0, 0.0, 0.0), exact)
+    stage = single(perfect, sensor_of("mru5", exact), sensor_of("vux1", exact))
+    result = budget(System((stage,)))
+    assert result.sensors[0].tau_crit_s == 0.0
+    assert result.sensors[0].ratio == math.inf
+    assert not result.sync_ratio < 1.0
 
 
 @pytest.mark.parametrize("order", [(math.nan, 1.0), (1.0, math.nan)])
