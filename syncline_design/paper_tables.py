@@ -4,7 +4,7 @@ Source: E. R. Jellum, T. H. Bryne, T. A. Johansen, M. Orlandić, "The Syncline M
 Impact of Time Synchronization in Sensor Fusion", arXiv:2209.01136v2 (CC BY 4.0).  Digits and unit
 of each figure are the paper's (a space is put before the unit).  This is no catalog: nothing here
 enters a design.  Ids are those of the catalogs; where the paper contradicts itself is listed in
-`reproduce.ERRATA`.
+`paper_errata`.
 """
 
 from __future__ import annotations

@@ -17,6 +17,7 @@ from syncline_design.catalog import Catalog
 from syncline_design.loading import load_builtin
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
+from syncline_design.paper_errata import ERRATA, Key
 from syncline_design.paper_figures import (
     FIGURE_1_SENSOR_ERROR_M,
     SURVEY_PAYLOAD,
@@ -35,70 +36,6 @@ SCHEMA = "syncline-design/reproduction/v1"
 TAU_CRIT_TABLES = ("tau_crit_georeferencing", "tau_crit_survey")
 
 Status = Literal["agrees", "erratum", "differs"]
-Key = tuple[str, str, str]  # table, row, column
-
-
-@dataclass(frozen=True, slots=True)
-class Erratum:
-    """A place where the paper contradicts itself.
-
-    cells: the printed figures it explains, with what they come out at instead (in the cell's
-    display unit; half a unit of its last digit is the tolerance).
-    """
-
-    id: str
-    where: str
-    reason: str
-    cells: tuple[tuple[Key, str], ...] = ()
-
-
-ERRATA = (
-    Erratum(
-        "auv_row",
-        "table Robot platform parameters, AUV",
-        "Printed v_max 30 m/s and d 5 m. The survey table, the text (30 m above the sea floor) and "
-        "both system tau_crit only come out with d 30 m and v_max 2.0779 m/s. The catalog's auv "
-        "is corrected, auv_printed is as printed.",
-        (
-            (("platforms", "auv", "v_max"), "2.0779"),
-            (("platforms", "auv", "distance"), "30"),
-        ),
-    ),
-    Erratum(
-        "auv_speed_digits",
-        "table Critical synchronization error, M3 Sonar on the AUV",
-        "The corrected speed, 2.0779 m/s, is itself cut: the six AUV cells together ask for "
-        "2.07795 to 2.07800 m/s, and 2.07797 m/s gives 82.776 ms.",
-        ((("tau_crit_survey", "kongsberg_m3", "auv"), "82.7771"),),
-    ),
-    Erratum(
-        "survey_roof",
-        "text on the survey Synclines",
-        "Printed 1.67 m. The paper's own formula and tables give 1.4127 m, and only 1.4127 m gives "
-        "the printed system tau_crit of 16 and 4 ms.",
-        ((("text", "survey_roof", "both_sv"), "1.4127"),),
-    ),
-    Erratum(
-        "fixed_wing_rate",
-        "table Minimum synchronization error, VUX-1 on the fixed wing",
-        "77.9 deg/s is a rounding of 45 sqrt(3) = 77.94 deg/s, which gives 157.99 us; the printed "
-        "rate gives 158.06 us.",
-        ((("tau_crit_georeferencing", "riegl_vux1uav", "uav_fixed_wing"), "158.06"),),
-    ),
-    Erratum(
-        "superscripts",
-        "GNSS and AUV INS measurement equations",
-        "The sync error of the GNSS equation carries the superscript of the INS, that of the AUV's "
-        "INS the one of the surface vessel; the GNSS and the AUV are meant. No figure changes.",
-    ),
-    Erratum(
-        "lever_arm",
-        "Syncline equation",
-        "The lever arm enters the simulator (v + omega x l) but not the Syncline. For the large "
-        "surface vessel b omega = 3.9 m/s exceeds v_max = 2.5 m/s, so its position tau_crit is "
-        "optimistic by a factor of 2.6. Both values are shown by check.",
-    ),
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,6 +71,10 @@ class Reproduction:
         """Whether every printed figure agrees or is a documented erratum."""
         return all(cell.status != "differs" for cell in (*self.cells, *self.inputs))
 
+    def to_json(self) -> dict[str, Any]:
+        """The reproduction as plain data (schema syncline-design/reproduction/v1)."""
+        return as_json(self)
+
 
 def reproduce(catalog: Catalog | None = None, simulate: bool = True) -> Reproduction:
     """Compute every printed figure from a catalog, the built-in one unless another is given.
@@ -142,14 +83,14 @@ def reproduce(catalog: Catalog | None = None, simulate: bool = True) -> Reproduc
     """
     catalog = load_builtin() if catalog is None else catalog
     cells = tuple(
-        _cell((table, row, column), text, _computed_si(catalog, table, row, column))
+        _cell((table, row, column), printed, _computed_si(catalog, table, row, column))
         for table in (*TAU_CRIT_TABLES, "text")
-        for row, column, text in _entries(table)
+        for row, column, printed in _entries(table)
     )
     inputs = tuple(
-        _cell((table, row, column), text, _catalog_si(catalog, table, row, column), exact=True)
+        _cell((table, row, column), printed, _catalog_si(catalog, table, row, column), exact=True)
         for table in ("platforms", "sensors")
-        for row, column, text in _entries(table)
+        for row, column, printed in _entries(table)
     )
     plotted = figures(catalog)
     beside = [figure for figure in plotted if figure.simulated and simulate]
@@ -159,8 +100,8 @@ def reproduce(catalog: Catalog | None = None, simulate: bool = True) -> Reproduc
 
 def _entries(table: str) -> Iterator[tuple[str, str, str]]:
     for row, columns in PRINTED[table].items():
-        for column, text in columns.items():
-            yield row, column, text
+        for column, printed in columns.items():
+            yield row, column, printed
 
 
 def _computed_si(catalog: Catalog, table: str, row: str, column: str) -> float:
@@ -328,7 +269,7 @@ def _counts(result: Reproduction) -> dict[str, dict[str, int]]:
     }
 
 
-def as_text(result: Reproduction) -> str:
+def text(result: Reproduction) -> str:
     """The reproduction as aligned text: every cell, the errata, the counts at the end."""
     lines: list[str] = []
     for table in (*TAU_CRIT_TABLES, "text"):

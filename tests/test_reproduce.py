@@ -11,6 +11,7 @@ import pytest
 from syncline_design.catalog import Catalog
 from syncline_design.loading import load_builtin
 from syncline_design.model.budget import budget
+from syncline_design.paper_errata import ERRATA
 from syncline_design.paper_figures import (
     FIGURE_2_PAYLOAD,
     SURVEY_PAYLOAD,
@@ -20,14 +21,13 @@ from syncline_design.paper_figures import (
 )
 from syncline_design.paper_tables import PRINTED
 from syncline_design.reproduce import (
-    ERRATA,
     SCHEMA,
     Cell,
     Reproduction,
     as_json,
-    as_text,
     reproduce,
     tau_crit_cells,
+    text,
 )
 from syncline_design.units import Dimension, Quantity, parse_quantity
 
@@ -110,8 +110,8 @@ def test_the_survey_tables_add_up_to_the_papers_columns() -> None:
     """Column sums typed in from the paper's rows guard the transcription as a whole."""
     columns = {"large_sv": 0.0, "small_sv": 0.0, "auv": 0.0}
     for row in PRINTED["tau_crit_survey"].values():
-        for column, text in row.items():
-            columns[column] += float(text.split()[0])
+        for column, printed in row.items():
+            columns[column] += float(printed.split()[0])
     assert columns["large_sv"] == pytest.approx(
         1039.230 + 6.928 + 52.754 + 0.746 + 18.521 + 12.368 + 137.071 + 221.857
     )
@@ -130,13 +130,13 @@ def test_a_wrong_sensor_figure_fails_its_cells_and_its_input(catalog: Catalog) -
     assert not wrong.ok
     assert cell_of(wrong, "sensors", "kongsberg_mru5", "yaw").status == "differs"
     assert cell_of(wrong, "tau_crit_survey", "kongsberg_mru5", "large_sv").status == "differs"
-    text = as_text(wrong)
-    assert "NOT accounted for" in text
-    assert "DIFFERS, neither agrees nor is a documented erratum" in text
+    said = text(wrong)
+    assert "NOT accounted for" in said
+    assert "DIFFERS, neither agrees nor is a documented erratum" in said
 
 
 @pytest.mark.parametrize(
-    ("platform", "key", "text", "dimension"),
+    ("platform", "key", "written", "dimension"),
     [
         ("usv", "v_max", "5.0000001 m/s", Dimension.SPEED),
         ("large_sv", "baseline", "51 m", Dimension.LENGTH),
@@ -145,10 +145,10 @@ def test_a_wrong_sensor_figure_fails_its_cells_and_its_input(catalog: Catalog) -
     ],
 )
 def test_a_wrong_platform_figure_fails(
-    catalog: Catalog, platform: str, key: str, text: str, dimension: Dimension
+    catalog: Catalog, platform: str, key: str, written: str, dimension: Dimension
 ) -> None:
     wrong = without_simulation(
-        with_platform(catalog, platform, **{key: parse_quantity(text, dimension)})
+        with_platform(catalog, platform, **{key: parse_quantity(written, dimension)})
     )
     assert not wrong.ok
 
@@ -215,7 +215,7 @@ def test_reason_lever_arm(catalog: Catalog) -> None:
 
 
 def test_json_has_the_agreed_keys_and_is_plain(result: Reproduction) -> None:
-    data = json.loads(json.dumps(as_json(result), allow_nan=False))
+    data = json.loads(json.dumps(result.to_json(), allow_nan=False))
     assert data["schema"] == SCHEMA == "syncline-design/reproduction/v1"
     assert data["ok"] is True
     keys = {"table", "row", "column", "printed", "computed", "unit", "status", "note"}
@@ -233,7 +233,7 @@ def test_json_has_the_agreed_keys_and_is_plain(result: Reproduction) -> None:
 
 
 def test_text_shows_every_cell_and_counts_at_the_end(result: Reproduction) -> None:
-    lines = as_text(result).splitlines()
+    lines = text(result).splitlines()
     assert lines[-1] == "Every printed figure is accounted for."
     assert lines[-4].startswith("46 of 46 printed tau_crit cells accounted for")
     assert lines[-3].startswith("4 of 4 ")
@@ -341,10 +341,10 @@ def test_one_display_unit_is_exact() -> None:
 
     key = ("tau_crit_georeferencing", "ublox_f9p_rtk", "car")
 
-    def status(text: str, microseconds: str) -> str:
+    def status(printed: str, microseconds: str) -> str:
         value = parse_quantity(f"{microseconds} us", Dimension.TIME)
         assert value.exact == Fraction(microseconds) / 10**6
-        return _cell(key, text, value).status
+        return _cell(key, printed, value).status
 
     assert status("577 us", "577.999999999999999") == "agrees"
     assert status("577 us", "578") == "differs"
