@@ -148,7 +148,8 @@ def _add_entry(
     first = collection.origins.get((section, identity))
     if first is not None:
         message = f"this id is taken: {identity} is also at {first}"
-        problem = problem_at(document, (section, identity), message, hint="rename one of them")
+        shown, hint = show_path((section, identity)), "rename one of them"
+        problem = Problem(document.file, line, column, shown, message, hint=hint)
         collection.problems.append(problem)
         return
     collection.origins[section, identity] = place

@@ -155,7 +155,7 @@ def read_bytes(path: Path) -> bytes:
     """Bytes of a regular file of acceptable size; size and kind are looked at before reading."""
     # O_NONBLOCK: opening a FIFO would wait for its writer for ever.
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
-    with os.fdopen(descriptor, "rb") as stream:
+    try:
         status = os.fstat(descriptor)
         if stat.S_ISDIR(status.st_mode):
             raise StopReadingError("a folder; expected a file")
@@ -163,7 +163,10 @@ def read_bytes(path: Path) -> bytes:
             raise StopReadingError("not a regular file (a pipe, socket or device)")
         if status.st_size > MAX_BYTES:
             raise StopReadingError(f"{status.st_size} bytes; expected at most {MAX_BYTES}")
-        content = stream.read(MAX_BYTES + 1)
+        with os.fdopen(descriptor, "rb", closefd=False) as stream:
+            content = stream.read(MAX_BYTES + 1)
+    finally:
+        os.close(descriptor)
     if len(content) > MAX_BYTES:
         raise StopReadingError(f"more than {MAX_BYTES} bytes")
     return content
@@ -295,7 +298,7 @@ class _Builder:
     def _node(self, event: Any, events: Iterator[Any], path: KeyPath, depth: int) -> Any:
         place = _place(event.start_mark)
         self.positions[path] = place
-        if depth > MAX_DEPTH:
+        if isinstance(event, yaml.CollectionStartEvent) and depth >= MAX_DEPTH:
             self.refuse(path[:4], place, f"nested deeper than {MAX_DEPTH} levels")
             raise StopReadingError
         if isinstance(event, yaml.AliasEvent):
