@@ -8,6 +8,7 @@ objective, and no Monte Carlo requirement.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 import re
@@ -29,6 +30,7 @@ FACTOR = {
 Slot = tuple[int, str]  # stage, role
 
 
+@functools.cache
 def number(text: Any) -> float:
     """SI value of "NUMBER UNIT"."""
     match = re.fullmatch(r"([-+]?[0-9.]+) (\S+)", str(text))
@@ -36,6 +38,7 @@ def number(text: Any) -> float:
     return float(match[1]) * FACTOR[match[2]]
 
 
+@functools.cache
 def read_catalog() -> dict[str, Any]:
     merged: dict[str, Any] = {}
     for name in ("platforms", "sensors", "timestamping"):
