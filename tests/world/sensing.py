@@ -52,7 +52,7 @@ def read_position(carrier: Carrier, faults: Faults, stamps_s: Array) -> Array:
     arm = np.array(carrier.sensors.antenna_arm_m) + faults.antenna_moved_m
     if faults.lag_s > 0.0:
         order = np.argsort(when)
-        step = min(0.01, faults.lag_s / 10.0)
+        step = min(max(faults.lag_s / 10.0, 0.002), 0.01)
         place = np.empty((when.size, 3))
         place[order] = lagged_track(carrier.path, arm, when[order], faults.lag_s, step)
     else:

@@ -1,0 +1,204 @@
+"""Scoring of one diagnosis against the truth, and the table over many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from tests.world import STOCHASTIC, Hidden
+from tests.world.bound import fitted_keys, information
+from tests.world.worldlog import WorldLog
+
+Row = dict[str, Any]
+NOISE_EFFECTS = STOCHASTIC | {"correlated_noise"}
+
+
+def names_of(finding: Row) -> set[tuple[str, str]]:
+    """(effect, sensor) pairs that a finding stands for: itself and its class."""
+    names = {(finding["effect"], finding["sensor"])}
+    for alias in finding.get("aliases", []):
+        if isinstance(alias, dict):
+            names.add((alias["effect"], alias.get("sensor", finding["sensor"])))
+        else:
+            effect, _, rest = str(alias).partition("(")
+            sensor = rest.split(",")[0].strip(" )") or finding["sensor"]
+            names.add((effect.strip(), sensor))
+    return names
+
+
+def same(effect: Hidden, finding: Row) -> bool:
+    stage = finding.get("stage")
+    right_stage = stage is None or effect.stage is None or stage == effect.stage
+    return right_stage and (effect.effect, effect.sensor) in names_of(finding)
+
+
+def exact(effect: Hidden, finding: Row) -> bool:
+    return same(effect, finding) and (effect.effect, effect.sensor) == (
+        finding["effect"],
+        finding["sensor"],
+    )
+
+
+def ideal_power(log: WorldLog, effect: Hidden, effects_tried: int = 35) -> float | None:
+    """Chance that the best possible test finds the effect at 5 % false alarms per log.
+
+    Likelihood ratio of p parameters with the noise known: noncentral chi-squared with
+    noncentrality theta' F theta, against the 5 % level shared among `effects_tried` effects.
+    """
+    keys = fitted_keys((effect,))
+    if not keys or effect.effect in STOCHASTIC:
+        return None
+    fisher = information(log.run, (effect,), log.noise, keys)
+    theta = np.array([effect.number(name) for _, name in keys])
+    level = stats.chi2.isf(0.05 / effects_tried, len(keys))
+    return float(stats.ncx2.sf(level, len(keys), theta @ fisher @ theta))
+
+
+def parameters(log: WorldLog, effect: Hidden, finding: Row, bounds: dict[Any, float]) -> list[Row]:
+    rows = []
+    for index, name in fitted_keys((effect,)):
+        found = finding["parameters"].get(name)
+        if found is None:
+            continue
+        error = float(found["value"]) - effect.number(name)
+        stated = found.get("standard_uncertainty")
+        rows.append(
+            {
+                "name": name,
+                "true": effect.number(name),
+                "found": found["value"],
+                "z": error / stated if stated else None,
+                "over_bound": error / bounds[index, name] if (index, name) in bounds else None,
+            }
+        )
+    return rows
+
+
+def score(log: WorldLog, document: Row) -> Row:
+    """What was named, what was not, and how well the parameters came out."""
+    findings, truth = document["findings"], log.truth
+    named = [any(same(effect, finding) for finding in findings) for effect in truth]
+    wrong = [f for f in findings if not any(same(effect, f) for effect in truth)]
+    bounds = [log.cramer_rao()] if len(truth) == 1 and truth[0].effect not in STOCHASTIC else []
+    fitted = [
+        row
+        for effect in truth
+        if effect.effect not in STOCHASTIC
+        for finding in findings
+        if exact(effect, finding)
+        for row in parameters(log, effect, finding, bounds[0] if bounds else {})
+    ]
+    gap = document.get("gap") or {}
+    return {
+        "verdict": document["verdict"],
+        "truth": [(e.effect, e.sensor, dict(e.parameters)) for e in truth],
+        "found": [
+            (f["effect"], f["sensor"], sorted(map("/".join, names_of(f) - {_own(f)})))
+            for f in findings
+        ],
+        "named": bool(named) and all(named),
+        "wrong": [(f["effect"], f["sensor"]) for f in wrong],
+        "parameters": fitted,
+        "closed_fraction": gap.get("closed_fraction"),
+        "ideal_power": ideal_power(log, truth[0]) if len(truth) == 1 else None,
+    }
+
+
+def _own(finding: Row) -> tuple[str, str]:
+    return finding["effect"], finding["sensor"]
+
+
+def proportion(hits: Iterable[bool]) -> str:
+    """Share in per cent with its 95 % Clopper-Pearson interval."""
+    values = list(hits)
+    if not values:
+        return "-"
+    k, n = sum(values), len(values)
+    low = 0.0 if k == 0 else float(stats.beta.ppf(0.025, k, n - k + 1))
+    high = 1.0 if k == n else float(stats.beta.ppf(0.975, k + 1, n - k))
+    return f"{100 * k / n:.0f} % [{100 * low:.0f}, {100 * high:.0f}]"
+
+
+def spread(values: list[float]) -> str:
+    """Standard deviation about zero, and a robust one beside it when they differ by half."""
+    if len(values) < 5:
+        return "-"
+    plain = float(np.sqrt(np.mean(np.square(values))))
+    robust = float(1.4826 * np.median(np.abs(values)))
+    text = f"{plain:.2f}"
+    return text if plain < 1.5 * robust else f"{text} (robust {robust:.2f})"
+
+
+def _clean(rows: list[Row]) -> str:
+    return proportion(bool(_physical(row)) for row in rows)
+
+
+def _physical(row: Row) -> list[Any]:
+    """Wrong names, noise effects apart: those say something else about a log."""
+    return [wrong for wrong in row["wrong"] if wrong[0] not in NOISE_EFFECTS]
+
+
+def right(group: str) -> tuple[str, Callable[[Row], bool]]:
+    """What a right answer is in a group, in words and as a test."""
+    if group.startswith("clean, noise of another"):
+        return "no physical effect named", lambda row: not _physical(row)
+    if group.startswith("clean"):
+        return "nothing named, agrees", lambda row: not row["found"] and row["verdict"] == "agrees"
+    if group.startswith("true effect not"):
+        return "unexplained", lambda row: row["verdict"] == "unexplained"
+    return "named, or its class", lambda row: bool(row["named"])
+
+
+def table(rows: list[Row]) -> str:
+    """The study's table in Markdown, a line per group."""
+    lines = [
+        "| logs | n | right answer | share right [95 %] | false names | parameter z | "
+        "error / bound | closed fraction, median (5 %) |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for group in dict.fromkeys(row["group"] for row in rows):
+        part = [row for row in rows if row["group"] == group and "error" not in row]
+        if not part:
+            continue
+        words, good = right(group)
+        z = [p["z"] for row in part for p in row["parameters"] if p["z"] is not None]
+        over = [p["over_bound"] for row in part for p in row["parameters"] if p["over_bound"]]
+        closed = [r["closed_fraction"] for r in part if r["closed_fraction"] is not None]
+        shown = f"{np.median(closed):.2f} ({np.quantile(closed, 0.05):.2f})" if closed else "-"
+        if group.startswith("clean"):
+            shown = "-"
+        wrong = proportion(bool(row["wrong"]) for row in part)
+        share = proportion(good(row) for row in part)
+        lines.append(
+            f"| {group} | {len(part)} | {words} | {share} | {wrong} | {spread(z)} | "
+            f"{spread(over)} | {shown} |"
+        )
+    return "\n".join(lines)
+
+
+def by_effect(rows: list[Row], group: str) -> str:
+    """One line per effect of a group: how often named, and how often anyone could."""
+    part = [row for row in rows if row["group"] == group and "error" not in row]
+    lines = ["| hidden effect | named | best possible | what else was named |", "|---|---|---|---|"]
+    for label in sorted({row["label"] for row in part}):
+        own = [row for row in part if row["label"] == label]
+        power = [row["ideal_power"] for row in own if row["ideal_power"] is not None]
+        best = f"{100 * np.mean(power):.0f} %" if power else "-"
+        others = sorted({" ".join(wrong) for row in own for wrong in row["wrong"]})
+        named = f"{sum(row['named'] for row in own)} of {len(own)}"
+        lines.append(f"| {label} | {named} | {best} | {', '.join(others) or 'nothing'} |")
+    return "\n".join(lines)
+
+
+def misses(rows: list[Row]) -> str:
+    """Every case that went wrong, one line each."""
+    lines = []
+    for row in rows:
+        if "error" in row:
+            lines.append(f"{row['id']}: {row['error']}")
+        elif not right(row["group"])[1](row) or row["wrong"]:
+            lines.append(f"{row['id']}: {row['verdict']}, found {row['found']}")
+    return "\n".join(lines)
