@@ -135,32 +135,59 @@ def _distribution_draw(distribution: Distribution, source: Source) -> Array:
 
 
 def stage_draw(
-    system: System, index: int, shifts: Shifts, source: Source, inside: bool, noisy: bool = True
+    system: System,
+    index: int,
+    shifts: Shifts,
+    source: Source,
+    inside: bool,
+    noisy: bool = True,
+    from_rate: bool = False,
 ) -> Draw:
-    """n draws of a stage under the envelope `limits` or `inside` (model.md, simulator)."""
+    """n draws of a stage under the envelope `limits` or `inside` (model.md, simulator).
+
+    from_rate: the other directions are drawn relative to the rate's, which changes no
+    distribution but puts what matters, the angle between rate and line of sight, into one number.
+    """
     stage = system.stages[index]
     d = 0.0 if stage.ranging is None else float(stage.platform.distance_m)
-    free_arm = position_lever_arm(stage, index == 0) is None
-    uniform = source.uniform(7 + 2 * free_arm + 2 * inside)
-    found = directions(uniform[: 3 + free_arm], uniform[3 + free_arm : 6 + 2 * free_arm])
-    cos_yaw, sin_yaw = angle(uniform[6 + 2 * free_arm])
+    free = 4 if position_lever_arm(stage, index == 0) is None else 3
+    uniform = source.uniform(2 * free + 1 + 2 * inside)
+    found = directions(uniform[:free], uniform[free : 2 * free])
+    if from_rate:
+        _express_from(found)
+    cos_yaw, sin_yaw = angle(uniform[2 * free])
     speed: float | Array = float(stage.platform.v_max_mps)
     rate: float | Array = float(stage.platform.omega_max_radps)
     if inside:
         speed, rate = speed * uniform[-2], rate * uniform[-1]
-    antenna, ranging = lever_arms(stage, index == 0, found[-1])
+    antenna, ranging = lever_arms(stage, index == 0, found[-2])
     return Draw(
         cos_yaw=cos_yaw,
         sin_yaw=sin_yaw,
-        velocity_mps=found[0] * speed,
-        rate_radps=found[1] * rate,
+        velocity_mps=found[1] * speed,
+        rate_radps=found[-1] * rate,
         range_m=np.full(source.count, d),
-        bearing=found[2],
+        bearing=found[0],
         antenna_m=antenna,
         ranging_m=ranging,
         **noise_draw(stage, source, noisy),
         **stage_shifts(system, index, shifts, source.count),
     )
+
+
+def _express_from(found: Array) -> None:
+    """Turn all unit vectors (k, 3, n) but the last so that their z axis becomes the last one.
+
+    The two other axes: T. Duff et al., J. Comput. Graph. Tech. 6 (2017) 1-8.
+    """
+    x, y, z = found[-1]
+    sign = np.where(z < 0.0, -1.0, 1.0)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x])
+    second = np.stack([b, sign + y * y * a, -y])
+    for vector in found[:-1]:
+        vector[:] = vector[0] * first + vector[1] * second + vector[2] * found[-1]
 
 
 def position_lever_arm(stage: Stage, first: bool) -> tuple[float, float, float] | None:

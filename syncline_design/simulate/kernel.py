@@ -168,7 +168,7 @@ def _believed_object(draw: Draw) -> Array:
     vector *= draw.range_m + draw.range_noise_m
     vector += draw.ranging_m - draw.antenna_m
     for axis, (sin_angle, cos_angle) in enumerate(_measured_attitude(draw, sine, cosine)):
-        _turn(vector, axis, sin_angle, cos_angle)
+        turn_columns(vector, axis, sin_angle, cos_angle)
     return vector
 
 
@@ -228,7 +228,7 @@ def _measured_attitude(draw: Draw, sine: Array, cosine: Array) -> tuple[tuple[Ar
     )
 
 
-def _turn(vector: Array, axis: int, sine: Array, cosine: Array) -> None:
+def turn_columns(vector: Array, axis: int, sine: Array, cosine: Array) -> None:
     """Rotate (3, n) columns about a coordinate axis, in place."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
     first = vector[i] * cosine

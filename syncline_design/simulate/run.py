@@ -34,7 +34,8 @@ from syncline_design.simulate.worst_case import WorstCase, worst_cases
 DEFAULT_SETTINGS = SimulationSettings()
 DEFAULT_CAP = 4_000_000
 LOOK_GROWTH = 4  # each further look of `decide` has this many times the samples
-CROSS_CHECK_GAP = 1e-4  # the worst case of a cross-check may be this much, relatively, too low
+CROSS_CHECK_GAP = 1e-3  # where a cross-check stops looking: so near, relatively, to the bound
+CROSS_CHECK_ITERATIONS = 30
 
 
 def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> MonteCarlo:
@@ -44,7 +45,11 @@ def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS)
     """
     demand_simulable(system)
     (worst,) = worst_cases(
-        system, np.array([budget(system).tau_s]), settings.seed, enough_gap=CROSS_CHECK_GAP
+        system,
+        np.array([budget(system).tau_s]),
+        settings.seed,
+        iterations=CROSS_CHECK_ITERATIONS,
+        enough_gap=CROSS_CHECK_GAP,
     )
     if settings.estimator == "conditioned":
         from syncline_design.simulate.conditioned import conditioned_monte_carlo

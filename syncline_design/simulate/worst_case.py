@@ -23,7 +23,8 @@ from syncline_design.simulate.draws import generator, lever_arms, position_lever
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
 _STEP = 1e-6  # of the forward differences, in units of each block
 _MOVES = (1.0, 0.5, 0.2, 0.05, 0.01, 0.002)  # fractions of the way to the ascent direction
-_SETTLED = 1e-13  # relative gain of an iteration below which a start has arrived
+_STRIDES = (1.0, 3.0, 10.0, 30.0)  # multiples of the last step to go on by: climbs along ridges
+_SETTLED = 0.01  # an ascent has arrived when an iteration gains less than this part of the gap
 Kind = Literal["ball", "sphere"]
 
 
@@ -105,7 +106,7 @@ def worst_cases(
     seed: int = 0,
     starts: int = 16,
     iterations: int = 200,
-    enough_gap: float = 1e-6,
+    enough_gap: float = 1e-4,
 ) -> tuple[WorstCase, ...]:
     """The worst case at each tau (n,) [s], all ascents of all taus at once.
 
@@ -116,7 +117,8 @@ def worst_cases(
     figures = [references(system, float(tau)) for tau in taus]
     search = _Search(system, np.repeat(taus, starts), starts)
     enough = np.array([bound * (1.0 - enough_gap) for bound, _, _ in figures])
-    value = search.ascend(search.starting_points(seed), enough, iterations)
+    settled = _SETTLED * enough_gap
+    value = search.ascend(search.starting_points(seed), enough, settled, iterations)
     best = value.reshape(-1, starts).max(axis=1)
     return tuple(
         WorstCase(float(tau), float(found), *reference)
@@ -187,25 +189,33 @@ class _Search:
             point[block.rows] /= np.where(length > 0.0, length, 1.0)
         return point
 
-    def ascend(self, point: Array, enough_m: Array, iterations: int) -> Array:
-        """Largest |e| [m] of each ascent, (n,); `point` ends where it was found."""
+    def ascend(self, point: Array, enough_m: Array, settled: float, iterations: int) -> Array:
+        """Largest |e| [m] of each ascent, (n,); `point` ends where it was found.
+
+        enough_m (taus,): a tau is done when reached; settled: relative gain of an iteration below
+        which an ascent ends.
+        """
         value = self.error_m(point, self.tau_s)
         moving = np.ones(value.shape, dtype=bool)
+        before = point.copy()
         for _ in range(iterations):
             reached = value.reshape(-1, self.starts).max(axis=1) >= enough_m
             active = np.flatnonzero(moving & ~np.repeat(reached, self.starts))
             if active.size == 0:
                 break
-            better, gained = self._step(point[:, active], value[active], self.tau_s[active])
-            moving[active] = gained - value[active] > _SETTLED * gained
-            point[:, active] = better
+            here = point[:, active]
+            stride = here - before[:, active]
+            better, gained = self._step(here, stride, value[active], self.tau_s[active])
+            moving[active] = gained - value[active] > settled * gained
+            before[:, active], point[:, active] = here, better
             value[active] = gained
         return value
 
-    def _step(self, point: Array, value: Array, tau_s: Array) -> tuple[Array, Array]:
-        """The best of several moves along the ascent direction, and its |e|."""
+    def _step(self, point: Array, stride: Array, value: Array, tau_s: Array) -> tuple[Array, Array]:
+        """The best of several moves along the ascent direction or the last step, and its |e|."""
         target = self._target(point, value, tau_s)
-        moves = np.stack([*self._moves(point, target), point])
+        onward = [self._admissible(point + much * stride) for much in _STRIDES]
+        moves = np.stack([*self._moves(point, target), *onward, point])
         count, size, columns = moves.shape
         flat = np.moveaxis(moves, 0, 1).reshape(size, count * columns)
         found = self.error_m(flat, np.tile(tau_s, count)).reshape(count, columns)
@@ -215,18 +225,21 @@ class _Search:
 
     def _moves(self, point: Array, target: Array) -> list[Array]:
         """All blocks some of the way to their targets, and each block alone all of the way."""
-        moves = []
-        for fraction in _MOVES:
-            move = point + fraction * (target - point)
-            for block in self.blocks:
-                if block.kind == "sphere":
-                    move[block.rows] /= np.sqrt(np.sum(move[block.rows] ** 2, axis=0))
-            moves.append(move)
+        moves = [self._admissible(point + part * (target - point)) for part in _MOVES]
         for block in self.blocks:
             move = point.copy()
             move[block.rows] = target[block.rows]
             moves.append(move)
         return moves
+
+    def _admissible(self, point: Array) -> Array:
+        """The point with spheres brought to length 1 and balls to at most 1, in place."""
+        for block in self.blocks:
+            length = np.sqrt(np.sum(point[block.rows] ** 2, axis=0))
+            if block.kind == "ball":
+                length = np.maximum(length, 1.0)
+            point[block.rows] /= np.where(length > 0.0, length, 1.0)
+        return point
 
     def _target(self, point: Array, value: Array, tau_s: Array) -> Array:
         """Each block's gradient at length 1 (where it vanishes: the block as it is).

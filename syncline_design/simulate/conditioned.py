@@ -1,0 +1,314 @@
+"""A faster estimator: what is Gaussian given the kinematics is integrated, not sampled.
+
+Given directions, timestamp errors and yaw, the error is a mean m, exact and nonlinear, plus sensor
+noise, which is Gaussian with a covariance C, linear in the noise.  Then
+P(|m + L g| <= q), C = L L', is an average over directions u of g: |m + s L u| <= q is an interval
+of s, whose chi-square probability with three degrees of freedom is known.  Directions and
+kinematics are points of randomly shifted lattices; the spread of the copies gives the interval.
+
+What it leaves out is the second order of the angular noise, at most half of its square times the
+range; `noise_curvature_m` says how much that is.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.effects.base import Array
+from syncline_design.model.system import Stage, System
+from syncline_design.simulate import kernel
+from syncline_design.simulate.draws import Shifts, Source, generator, stage_draw, timing_draws
+from syncline_design.simulate.quadrature import (
+    LatticeSource,
+    chi3_cdf,
+    generating_vector,
+    student_quantile,
+)
+from syncline_design.simulate.results import (
+    Histogram,
+    MonteCarlo,
+    ProportionEstimate,
+    QuantileEstimate,
+)
+from syncline_design.simulate.settings import SimulationError, SimulationSettings
+from syncline_design.simulate.worst_case import WorstCase
+
+CONDITIONED_STREAM = 3  # first word of the stream key, see draws.generator
+COPIES = 16
+LARGEST_LATTICE = 512
+Covariance = tuple[Array, Array, Array, Array, Array, Array]  # nn, ne, nd, ee, ed, dd (n,)
+
+
+@dataclass(frozen=True, slots=True)
+class Rays:
+    """Lines |m + s w|^2 = a s^2 + 2 b s + c through the error's distribution, s both ways.
+
+    a, b, c (copies, points); s is chi-distributed with three degrees of freedom, its sign free.
+    """
+
+    a: Array
+    b: Array
+    c: Array
+
+    def probability(self, q_m: Array) -> tuple[Array, Array]:
+        """(P(|error| <= q), its derivative by q) of each copy, q (copies,)."""
+        q = q_m[:, None]
+        root = self.b * self.b - self.a * (self.c - q * q)
+        hits = root > 0.0
+        root = np.sqrt(np.maximum(root, 0.0))
+        inside, slope = np.zeros_like(root), np.zeros_like(root)
+        for sign in (1.0, -1.0):
+            far, near = (root - sign * self.b) / self.a, (-root - sign * self.b) / self.a
+            for end, weight in ((far, 0.5), (near, -0.5)):
+                length = np.maximum(end, 0.0)
+                factor = np.exp(-0.5 * length * length)
+                inside += weight * chi3_cdf(length, factor)
+                slope += np.abs(weight) * length * length * factor
+        inside *= hits
+        slope *= hits * math.sqrt(2.0 / math.pi) * q / np.where(hits, root, 1.0)
+        shares: tuple[Array, Array] = inside.mean(axis=1), slope.mean(axis=1)
+        return shares
+
+    def quantile(self, quantile: float) -> Array:
+        """The quantile [m] of each copy, (copies,): Newton's method inside a bracket."""
+        spread = np.sqrt(self.c.mean(axis=1) + 3.0 * self.a.mean(axis=1))
+        low, high = np.zeros_like(spread), 40.0 * spread + 1e-300
+        q = spread
+        for _ in range(60):
+            inside, slope = self.probability(q)
+            above = inside >= quantile
+            low, high = np.where(above, low, q), np.where(above, q, high)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                step = q - (inside - quantile) / slope
+            usable = (step > low) & (step < high)
+            last, q = q, np.where(usable, step, 0.5 * (low + high))
+            if np.all(np.abs(q - last) <= 1e-7 * q):
+                break
+        return q
+
+
+def rays(system: System, settings: SimulationSettings, points: int, group: int) -> Rays:
+    """The rays of one group of COPIES copies of the lattice."""
+    source = LatticeSource(
+        generator(settings.seed, CONDITIONED_STREAM, group),
+        points,
+        COPIES,
+        generating_vector(_dimensions(system), points),
+    )
+    ray = _ray_directions(source)
+    mean, covariance = conditional_moments(system, settings, source)
+    along = _factor_times(covariance, ray)
+    shape = (COPIES, points)
+    return Rays(
+        a=np.maximum(_dot(along, along), 1e-300).reshape(shape),
+        b=_dot(mean, along).reshape(shape),
+        c=_dot(mean, mean).reshape(shape),
+    )
+
+
+def conditioned_monte_carlo(
+    system: System, settings: SimulationSettings, worst: WorstCase
+) -> MonteCarlo:
+    """Quantiles and P(|error| <= limit) with Student intervals over the lattice's copies.
+
+    `settings.samples` points, rounded up to whole groups of copies.
+    """
+    demand_conditionable(system, settings)
+    points, groups = lattice_size(settings.samples)
+    drawn = [rays(system, settings, points, group) for group in range(groups)]
+    quantiles = []
+    for quantile in settings.quantiles:
+        copies = np.concatenate([group.quantile(quantile) for group in drawn])
+        quantiles.append(QuantileEstimate(quantile, *_interval(copies, settings.confidence)))
+    within = None
+    if settings.limit_m is not None:
+        target = np.full(COPIES, settings.limit_m)
+        copies = np.concatenate([group.probability(target)[0] for group in drawn])
+        shares = (min(max(x, 0.0), 1.0) for x in _interval(copies, settings.confidence))
+        within = ProportionEstimate(settings.limit_m, *shares)
+    return MonteCarlo(
+        samples=points * COPIES * groups,
+        seed=settings.seed,
+        envelope=settings.envelope,
+        estimator="conditioned",
+        effective_samples=_effective_samples(drawn, settings.quantiles),
+        confidence=settings.confidence,
+        quantiles=tuple(quantiles),
+        within_target=within,
+        worst_case=worst,
+        histogram=_histogram(drawn[0]),
+    )
+
+
+def lattice_size(samples: int) -> tuple[int, int]:
+    """(points of a copy, groups of COPIES copies): a power of two of 16 to 512 points."""
+    wanted = max(samples // COPIES, 1)
+    points = min(max(1 << (wanted.bit_length() - 1), 16), LARGEST_LATTICE)
+    return points, -(-samples // (points * COPIES))
+
+
+def _interval(copies: Array, confidence: float) -> tuple[float, float, float]:
+    """(mean, low, high) of independent copies of an estimate, by Student's t."""
+    middle = float(copies.mean())
+    deviation = float(copies.std(ddof=1)) / math.sqrt(copies.shape[0])
+    reach = student_quantile(0.5 + 0.5 * confidence, copies.shape[0] - 1) * deviation
+    return middle, middle - reach, middle + reach
+
+
+def _effective_samples(drawn: list[Rays], quantiles: tuple[float, ...]) -> int:
+    """Plain samples with the same standard error of a quantile: p (1 - p) / (f se)^2.
+
+    f: density at the quantile; the asymptotic variance of a sample quantile (H. A. David,
+    H. N. Nagaraja, Order Statistics, 3rd ed., 10.2).  For 0.95, or else the last one asked for.
+    """
+    p = 0.95 if 0.95 in quantiles or not quantiles else quantiles[-1]
+    found = [group.quantile(p) for group in drawn]
+    copies = np.concatenate(found)
+    middle = np.full(COPIES, copies.mean())
+    density = float(np.mean([group.probability(middle)[1].mean() for group in drawn]))
+    error = float(copies.std(ddof=1)) / math.sqrt(copies.shape[0])
+    spread = (density * error) ** 2
+    return round(p * (1.0 - p) / spread) if spread > 0.0 else copies.shape[0]
+
+
+def _histogram(group: Rays, bins: int = 60) -> Histogram:
+    """Density over equal bins up to the quantile 0.9999."""
+    top = float(group.quantile(0.9999).mean())
+    edges = np.linspace(0.0, top if top > 0.0 else 1.0, bins + 1)
+    share = [float(group.probability(np.full(COPIES, edge))[0].mean()) for edge in edges]
+    density = np.diff(share) / np.diff(edges)
+    return Histogram(tuple(float(e) for e in edges), tuple(float(d) for d in density))
+
+
+def demand_conditionable(system: System, settings: SimulationSettings) -> None:
+    """Raise SimulationError where the conditioned estimator does not hold."""
+    if system.effects or settings.envelope == "trajectory":
+        raise SimulationError(
+            "estimator: 'conditioned' takes neither effects nor a trajectory; use 'plain'"
+        )
+
+
+def noise_curvature_m(system: System) -> float:
+    """Second order of the angular noise [m]: sum of d (sigma_Theta^2 + sigma_u^2) / 2."""
+    total = 0.0
+    for stage in system.stages:
+        if stage.attitude is not None and stage.ranging is not None:
+            square = math.hypot(*stage.attitude.sigma, *stage.ranging.sigma[1:]) ** 2
+            total += 0.5 * stage.platform.distance_m * square
+    return total
+
+
+def _dimensions(system: System) -> int:
+    """Dimensions of the cube: rays 2, per stage up to 11, per sensor or clock up to 2."""
+    sensors = sum(len(stage.sensors()) for stage in system.stages)
+    return 2 + 11 * len(system.stages) + 2 * (sensors + len(system.clock_offsets))
+
+
+def _ray_directions(source: Source) -> Array:
+    """Isotropic directions (3, n)."""
+    height, turn = source.uniform(2)
+    z = 2.0 * height - 1.0
+    radius = np.sqrt(1.0 - z * z)
+    return np.stack([radius * np.cos(2 * np.pi * turn), radius * np.sin(2 * np.pi * turn), z])
+
+
+def conditional_moments(
+    system: System, settings: SimulationSettings, source: Source
+) -> tuple[Array, Covariance]:
+    """(mean (3, n) [m], covariance [m^2]) of the chain's error given the kinematics, NED."""
+    shifts: Shifts = timing_draws(system, source)
+    mean: Array | None = None
+    total: Covariance | None = None
+    for index, stage in enumerate(system.stages):
+        draw = stage_draw(system, index, shifts, source, settings.envelope == "inside", False, True)
+        mean = kernel.stage_error(draw, mean)
+        own = _stage_covariance(stage, draw)
+        total = own if total is None else tuple(p + q for p, q in zip(total, own, strict=True))  # type: ignore[assignment]
+    assert mean is not None
+    assert total is not None
+    return mean, total
+
+
+def _stage_covariance(stage: Stage, draw: kernel.Draw) -> Covariance:
+    """Covariance of a stage's noise: every noise times the direction it moves the estimate in."""
+    count = draw.bearing.shape[1]
+    parts = [np.zeros(count) for _ in range(6)]
+    if stage.position is not None:
+        for part, sigma in zip((0, 3, 5), stage.position.sigma, strict=True):
+            parts[part] += float(sigma) ** 2
+    if stage.ranging is not None and stage.attitude is not None:
+        for column in _noise_columns(stage, draw):
+            x, y, z = column
+            for part, product in enumerate((x * x, x * y, x * z, y * y, y * z, z * z)):
+                parts[part] += product
+    return tuple(parts)  # type: ignore[return-value]
+
+
+def _noise_columns(stage: Stage, draw: kernel.Draw) -> list[Array]:
+    """Error [m] per standard deviation of each of the six noises, NED, (3, n) each.
+
+    Euler angles turn about z (yaw), the heading's y axis (pitch) and the body's x axis (roll);
+    the bearing moves along dn/d az and dn/d el, the range along n.
+    """
+    assert stage.attitude is not None
+    assert stage.ranging is not None
+    turn = draw.rate_radps * (draw.mu_attitude_s - draw.mu_ranging_s)
+    angles = kernel.attitude_angles(turn)
+    range_m = draw.range_m
+    n = draw.bearing
+    flat = np.sqrt(n[0] ** 2 + n[1] ** 2)
+    safe = np.where(flat > 0.0, flat, 1.0)
+    along_az = np.stack([-n[1], n[0], np.zeros_like(flat)]) * range_m
+    along_el = np.stack([n[2] * n[0] / safe, n[2] * n[1] / safe, -flat]) * range_m
+    sigma_r, sigma_az, sigma_el = (float(s) for s in stage.ranging.sigma)
+    body = [n * sigma_r, along_az * sigma_az, along_el * sigma_el]
+    vector = draw.ranging_m - draw.antenna_m + range_m * n
+    axes = _euler_axes(angles)
+    vector = _rotated(vector, angles)
+    sigma_roll, sigma_pitch, sigma_yaw = (float(s) for s in stage.attitude.sigma)
+    columns = [_rotated(column, angles) for column in body]
+    columns += [
+        kernel.cross(axis, vector) * sigma
+        for axis, sigma in zip(axes, (sigma_roll, sigma_pitch, sigma_yaw), strict=True)
+    ]
+    for column in columns:
+        kernel.turn_columns(column, 2, draw.sin_yaw, draw.cos_yaw)
+    return columns
+
+
+def _rotated(vector: Array, angles: tuple[tuple[Array, Array], ...]) -> Array:
+    """R v in level axes, v (3, n) body."""
+    out = vector.copy()
+    for axis, (sine, cosine) in enumerate(angles):
+        kernel.turn_columns(out, axis, sine, cosine)
+    return out
+
+
+def _euler_axes(angles: tuple[tuple[Array, Array], ...]) -> tuple[Array, Array, Array]:
+    """The axes about which roll, pitch and yaw turn, level axes, (3, n) each."""
+    _, (sin_pitch, cos_pitch), (sin_yaw, cos_yaw) = angles
+    zero, one = np.zeros_like(sin_yaw), np.ones_like(sin_yaw)
+    roll = np.stack([cos_pitch * cos_yaw, cos_pitch * sin_yaw, -sin_pitch])
+    return roll, np.stack([-sin_yaw, cos_yaw, zero]), np.stack([zero, zero, one])
+
+
+def _factor_times(covariance: Covariance, vector: Array) -> Array:
+    """L v with L L' the covariance (Cholesky; zero columns where it is singular)."""
+    xx, xy, xz, yy, yz, zz = covariance
+    l11 = np.sqrt(xx)
+    safe = np.where(l11 > 0.0, l11, 1.0)
+    l21, l31 = xy / safe, xz / safe
+    l22 = np.sqrt(np.maximum(yy - l21 * l21, 0.0))
+    safe = np.where(l22 > 0.0, l22, 1.0)
+    l32 = np.where(l22 > 0.0, (yz - l31 * l21) / safe, 0.0)
+    l33 = np.sqrt(np.maximum(zz - l31 * l31 - l32 * l32, 0.0))
+    x, y, z = vector
+    return np.stack([l11 * x, l21 * x + l22 * y, l31 * x + l32 * y + l33 * z])
+
+
+def _dot(first: Array, second: Array) -> Array:
+    total: Array = np.sum(first * second, axis=0)
+    return total
