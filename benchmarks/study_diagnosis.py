@@ -27,28 +27,41 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import syncline_design
 from benchmarks import study_cases
 from benchmarks.study_cases import Case
+from benchmarks.study_ideal import ideal_naming
 from benchmarks.study_scoring import by_effect, misses, score, table
-from tests.world import make_log
+from tests.world import WorldLog, make_log
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "out" / "study_diagnosis.jsonl"
 Row = dict[str, Any]
 
 
-def code_digest() -> str:
-    """Digest of what the answers depend on: the diagnosis, the effects and the world."""
-    digest = hashlib.sha256()
-    for folder in ("syncline_design/diagnose", "syncline_design/effects", "tests/world"):
+def digest(*folders: str) -> str:
+    """Digest of the code that the answers depend on."""
+    whole = hashlib.sha256()
+    for folder in folders:
         for file in sorted((ROOT / folder).glob("*.py")):
-            digest.update(file.read_bytes())
-    return digest.hexdigest()[:12]
+            whole.update(file.read_bytes())
+    return whole.hexdigest()[:12]
 
 
-def solve(case: Case) -> Row:
+def digests() -> dict[str, str]:
+    """Of the world alone, and of everything: the world, the diagnosis and the effects."""
+    packages = ("syncline_design/diagnose", "syncline_design/effects")
+    return {"world": digest("tests/world"), "code": digest("tests/world", *packages)}
+
+
+def ideal_of(case: Case, log: WorldLog, known: float | None) -> float | None:
+    """How often the best possible reader names a single effect; costly, so computed once."""
+    if known is not None or len(log.truth) != 1 or case.times_bound is None or case.exclude:
+        return known
+    return ideal_naming(log, log.truth[0])
+
+
+def solve(case: Case, ideal: float | None = None) -> Row:
     """Make the log, diagnose it, score it; a failure of the diagnosis is a result too."""
     from syncline_design.diagnose import DiagnosisSettings, diagnose
 
-    start = time.perf_counter()
     base = {"id": case.id, "group": case.group, "label": case.label, "seed": case.seed}
     run = case.run()
     log = make_log(run, case.sized_effects(run), case.noise)
@@ -64,38 +77,44 @@ def solve(case: Case) -> Row:
             return {**base, "error": f"{type(error).__name__}: {error}"}
     seconds = time.perf_counter() - made
     result = score(log, document)
-    return {**base, **result, "seconds": seconds, "world_seconds": made - start}
+    extra = {"ideal": ideal_of(case, log, ideal), "seconds": seconds}
+    return {**base, **result, **extra}
 
 
-def kept_rows(digest: str) -> dict[str, Row]:
-    """Rows of earlier runs of the same code; a torn last line is left out."""
+def kept_rows(code: dict[str, str]) -> tuple[dict[str, Row], dict[str, float]]:
+    """Rows of earlier runs of the same code, and yardsticks of earlier runs of the same world.
+
+    A torn last line is left out.
+    """
     rows: dict[str, Row] = {}
-    if not KEPT.exists():
-        return rows
-    for line in KEPT.read_text(encoding="utf-8").splitlines():
+    ideals: dict[str, float] = {}
+    for line in KEPT.read_text(encoding="utf-8").splitlines() if KEPT.exists() else []:
         try:
             row = json.loads(line)
         except json.JSONDecodeError:
             continue
-        if row["code"] == digest:
+        if row["code"] == code["code"]:
             rows[row["id"]] = row
-    return rows
+        if row["world"] == code["world"] and row.get("ideal") is not None:
+            ideals[row["id"]] = row["ideal"]
+    return rows, ideals
 
 
-def run_all(cases: list[Case], digest: str, processes: int, minutes: float | None) -> list[Row]:
+def run_all(cases: list[Case], processes: int, minutes: float | None) -> list[Row]:
     """Solve every case not yet kept, until the minutes are used up."""
-    rows = kept_rows(digest)
+    code = digests()
+    rows, ideals = kept_rows(code)
     open_cases = iter([case for case in cases if case.id not in rows])
     deadline = None if minutes is None else time.monotonic() + 60.0 * minutes
     KEPT.parent.mkdir(exist_ok=True)
     with KEPT.open("a", encoding="utf-8") as file, ProcessPoolExecutor(processes) as pool:
         running: set[Future[Row]] = set()
         for case in _until(open_cases, deadline):
-            running.add(pool.submit(solve, case))
+            running.add(pool.submit(solve, case, ideals.get(case.id)))
             if len(running) >= processes:
-                running = _collect(running, rows, file, digest)
+                running = _collect(running, rows, file, code)
         while running:
-            running = _collect(running, rows, file, digest)
+            running = _collect(running, rows, file, code)
     return [rows[case.id] for case in cases if case.id in rows]
 
 
@@ -107,11 +126,11 @@ def _until(cases: Iterable[Case], deadline: float | None) -> Iterable[Case]:
 
 
 def _collect(
-    running: set[Future[Row]], rows: dict[str, Row], file: Any, digest: str
+    running: set[Future[Row]], rows: dict[str, Row], file: Any, code: dict[str, str]
 ) -> set[Future[Row]]:
     done, left = wait(running, return_when=FIRST_COMPLETED)
     for future in done:
-        row = {**future.result(), "code": digest}
+        row = {**future.result(), **code}
         rows[row["id"]] = row
         file.write(json.dumps(row) + "\n")
         file.flush()
@@ -158,7 +177,7 @@ def main() -> None:
     given = parser.parse_args()
     cases = study_cases.quick() if given.quick else study_cases.full(given.seeds)
     cases = [case for case in cases if given.only in case.id]
-    rows = run_all(cases, code_digest(), given.processes, given.minutes)
+    rows = run_all(cases, given.processes, given.minutes)
     numbers = sorted({case.seed for case in cases})
     text = report(rows, len(cases), f"seeds {numbers[0]} to {numbers[-1]}")
     print(text)

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import stats
 
 from tests.world import STOCHASTIC, Hidden
-from tests.world.bound import fitted_keys, information
+from tests.world.bound import fitted_keys
 from tests.world.worldlog import WorldLog
 
 Row = dict[str, Any]
@@ -40,21 +40,6 @@ def exact(effect: Hidden, finding: Row) -> bool:
         finding["effect"],
         finding["sensor"],
     )
-
-
-def ideal_power(log: WorldLog, effect: Hidden, effects_tried: int = 35) -> float | None:
-    """Chance that the best possible test finds the effect at 5 % false alarms per log.
-
-    Likelihood ratio of p parameters with the noise known: noncentral chi-squared with
-    noncentrality theta' F theta, against the 5 % level shared among `effects_tried` effects.
-    """
-    keys = fitted_keys((effect,))
-    if not keys or effect.effect in STOCHASTIC:
-        return None
-    fisher = information(log.run, (effect,), log.noise, keys)
-    theta = np.array([effect.number(name) for _, name in keys])
-    level = stats.chi2.isf(0.05 / effects_tried, len(keys))
-    return float(stats.ncx2.sf(level, len(keys), theta @ fisher @ theta))
 
 
 def parameters(log: WorldLog, effect: Hidden, finding: Row, bounds: dict[Any, float]) -> list[Row]:
@@ -103,7 +88,6 @@ def score(log: WorldLog, document: Row) -> Row:
         "wrong": [(f["effect"], f["sensor"]) for f in wrong],
         "parameters": fitted,
         "closed_fraction": gap.get("closed_fraction"),
-        "ideal_power": ideal_power(log, truth[0]) if len(truth) == 1 else None,
     }
 
 
@@ -155,9 +139,9 @@ def right(group: str) -> tuple[str, Callable[[Row], bool]]:
 def table(rows: list[Row]) -> str:
     """The study's table in Markdown, a line per group."""
     lines = [
-        "| logs | n | right answer | share right [95 %] | false names | parameter z | "
-        "error / bound | closed fraction, median (5 %) |",
-        "|---|---|---|---|---|---|---|---|",
+        "| logs | n | right answer | share right [95 %] | best possible | false names | "
+        "parameter z | error / bound | closed fraction, median (5 %) |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     for group in dict.fromkeys(row["group"] for row in rows):
         part = [row for row in rows if row["group"] == group and "error" not in row]
@@ -172,8 +156,10 @@ def table(rows: list[Row]) -> str:
             shown = "-"
         wrong = proportion(bool(row["wrong"]) for row in part)
         share = proportion(good(row) for row in part)
+        ideal = [row["ideal"] for row in part if row["ideal"] is not None]
+        best = f"{100 * np.mean(ideal):.0f} %" if ideal else "-"
         lines.append(
-            f"| {group} | {len(part)} | {words} | {share} | {wrong} | {spread(z)} | "
+            f"| {group} | {len(part)} | {words} | {share} | {best} | {wrong} | {spread(z)} | "
             f"{spread(over)} | {shown} |"
         )
     return "\n".join(lines)
@@ -185,8 +171,8 @@ def by_effect(rows: list[Row], group: str) -> str:
     lines = ["| hidden effect | named | best possible | what else was named |", "|---|---|---|---|"]
     for label in sorted({row["label"] for row in part}):
         own = [row for row in part if row["label"] == label]
-        power = [row["ideal_power"] for row in own if row["ideal_power"] is not None]
-        best = f"{100 * np.mean(power):.0f} %" if power else "-"
+        ideal = [row["ideal"] for row in own if row["ideal"] is not None]
+        best = f"{100 * np.mean(ideal):.0f} %" if ideal else "-"
         others = sorted({" ".join(wrong) for row in own for wrong in row["wrong"]})
         named = f"{sum(row['named'] for row in own)} of {len(own)}"
         lines.append(f"| {label} | {named} | {best} | {', '.join(others) or 'nothing'} |")
