@@ -1,0 +1,109 @@
+"""What a reader of a verdict has to know besides it: lever arms, clocks, assumptions, effects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+from syncline_design.loading import LoadedSpec
+from syncline_design.model.budget import differs
+from syncline_design.units import Dimension, format_quantity
+from syncline_design.verdict import Verified
+
+Json = dict[str, Any]
+
+
+def cautions(
+    loaded: LoadedSpec, verified: Verified, assumed: Sequence[Mapping[str, Any]]
+) -> list[Json]:
+    """The `warnings` of a verdict: a code to filter by, a sentence to read."""
+    return [
+        {"code": code, "message": message}
+        for code, message in (
+            *_lever_arm(verified),
+            *_clocks(loaded, verified),
+            *_waivers(verified),
+            *_simulation(verified),
+            *_assumptions(assumed),
+        )
+    ]
+
+
+Caution = tuple[str, str]
+
+
+def _time(value: float) -> str:
+    return format_quantity(value, Dimension.TIME)
+
+
+def _length(value: float) -> str:
+    return format_quantity(value, Dimension.LENGTH)
+
+
+def _lever_arm(verified: Verified) -> Iterator[Caution]:
+    """Where leaving the lever arm out, as the paper does, is optimistic by more than 10 %."""
+    figures = verified.figures
+    for row in figures.sensors:
+        if differs(row.tau_crit_s, row.tau_crit_lever_arm_s):
+            ratio = row.tau_crit_s / row.tau_crit_lever_arm_s
+            broken = " and is exceeded" if not row.tau_s < row.tau_crit_lever_arm_s else ""
+            yield (
+                "lever-arm",
+                f"{row.stage}.{row.role}: with the lever arm, tau_crit is "
+                f"{_time(row.tau_crit_lever_arm_s)} instead of {_time(row.tau_crit_s)} "
+                f"(the paper's figure is optimistic by a factor of {ratio:.3g}){broken}",
+            )
+    lever = figures.lever_arm
+    if differs(figures.total_m, lever.total_m):
+        yield (
+            "lever-arm",
+            f"with lever arms the total error is {_length(lever.total_m)} instead of "
+            f"{_length(figures.total_m)}",
+        )
+
+
+def _clocks(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
+    """Vehicles whose clocks are taken as common because the spec says nothing."""
+    vehicles = {stage.vehicle for stage in verified.system.stages}
+    timed = {stage.vehicle_name for stage in loaded.spec.stages if stage.clock is not None}
+    silent = sorted(vehicles - timed)
+    if len(vehicles) > 1 and silent:
+        yield (
+            "common-clock",
+            f"the clocks of {', '.join(sorted(vehicles))} are taken as common because "
+            f"{', '.join(silent)} gives no `clock`; across vehicles without a common clock "
+            "holdover drift is the honest figure",
+        )
+        return
+    for stage in verified.system.stages:
+        lines = sorted({"utc" if s.timeline == "utc" else "host" for s in stage.sensors()})
+        if len(lines) > 1 and stage.vehicle in silent:
+            yield (
+                "common-clock",
+                f"{stage.name} has sensors on the host clock and on UTC, and no `clock` says how "
+                "far these are apart: the offset is taken as 0",
+            )
+
+
+def _waivers(verified: Verified) -> Iterator[Caution]:
+    for row in verified.requirements:
+        if row.waiver is not None:
+            state = "expired on" if row.waiver["expired"] else "in force until"
+            yield (
+                "waiver",
+                f"{row.id}: waiver {state} {row.waiver['expires']}: {row.waiver['reason']}",
+            )
+
+
+def _simulation(verified: Verified) -> Iterator[Caution]:
+    if verified.monte_carlo is None:
+        yield "no-monte-carlo", f"no Monte Carlo cross-check: {verified.trouble}"
+
+
+def _assumptions(assumed: Sequence[Mapping[str, Any]]) -> Iterator[Caution]:
+    """Figures without a public source, one line an entry."""
+    by_entry: dict[str, list[str]] = {}
+    for one in assumed:
+        by_entry.setdefault(str(one["entry"]), []).append(str(one["figure"]))
+    for entry, figures in by_entry.items():
+        yield "assumption", f"{entry}: {', '.join(figures)} assumed, no public source"

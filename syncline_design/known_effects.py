@@ -1,0 +1,130 @@
+"""The systematic effects that a spec lists: checked, described, and what they add to the budget."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+
+from syncline_design.loading import BadInput, LoadedSpec
+from syncline_design.model.system import EffectEntry, Platform, RoleName, Stage, System
+from syncline_design.resolution import platform_of
+from syncline_design.spec import EffectChoice
+from syncline_design.units import Dimension, format_quantity, suffix_unit
+from syncline_design.yaml_reader import KeyPath, Problem, show_path
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """What effects add: tau [s] by (stage, role), and systematic terms (name, stage, value [m])."""
+
+    extra_tau_s: Mapping[tuple[str, RoleName], float] = field(default_factory=dict)
+    systematic: tuple[tuple[str, str, float], ...] = ()
+
+
+def known_of(loaded: LoadedSpec, system: System | None = None) -> Known:
+    """Contributions of the spec's effects; without a system, before any sensor is chosen.
+
+    An effect whose size depends on the sensor (an understated noise) adds nothing before the
+    choice and its full part afterwards, when the design is verified.
+    """
+    effects = effect_entries(loaded)
+    if not effects:
+        return Known()
+    from syncline_design.simulate.known_effects import contributions
+
+    return Known(*contributions(system or System(_bare_stages(loaded), effects=effects)))
+
+
+def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:
+    """The spec's effects for the simulator; BadInput where one does not exist or fit."""
+    if not loaded.spec.effects:
+        return ()
+    problems = [
+        problem
+        for index, effect in enumerate(loaded.spec.effects)
+        for problem in _problems(loaded, ("effects", index), effect)
+    ]
+    if problems:
+        raise BadInput(tuple(problems))
+    last = loaded.spec.stages[-1].name
+    only = loaded.spec.stages[0].name
+    return tuple(
+        EffectEntry(
+            effect.effect,
+            effect.sensor,
+            effect.stage or (last if effect.sensor == "target" else only),
+            tuple((name, _plain(value)) for name, value in effect.parameters.items()),
+        )
+        for effect in loaded.spec.effects
+    )
+
+
+def _plain(value: float | str) -> float | str:
+    return value if isinstance(value, str) else float(value)
+
+
+def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator[Problem]:
+    from syncline_design.effects import registry
+
+    record = registry().get(effect.effect)
+    if record is None:
+        yield _problem(loaded, (*at, "effect"), "unknown effect", effect.effect, list(registry()))
+        return
+    if effect.sensor not in record.sensors:
+        message = f"{effect.effect} does not act on this sensor"
+        yield _problem(loaded, (*at, "sensor"), message, effect.sensor, list(record.sensors))
+    names = [parameter.name for parameter in record.parameters]
+    for name in effect.parameters:
+        if name not in names:
+            yield _problem(loaded, (*at, "parameters", name), "unknown parameter", name, names)
+    for parameter in record.parameters:
+        place = (*at, "parameters")
+        if parameter.name not in effect.parameters:
+            yield _problem(loaded, place, f"missing parameter {parameter.name}", "", names)
+        elif isinstance(effect.parameters[parameter.name], str) != bool(parameter.choices):
+            wanted = list(parameter.choices) or ["a number"]
+            found = str(effect.parameters[parameter.name])
+            yield _problem(loaded, (*place, parameter.name), "wrong kind of value", found, wanted)
+
+
+def _problem(
+    loaded: LoadedSpec, path: KeyPath, message: str, found: str, known: list[str]
+) -> Problem:
+    line, column = next(
+        loaded.positions[path[:n]] for n in range(len(path), -1, -1) if path[:n] in loaded.positions
+    )
+    close = get_close_matches(found, known, 1)
+    hint = f"did you mean {close[0]}?" if close else ""
+    expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]
+    return Problem(str(loaded.path), line, column, show_path(path), message, expected, found, hint)
+
+
+def _bare_stages(loaded: LoadedSpec) -> tuple[Stage, ...]:
+    """The stages as they move, with no sensor chosen yet."""
+    stages = []
+    for choice in loaded.spec.stages:
+        entry = platform_of(choice.platform, loaded.catalog)
+        platform = Platform(
+            float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline)
+        )
+        stages.append(Stage(choice.name, choice.vehicle_name, platform, None, None, None))
+    return tuple(stages)
+
+
+def describe(entry: EffectEntry) -> str:
+    """An effect in one sentence, its parameters with units."""
+    from syncline_design.effects import registry
+
+    shown = {name: parameter_text(name, value) for name, value in entry.parameters}
+    return registry()[entry.effect].sentence.format(sensor=entry.sensor, **shown)
+
+
+def parameter_text(name: str, value: float | str) -> str:
+    """A parameter in the unit its name says: `latency_s`, 0.0871 -> `87.1 ms`."""
+    if isinstance(value, str):
+        return value
+    dimension = suffix_unit(name)[1]
+    if dimension is Dimension.DIMENSIONLESS:
+        return f"{value:.4g}"
+    return format_quantity(value, dimension)

@@ -1,0 +1,81 @@
+"""The catalogs as text: what there is, and one entry with its sources."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+from syncline_design.catalog import Catalog, Entry
+from syncline_design.design_data import figure_text
+from syncline_design.report.console import table
+from syncline_design.report.text import visible
+
+SECTIONS = ("platforms", "sensors", "timestamping", "infrastructure", "clocks")
+_TEXT_FIELDS = ("name", "source", "basis", "note")
+
+
+def list_text(catalog: Catalog, section: str | None) -> str:
+    """One line an entry: id, name, key figures."""
+    blocks = []
+    for name in SECTIONS if section is None else (section,):
+        entries: Mapping[str, Entry] = getattr(catalog, name)
+        rows = [[identity, visible(e.name), _digest(e)] for identity, e in entries.items()]
+        if rows:
+            blocks.append("\n".join([name, *table(rows)]))
+    return "\n\n".join(blocks) + "\n"
+
+
+def _digest(entry: Entry) -> str:
+    figures = [
+        f"{key} {shown(value)}" for key, value in _figures(entry) if key not in ("mass", "power")
+    ]
+    return ", ".join(figures)
+
+
+def _figures(entry: Entry) -> list[tuple[str, Any]]:
+    return [
+        (key, value)
+        for key, value in entry
+        if key not in _TEXT_FIELDS and value is not None and value != () and value != {}
+    ]
+
+
+def shown(value: Any) -> str:
+    """A figure as the catalog writes it, harmless on a terminal."""
+    return visible(figure_text(value))
+
+
+def show_text(catalog: Catalog, identity: str) -> str | None:
+    """Every figure of an entry, marked where it is an assumption; None: no such entry."""
+    for section in SECTIONS:
+        entry: Entry | None = getattr(catalog, section).get(identity)
+        if entry is not None:
+            return _entry_text(section, identity, entry)
+    return None
+
+
+def _entry_text(section: str, identity: str, entry: Entry) -> str:
+    rows = [
+        [key, shown(value), "assumption" if is_assumed(entry, key) else ""]
+        for key, value in _figures(entry)
+    ]
+    lines = [f"{identity} ({section}): {visible(entry.name)}", *table(rows)]
+    for label in ("source", "note"):
+        if text := getattr(entry, label):
+            lines.append(f"  {label}: {visible(text)}")
+    return "\n".join(lines) + "\n"
+
+
+def is_assumed(entry: Entry, figure: str) -> bool:
+    """Whether the catalog has no public source for a figure."""
+    if isinstance(entry.basis, Mapping):
+        return figure in entry.basis
+    return entry.basis == "assumption" and figure not in ("modality", "type")
+
+
+def suggestion(catalog: Catalog, identity: str) -> str:
+    """`; did you mean X?`, or where to look."""
+    known = [name for section in SECTIONS for name in getattr(catalog, section)]
+    close = get_close_matches(identity, known, 1)
+    return f"; did you mean {close[0]}?" if close else "; see `syncline-design catalog list`"

@@ -1,0 +1,162 @@
+"""A verdict as data: the JSON of `check`, schema syncline-design/verdict/v1."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from syncline_design.design_space import Design
+from syncline_design.model.budget import Budget, LeverArm
+from syncline_design.model.system import System
+from syncline_design.recheck import Recheck
+from syncline_design.simulate import MonteCarlo
+
+SCHEMA = "syncline-design/verdict/v1"
+Status = Literal["pass", "fail", "indeterminate"]
+Word = Literal["meets", "fails", "infeasible", "indeterminate"]
+EXIT_CODES: Mapping[str, int] = {
+    "meets": 0,
+    "fails": 1,
+    "infeasible": 1,
+    "refused": 2,
+    "indeterminate": 3,
+}
+UNITS = {"accuracy": "m", "monte_carlo": "m", "sync": "1", "mass": "kg", "power": "W"}
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementResult:
+    """One requirement, decided: value against limit; margin = limit - value."""
+
+    id: str
+    kind: str
+    status: Status
+    value: float | None
+    limit: float
+    unit: str
+    line: int | None = None
+    column: int | None = None
+    implied: bool = False
+    quantile: float | None = None
+    low: float | None = None
+    high: float | None = None
+    note: str = ""
+    waiver: Mapping[str, Any] | None = None
+
+    @property
+    def is_waived(self) -> bool:
+        """Whether a waiver in force covers this requirement."""
+        return self.waiver is not None and not self.waiver["expired"]
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry under `requirements`."""
+        margin = None if self.value is None else self.limit - self.value
+        data: dict[str, Any] = {
+            "id": self.id,
+            "kind": self.kind,
+            "status": self.status,
+            "value": finite(self.value),
+            "limit": self.limit,
+            "unit": self.unit,
+            "margin": finite(margin),
+            "line": self.line,
+            "column": self.column,
+            "implied": self.implied,
+            "note": self.note,
+        }
+        optional = {
+            "quantile": self.quantile,
+            "low": self.low,
+            "high": self.high,
+            "waiver": self.waiver,
+        }
+        return data | {key: value for key, value in optional.items() if value is not None}
+
+
+def finite(value: float | None) -> float | None:
+    """JSON has no infinity: what is unlimited or unknown is null."""
+    return value if value is not None and math.isfinite(value) else None
+
+
+def word_of(results: Iterable[RequirementResult]) -> Word:
+    """One failed requirement fails the whole; one undecided one leaves it open; else it meets.
+
+    A failure with a valid waiver does not count.
+    """
+    statuses = {r.status for r in results if not (r.status == "fail" and r.is_waived)}
+    if "fail" in statuses:
+        return "fails"
+    return "indeterminate" if "indeterminate" in statuses else "meets"
+
+
+@dataclass(frozen=True, slots=True)
+class Verified:
+    """One design, verified: budget, exact recheck, Monte Carlo where it ran, requirements."""
+
+    design: Design
+    system: System
+    figures: Budget
+    exact: Recheck
+    monte_carlo: MonteCarlo | None
+    requirements: tuple[RequirementResult, ...]
+    trouble: str = ""  # why the Monte Carlo part is missing
+
+    @property
+    def word(self) -> Word:
+        """meets, fails or indeterminate."""
+        return word_of(self.requirements)
+
+
+def syncline_json(budget: Budget, model: str, total_m: float) -> dict[str, Any]:
+    """The `syncline` key; total_m is the rechecked total of the spec's own model."""
+    per_sensor = model == "per_sensor"
+    ledger = budget.ledger_per_sensor if per_sensor else budget.ledger
+    return {
+        "model": model,
+        "sensor_error_m": budget.sensor_error_m,
+        "sync_rate_mps": budget.sync_rate_mps,
+        "tau_s": budget.tau_s,
+        "tau_crit_s": finite(budget.tau_crit_s),
+        "sync_error_m": budget.sync_error_per_sensor_m if per_sensor else budget.sync_error_m,
+        "systematic_error_m": budget.systematic_m,
+        "total_m": total_m,
+        "models": {
+            "syncline": {"sync_error_m": budget.sync_error_m, "total_m": budget.total_m},
+            "per_sensor": {
+                "sync_error_m": budget.sync_error_per_sensor_m,
+                "total_m": budget.total_per_sensor_m,
+            },
+        },
+        "lever_arm": _lever_arm_json(budget.lever_arm, per_sensor),
+        "stages": [
+            {
+                "name": row.stage,
+                "sensor_error_m": row.sensor_error_m,
+                "sync_rate_mps": row.sync_rate_mps,
+                "tau_s": row.tau_s,
+                "tau_crit_s": finite(row.tau_crit_s),
+            }
+            for row in budget.stages
+        ],
+        "ledger": [
+            {
+                "term": term.term,
+                "stage": term.stage,
+                "value_m": term.value_m,
+                "kind": term.kind,
+                "share": term.share,
+            }
+            for term in ledger
+        ],
+    }
+
+
+def _lever_arm_json(lever_arm: LeverArm, per_sensor: bool) -> dict[str, Any]:
+    return {
+        "tau_crit_s": finite(lever_arm.tau_crit_s),
+        "total_m": lever_arm.total_per_sensor_m if per_sensor else lever_arm.total_m,
+        "sync_rate_mps": lever_arm.sync_rate_mps,
+        "differs": lever_arm.differs,
+    }

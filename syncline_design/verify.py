@@ -1,0 +1,350 @@
+"""Spec to verdict: choose what is open, recheck exactly, cross-check by Monte Carlo."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from syncline_design import __version__
+from syncline_design.cautions import cautions
+from syncline_design.chosen_system import system_of
+from syncline_design.design_data import assumptions, design_json, sources, used_entries
+from syncline_design.design_space import Design
+from syncline_design.design_space import Problem as DesignProblem
+from syncline_design.known_effects import describe, effect_entries, known_of
+from syncline_design.loading import BadInput, LoadedSpec, Problem, load
+from syncline_design.model.budget import budget
+from syncline_design.model.system import System
+from syncline_design.problem import build_problem, selection_of, sole_design
+from syncline_design.recheck import Recheck, recheck
+from syncline_design.resolution import platform_of
+from syncline_design.simulate import (
+    Decision,
+    MonteCarlo,
+    SimulationError,
+    SimulationSettings,
+    cross_check,
+    decide,
+)
+from syncline_design.spec import Requirement
+from syncline_design.verdict import (
+    EXIT_CODES,
+    SCHEMA,
+    UNITS,
+    RequirementResult,
+    Verified,
+    syncline_json,
+)
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class CheckSettings:
+    """How to check: seed of the random numbers, road of the choice and its time limit.
+
+    monte_carlo: whether to simulate (a monte_carlo requirement stays undecided without).
+    today: the day on which waivers are judged; None: the machine's date.
+    """
+
+    seed: int = 0
+    method: str = "auto"
+    time_limit_s: float | None = None
+    monte_carlo: bool = True
+    today: date | None = None
+
+
+def check_file(path: str | Path, settings: CheckSettings | None = None) -> Json:
+    """The verdict of a spec file (schema syncline-design/verdict/v1)."""
+    return check_loaded(load(path), settings or CheckSettings())
+
+
+def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
+    """Verdicts of specs and of the specs in folders; a refused file stands among them as such.
+
+    Refused: {"verdict": "refused", "file", "problems"}, and nothing of that spec is computed.
+    """
+    return [_check_or_refuse(path, settings) for path in spec_files(paths)]
+
+
+def spec_files(paths: Sequence[Path]) -> list[Path]:
+    """Files as given, folders as the YAML files directly in them, by name."""
+    found: list[Path] = []
+    for path in paths:
+        if path.is_dir():
+            inside = sorted(p for p in path.iterdir() if p.suffix in (".yaml", ".yml"))
+            if not inside:
+                raise BadInput((Problem(str(path), 0, 0, "", "no spec (*.yaml) in this folder"),))
+            found += inside
+        else:
+            found.append(path)
+    return found
+
+
+def _check_or_refuse(path: Path, settings: CheckSettings) -> Json:
+    try:
+        return check_file(path, settings)
+    except BadInput as error:
+        return {
+            "schema": SCHEMA,
+            "verdict": "refused",
+            "file": str(path),
+            "problems": [_problem_json(problem) for problem in error.problems],
+            "text": str(error),
+        }
+
+
+def _problem_json(problem: Problem) -> Json:
+    wanted = f"expected {problem.expected}" if problem.expected else ""
+    found = f"found {problem.found}" if problem.found else ""
+    parts = (problem.message, wanted, found, problem.hint)
+    return {
+        "file": problem.file,
+        "line": problem.line,
+        "column": problem.column,
+        "path": problem.path,
+        "message": "; ".join(part for part in parts if part),
+    }
+
+
+def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
+    """The verdict of a loaded spec."""
+    known = known_of(loaded)
+    problem = build_problem(loaded, known.extra_tau_s, known.systematic)
+    sole = sole_design(problem)
+    if sole is not None:
+        problem, design = sole
+        verified = verify(loaded, problem, design, settings)
+        return _verdict_json(loaded, problem, verified, settings, {})
+    return _check_open(loaded, problem, settings)
+
+
+def exit_code(verdict: Json) -> int:
+    """0 meets, 1 does not meet, 2 refused, 3 no verdict."""
+    return EXIT_CODES[verdict["verdict"]]
+
+
+def verify(
+    loaded: LoadedSpec, problem: DesignProblem, design: Design, settings: CheckSettings
+) -> Verified:
+    """Budget, exact recheck, Monte Carlo and every requirement of one design."""
+    system = system_of(loaded, problem, design, effect_entries(loaded))
+    known = known_of(loaded, system)
+    figures = budget(system, known.extra_tau_s, known.systematic)
+    exact = recheck(loaded, selection_of(problem, design), known.extra_tau_s, known.systematic)
+    found, trouble = _monte_carlo(loaded, system, settings)
+    results = tuple(_results(loaded, system, exact, found, settings))
+    return Verified(design, system, figures, exact, found, results, trouble)
+
+
+def simulation_settings(loaded: LoadedSpec, seed: int) -> SimulationSettings:
+    """How a spec wants to be simulated; the target is its tightest accuracy (or other) limit."""
+    choice = loaded.spec.monte_carlo
+    limits = [float(r.limit) for r in loaded.spec.requirements if r.kind == "accuracy"]
+    limits = limits or [float(r.limit) for r in loaded.spec.requirements if r.kind == "monte_carlo"]
+    trajectory: str | Path | None = None
+    if choice.trajectory is not None:
+        file = choice.trajectory.file
+        trajectory = choice.trajectory.manoeuvre if file is None else loaded.path.parent / file
+    return SimulationSettings(
+        samples=choice.samples,
+        seed=seed,
+        envelope=choice.envelope,
+        limit_m=min(limits) if limits else None,
+        trajectory=trajectory,
+    )
+
+
+def _monte_carlo(
+    loaded: LoadedSpec, system: System, settings: CheckSettings
+) -> tuple[MonteCarlo | None, str]:
+    if not settings.monte_carlo:
+        return None, "left out on request"
+    try:
+        return cross_check(system, simulation_settings(loaded, settings.seed)), ""
+    except SimulationError as error:
+        return None, str(error)
+
+
+def _results(
+    loaded: LoadedSpec,
+    system: System,
+    exact: Recheck,
+    found: MonteCarlo | None,
+    settings: CheckSettings,
+) -> Iterator[RequirementResult]:
+    rechecked = {one.id: one for one in exact.requirements}
+    for one in exact.requirements:
+        if one.implied:
+            yield RequirementResult(
+                one.id, one.kind, "pass" if one.passed else "fail", one.value_float,
+                float(one.limit), UNITS["sync"], implied=True,
+            )  # fmt: skip
+    for index, requirement in enumerate(loaded.spec.requirements):
+        if requirement.kind == "monte_carlo":
+            result = _decided(loaded, requirement, system, found, settings)
+        else:
+            one = rechecked[requirement.id]
+            result = RequirementResult(
+                one.id,
+                one.kind,
+                "pass" if one.passed else "fail",
+                one.value_float,
+                float(one.limit),
+                UNITS.get(one.kind, loaded.spec.currency),
+                note="" if one.value is not None else f"a catalog entry gives no {one.kind}",
+            )
+        yield _placed(loaded, index, requirement, result, settings)
+
+
+def _decided(
+    loaded: LoadedSpec,
+    requirement: Requirement,
+    system: System,
+    found: MonteCarlo | None,
+    settings: CheckSettings,
+) -> RequirementResult:
+    """A Monte Carlo requirement: sampled on until its interval leaves the limit."""
+    limit, quantile = float(requirement.limit), float(requirement.quantile or 0.0)
+    blank = RequirementResult(
+        requirement.id, "monte_carlo", "indeterminate", None, limit, UNITS["monte_carlo"],
+        quantile=quantile,
+    )  # fmt: skip
+    if found is None:
+        return replace(blank, note="not simulated")
+    simulation = simulation_settings(loaded, settings.seed)
+    decision = decide(system, simulation, quantile, limit, first=found)
+    estimate = decision.estimate
+    return replace(
+        blank,
+        status=decision.status,
+        value=estimate.value_m,
+        low=estimate.low_m,
+        high=estimate.high_m,
+        note=_samples_note(decision, simulation.samples),
+    )
+
+
+def _samples_note(decision: Decision, asked: int) -> str:
+    if decision.status == "indeterminate":
+        return f"the interval still holds the limit after {decision.samples} samples"
+    return f"took {decision.samples} samples to decide" if decision.samples > asked else ""
+
+
+def _placed(
+    loaded: LoadedSpec,
+    index: int,
+    requirement: Requirement,
+    result: RequirementResult,
+    settings: CheckSettings,
+) -> RequirementResult:
+    """The result with its place in the spec, its note and its waiver."""
+    line, column = loaded.positions.get(("requirements", index), (None, None))
+    note = "; ".join(text for text in (requirement.note, result.note) if text)
+    waiver = None
+    if requirement.waiver is not None:
+        today = settings.today or date.today()
+        waiver = {
+            "reason": requirement.waiver.reason,
+            "expires": requirement.waiver.expires,
+            "expired": not requirement.waiver.holds_on(today),
+        }
+    return replace(result, line=line, column=column, note=note, waiver=waiver)
+
+
+def _verdict_json(
+    loaded: LoadedSpec,
+    problem: DesignProblem,
+    verified: Verified,
+    settings: CheckSettings,
+    choice: Json,
+) -> Json:
+    entries = used_entries(loaded, problem, verified.design)
+    model = loaded.spec.sync_model
+    data = _frame(loaded, problem, verified.word, settings)
+    data["requirements"] = [r.to_json() for r in verified.requirements]
+    data["design"] = design_json(loaded, problem, verified.design, verified.figures)
+    data["syncline"] = syncline_json(verified.figures, model, float(verified.exact.total_m))
+    data["monte_carlo"] = None if verified.monte_carlo is None else verified.monte_carlo.to_json()
+    data["assumptions"] = assumptions(entries)
+    data["sources"] = sources(entries)
+    data["effects"] = _effects_json(verified.system)
+    data["warnings"] = cautions(loaded, verified, data["assumptions"])
+    if choice:
+        data["choice"] = choice
+    return data
+
+
+def _effects_json(system: System) -> list[Json]:
+    return [
+        {
+            "effect": entry.effect,
+            "sensor": entry.sensor,
+            "stage": entry.stage,
+            "parameters": dict(entry.parameters),
+            "sentence": describe(entry),
+        }
+        for entry in system.effects
+    ]
+
+
+def _frame(loaded: LoadedSpec, problem: DesignProblem, word: str, settings: CheckSettings) -> Json:
+    """What every verdict holds, with or without a design."""
+    spec = loaded.spec
+    stages = []
+    for stage in spec.stages:
+        platform = platform_of(stage.platform, loaded.catalog)
+        identity = stage.platform.use or stage.platform.name or stage.name
+        stages.append(
+            {
+                "name": stage.name,
+                "vehicle": stage.vehicle_name,
+                "platform": {
+                    "id": identity,
+                    "name": platform.name or identity,
+                    "v_max_mps": float(platform.v_max),
+                    "omega_max_radps": float(platform.omega_max),
+                    "distance_m": float(platform.distance),
+                    "baseline_m": float(platform.baseline),
+                },
+            }
+        )
+    return {
+        "schema": SCHEMA,
+        "verdict": word,
+        "spec": {
+            "name": spec.name,
+            "file": str(loaded.path),
+            "currency": spec.currency,
+            "sync_model": spec.sync_model,
+            "objective": spec.objective,
+            "coverage_factor": float(spec.coverage_factor),
+            "open_roles": sum(len(table.options) > 1 for table in problem.roles),
+            "combinations": str(problem.combinations),
+            "stages": stages,
+        },
+        "requirements": [],
+        "design": None,
+        "syncline": None,
+        "monte_carlo": None,
+        "warnings": [],
+        "provenance": _provenance(loaded, settings),
+    }
+
+
+def _provenance(loaded: LoadedSpec, settings: CheckSettings) -> Json:
+    import platform
+
+    import numpy as np
+
+    return {
+        "version": __version__,
+        "spec_sha256": loaded.spec_sha256,
+        "catalogs_sha256": loaded.catalogs_sha256,
+        "seed": settings.seed,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
