@@ -26,7 +26,7 @@ from syncline_design.choose.arrays import MARGIN, Tables, tabulate, useful_optio
 from syncline_design.choose.evaluate import error_key, evaluate
 from syncline_design.choose.labels import Labels, concatenate
 from syncline_design.choose.merge import Ceiling, Merge
-from syncline_design.choose.outcome import FrontPoint, TooLarge
+from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choose.pareto import Bools, Column, Columns, Floats, undominated
 from syncline_design.design_space import ClockOption, Design, Problem, ResourceName
 
@@ -49,14 +49,19 @@ def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint
 
 
 def merged_front(
-    problem: Problem, resource: ResourceName, *, accuracy: bool
+    problem: Problem,
+    resource: ResourceName,
+    *,
+    accuracy: bool,
+    deadline: Deadline | None = None,
 ) -> tuple[FrontPoint, ...]:
     """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12)."""
     demand_structure(problem)
     if any(not role.options for role in problem.roles):
         return ()
     tables = tabulate(problem, resource)
-    relaxed = _merge_all(_reduced(tables), accuracy, guarded=False, ceiling=None)
+    end = deadline or Deadline()
+    relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=None)
     holds = _hold_sync(tables, relaxed)
     points = _points(tables, relaxed, holds)
     if bool(holds.all()):
@@ -64,7 +69,7 @@ def merged_front(
     ceiling = None
     if bool(holds.any()):
         ceiling = Ceiling(relaxed.labels.resources[0][holds], relaxed.total[holds])
-    guarded = _merge_all(tables, accuracy, guarded=True, ceiling=ceiling)
+    guarded = _merge_all(tables, accuracy, end, guarded=True, ceiling=ceiling)
     found = _points(tables, guarded, np.ones(len(guarded.total), dtype=bool))
     return _joined([*points, *found])
 
@@ -98,14 +103,15 @@ def demand_structure(problem: Problem) -> None:
 
 
 def _merge_all(
-    tables: Tables, accuracy: bool, *, guarded: bool, ceiling: Ceiling | None
+    tables: Tables, accuracy: bool, deadline: Deadline, *, guarded: bool, ceiling: Ceiling | None
 ) -> _Finished:
     """Complete designs of every combination of clocks that may matter, the front of them."""
     combinations = tuple(clock_combinations(tables.problem))
     parts: list[Labels] = []
     for place, clocks in enumerate(combinations):
+        deadline.check()
         merge = Merge(tables, clocks, accuracy=accuracy, guarded=guarded, ceiling=ceiling)
-        labels = merge.run()
+        labels = merge.run(deadline)
         if labels is not None and len(labels):
             clock = np.full((len(labels), 1), place, dtype=np.intp)
             parts.append(replace(labels, choice=np.column_stack([labels.choice, clock])))

@@ -14,6 +14,7 @@ import numpy as np
 
 from syncline_design.choose.arrays import MARGIN, RoleArrays, Tables
 from syncline_design.choose.labels import Addition, Labels, concatenate, extend, with_pair
+from syncline_design.choose.outcome import Deadline
 from syncline_design.choose.pareto import (
     Bools,
     Column,
@@ -89,12 +90,13 @@ class Merge:
         self.safety = Safety(tables, self.offsets) if guarded else None
         self.capacity = _most_channels(tables)
 
-    def run(self) -> Labels | None:
+    def run(self, deadline: Deadline) -> Labels | None:
         """Complete designs that no other one replaces; None when there is none."""
         labels = self._start()
         for number, stage in enumerate(self.stages):
             parts = []
             for timing in self._classes(stage):
+                deadline.check()
                 done = self._stage(labels, number, timing)
                 if len(done):
                     parts.append(done)

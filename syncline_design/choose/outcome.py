@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
@@ -20,6 +22,23 @@ class TooLarge(NoVerdict):
     """One road gives up; another may still do it."""
 
 
+class Deadline:
+    """A point in time after which a road gives up."""
+
+    def __init__(self, limit_s: float | None = None) -> None:
+        self.limit_s = limit_s
+        self._end = math.inf if limit_s is None else time.monotonic() + limit_s
+
+    def check(self) -> None:
+        """Raise NoVerdict once the time is over."""
+        if time.monotonic() > self._end:
+            raise NoVerdict(f"the time limit of {self.limit_s:g} s was reached without a proof")
+
+    def left_s(self) -> float | None:
+        """Seconds left, None without a limit."""
+        return None if self.limit_s is None else max(0.0, self._end - time.monotonic())
+
+
 @dataclass(frozen=True, slots=True)
 class FrontPoint:
     """One point of the exact front: the least of a resource for this error, and the design."""
@@ -31,12 +50,16 @@ class FrontPoint:
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """How a choice was proven: the road, and that every constraint was recomputed exactly."""
+    """How a choice was proven.
+
+    method: the road.  rechecked: every sum and constraint of the design was recomputed in exact
+    fractions.  agrees_with: further roads that gave the same answer.
+    """
 
     method: str
     optimal: bool
     rechecked: bool
-    agrees_with: tuple[str, ...] = ()  # further roads that gave the same answer
+    agrees_with: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +72,10 @@ class Choice:
 
 @dataclass(frozen=True, slots=True)
 class Infeasible:
-    """No design meets every requirement; proven by `proof.method`."""
+    """No design meets every requirement.
+
+    proof: the road that showed it; empty_roles: roles that have no option at all.
+    """
 
     proof: Proof
     empty_roles: tuple[int, ...] = ()

@@ -1,0 +1,139 @@
+"""The best design, by one road or by roads that must agree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from syncline_design.choose.enumerate import best_by_enumeration
+from syncline_design.choose.evaluate import broken, error_key, evaluate, rank
+from syncline_design.choose.front import merged_front
+from syncline_design.choose.outcome import (
+    METHODS,
+    Choice,
+    Deadline,
+    Infeasible,
+    Method,
+    NoVerdict,
+    Proof,
+    TooLarge,
+)
+from syncline_design.choose.ranked import iter_best
+from syncline_design.design_space import Design, Problem, ResourceName
+
+SMALL = 300  # combinations up to which the automatic road also enumerates
+MOST_STEPS = 4000  # steps of the search that confirms the merge before it is left out
+
+
+def choose(
+    problem: Problem, method: Method = "auto", time_limit_s: float | None = None
+) -> Choice | Infeasible:
+    """The best design in the documented order, or that there is none.
+
+    auto: the front by merging, confirmed by best-first search and, where there are few
+    combinations, by enumeration; the MILP where merging gives up.  Raises NoVerdict when a road
+    ends without a proof or two roads disagree.
+    """
+    if method not in METHODS:
+        raise ValueError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
+    empty = tuple(r for r, role in enumerate(problem.roles) if not role.options)
+    if empty:
+        return Infeasible(Proof("tables", True, True), empty)
+    deadline = Deadline(time_limit_s)
+    deadline.check()
+    if method == "auto":
+        return _auto(problem, deadline)
+    if method == "enumerate":
+        return _outcome(problem, best_by_enumeration(problem), "enumerate")
+    if method == "milp":
+        return _by_milp(problem, deadline)
+    return _outcome(problem, best_by_front(problem, deadline), "front")
+
+
+def best_by_front(problem: Problem, deadline: Deadline) -> Design | None:
+    """The first design by the merge; close calls and ties are settled by best-first search."""
+    resource: ResourceName = "cost" if problem.objective == "error" else problem.objective
+    points = merged_front(problem, resource, accuracy=True, deadline=deadline)
+    if not points:
+        return None
+    picked = points[0]
+    if problem.objective == "error":
+        least = min(error_key(point.error_m) for point in points)
+        picked = next(point for point in points if error_key(point.error_m) == least)
+    holds = not broken(problem, evaluate(problem, picked.design))
+    try:
+        first = next(iter_best(problem, deadline, MOST_STEPS if holds else None), None)
+    except TooLarge:
+        return picked.design
+    if holds:
+        _demand_agreement(problem, picked.design, first, "merging", "best-first search")
+    return first
+
+
+def _auto(problem: Problem, deadline: Deadline) -> Choice | Infeasible:
+    try:
+        design = best_by_front(problem, deadline)
+    except TooLarge:
+        return _by_milp(problem, deadline)
+    agrees: tuple[str, ...] = ()
+    if problem.combinations <= SMALL:
+        other = best_by_enumeration(problem)
+        _demand_agreement(problem, design, other, "front", "enumeration")
+        agrees = ("enumerate",)
+    return _outcome(problem, design, "front", agrees)
+
+
+def _by_milp(problem: Problem, deadline: Deadline) -> Choice | Infeasible:
+    """The MILP's answer; among designs it cannot tell apart, the first in the documented order."""
+    from syncline_design.choose.milp import best_by_milp
+
+    found = best_by_milp(problem, deadline)
+    if found is None:
+        return _outcome(problem, None, "milp")
+    try:
+        first = next(iter_best(problem, deadline, MOST_STEPS), None)
+    except TooLarge:
+        return _outcome(problem, found, "milp")
+    _demand_agreement(problem, found, first, "MILP", "best-first search")
+    return _outcome(problem, first, "milp", ("search",))
+
+
+def _demand_agreement(
+    problem: Problem, one: Design | None, other: Design | None, first: str, second: str
+) -> None:
+    """Both roads must reach the same objective and error, or both none."""
+    if (one is None) != (other is None):
+        raise NoVerdict(f"{first} and {second} disagree on whether any design meets the spec")
+    if one is None or other is None:
+        return
+    ranks = [rank(problem, design, evaluate(problem, design))[:2] for design in (one, other)]
+    if ranks[0] != ranks[1]:
+        raise NoVerdict(f"{first} and {second} disagree on the best design")
+
+
+def _outcome(
+    problem: Problem, design: Design | None, method: str, agrees: tuple[str, ...] = ()
+) -> Choice | Infeasible:
+    proof = Proof(method, optimal=True, rechecked=True, agrees_with=agrees)
+    if design is None:
+        return Infeasible(proof)
+    if broken(problem, evaluate(problem, design)):
+        raise NoVerdict(f"the design found by {method} does not stand up to the exact recheck")
+    return Choice(design, proof)
+
+
+def best(problem: Problem, count: int) -> Iterator[Design]:
+    """The best `count` truly different designs, best first.
+
+    Two designs differ when a role has another sensor or another timestamping method; another
+    primitive or clock alone is the same design, shown in its best form.
+    """
+    seen: set[tuple[tuple[str, str], ...]] = set()
+    for design in iter_best(problem):
+        options = zip(problem.roles, design.options, strict=True)
+        shown = tuple((t.options[i].sensor, t.options[i].method) for t, i in options)
+        if shown in seen:
+            continue
+        seen.add(shown)
+        yield design
+        if len(seen) == count:
+            return
