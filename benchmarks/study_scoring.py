@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
-from tests.world import STOCHASTIC, Hidden
+from tests.world import DISCRETE, STOCHASTIC, Hidden
 from tests.world.bound import fitted_keys
 from tests.world.worldlog import WorldLog
 
 Row = dict[str, Any]
-NOISE_EFFECTS = STOCHASTIC | {"correlated_noise"}
+NO_SLOPE = STOCHASTIC | DISCRETE
 
 
 def names_of(finding: Row) -> set[tuple[str, str]]:
@@ -67,14 +67,14 @@ def score(log: WorldLog, document: Row) -> Row:
     findings, truth = document["findings"], log.truth
     named = [any(same(effect, finding) for finding in findings) for effect in truth]
     wrong = [f for f in findings if not any(same(effect, f) for effect in truth)]
-    bounds = [log.cramer_rao()] if len(truth) == 1 and truth[0].effect not in STOCHASTIC else []
+    bounds = log.cramer_rao() if len(truth) == 1 and truth[0].effect not in NO_SLOPE else {}
     fitted = [
         row
         for effect in truth
-        if effect.effect not in STOCHASTIC
+        if effect.effect not in NO_SLOPE
         for finding in findings
         if exact(effect, finding)
-        for row in parameters(log, effect, finding, bounds[0] if bounds else {})
+        for row in parameters(log, effect, finding, bounds)
     ]
     gap = document.get("gap") or {}
     return {
@@ -122,7 +122,7 @@ def _clean(rows: list[Row]) -> str:
 
 def _physical(row: Row) -> list[Any]:
     """Wrong names, noise effects apart: those say something else about a log."""
-    return [wrong for wrong in row["wrong"] if wrong[0] not in NOISE_EFFECTS]
+    return [wrong for wrong in row["wrong"] if wrong[0] not in STOCHASTIC]
 
 
 def right(group: str) -> tuple[str, Callable[[Row], bool]]:
