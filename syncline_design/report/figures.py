@@ -65,7 +65,7 @@ def syncline(
         if curve.lever_arm_rate_mps and curve.lever_arm_rate_mps > 1.01 * curve.rate_mps:
             wider = curve.floor_m + curve.lever_arm_rate_mps * tau
             axes.plot(1 / tau, 1 / wider, color=LINE, linewidth=1, linestyle=(0, (1, 2)))
-        axes.plot(1 / tau, 1 / error, color=LINE, linewidth=2.4, zorder=3)
+        axes.plot(1 / tau, 1 / error, color=LINE, linewidth=2.4, zorder=3)[0].set_gid("curve")
         _target_and_design(axes, curve, low)
         _syncline_labels(axes)
         return axes

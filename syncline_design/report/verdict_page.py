@@ -17,7 +17,7 @@ from syncline_design.report import (
 )
 from syncline_design.report.svg import InlineFigure
 from syncline_design.report.text import harmless, shortened
-from syncline_design.report.verdict_words import Json, items, part
+from syncline_design.report.verdict_words import Json, items, named, part
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,16 +299,18 @@ def _simulation_figures(verdict: Json, target: float | None) -> dict[str, Inline
     drawn: dict[str, InlineFigure] = {}
     monte_carlo = part(verdict, "monte_carlo")
     histogram = part(monte_carlo, "histogram")
-    edges, density = histogram.get("edges_m") or [], histogram.get("density") or []
-    if len(edges) == len(density) + 1 > 1:
+    edges = [numbers.finite(edge) for edge in histogram.get("edges_m") or ()]
+    density = [numbers.finite(value) or 0.0 for value in histogram.get("density") or ()]
+    known = [edge for edge in edges if edge is not None]
+    if len(known) == len(edges) == len(density) + 1 > 1:
         marks = tuple(
             (numbers.percent(float(key), 4), value)
-            for key, entry in part(monte_carlo, "quantiles").items()
+            for key, entry in named(monte_carlo, "quantiles")
             if (value := numbers.finite(entry.get("value_m"))) is not None
         )
         total = numbers.finite(part(verdict, "syncline").get("total_m"))
         drawn["histogram"] = figures_results.error_histogram(
-            figures_results.Histogram(tuple(edges), tuple(density), marks, target, total)
+            figures_results.Histogram(tuple(known), tuple(density), marks, target, total)
         )
     points = grid_points(items(monte_carlo, "grid"))
     if len(points) > 1:

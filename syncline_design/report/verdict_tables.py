@@ -12,6 +12,7 @@ from syncline_design.report.verdict_words import (
     items,
     kind_text,
     margin_text,
+    named,
     part,
     relative_margin,
     selection_reason,
@@ -24,9 +25,8 @@ from syncline_design.report.verdict_words import (
 def roles(verdict: Json) -> Iterator[tuple[str, str, Json]]:
     """(stage, role, entry) of every chosen sensor."""
     for stage in items(part(verdict, "design"), "stages"):
-        for role, entry in part(stage, "roles").items():
-            if isinstance(entry, Mapping):
-                yield str(stage.get("name")), str(role), entry
+        for role, entry in named(stage, "roles"):
+            yield str(stage.get("name")), role, entry
 
 
 def requirements(verdict: Json) -> Table:
@@ -156,7 +156,7 @@ def models(verdict: Json) -> Table:
     used = str(syncline.get("model") or "syncline")
     names = {"syncline": "Syncline (the paper's)", "per_sensor": "per sensor (tighter)"}
     rows = []
-    for key, entry in part(syncline, "models").items():
+    for key, entry in named(syncline, "models"):
         rows.append((
             names.get(str(key), str(key)) + (" \u2014 decides" if key == used else ""),
             Cell(numbers.length(entry.get("sync_error_m")), entry.get("sync_error_m")),
@@ -181,7 +181,7 @@ def models(verdict: Json) -> Table:
 def quantiles(verdict: Json) -> Table:
     """Quantiles of the simulated error with their confidence intervals."""
     rows = []
-    for key, entry in part(part(verdict, "monte_carlo"), "quantiles").items():
+    for key, entry in named(part(verdict, "monte_carlo"), "quantiles"):
         rows.append((
             Cell(numbers.percent(float(key), 4), float(key)),
             Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
@@ -211,11 +211,10 @@ def design_text(design: object) -> str:
         return str(design or "")
     names = []
     for stage in items(design, "stages"):
-        for entry in part(stage, "roles").values():
-            if isinstance(entry, Mapping):
-                method = entry.get("timestamping")
-                names.append(str(entry.get("name") or entry.get("sensor"))
-                             + (f" ({method})" if method else ""))  # fmt: skip
+        for _, entry in named(stage, "roles"):
+            method = entry.get("timestamping")
+            sensor = str(entry.get("name") or entry.get("sensor"))
+            names.append(f"{sensor} ({method})" if method else sensor)
     return ", ".join(names)
 
 

@@ -64,6 +64,15 @@ def items(source: Json | None, key: str) -> list[Json]:
     return [entry for entry in value or [] if isinstance(entry, Mapping)]
 
 
+def named(source: Json | None, key: str) -> list[tuple[str, Json]]:
+    """The entries of a nested mapping that are mappings themselves, with their names."""
+    return [
+        (str(name), entry)
+        for name, entry in part(source, key).items()
+        if isinstance(entry, Mapping)
+    ]
+
+
 def outcome(verdict: Json) -> Outcome:
     """The verdict's outcome; an unknown word counts as no verdict."""
     return OUTCOMES.get(str(verdict.get("verdict")), OUTCOMES["indeterminate"])
@@ -147,7 +156,7 @@ def design_sentence(verdict: Json) -> str:
     many = len(stages) > 1
     phrases = []
     for stage in stages:
-        roles = [role_phrase(r) for r in part(stage, "roles").values() if isinstance(r, Mapping)]
+        roles = [role_phrase(entry) for _, entry in named(stage, "roles")]
         where = f" on {stage.get('name')}" if many else ""
         phrases.append(sentence_list(roles) + where)
     platforms = sentence_list([str(p) for p in _platform_names(verdict)])

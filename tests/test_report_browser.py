@@ -1,0 +1,292 @@
+"""The written report in a real browser: no network, no console errors, sliders, themes, axe."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import report_samples as samples
+from syncline_design.report.pages import render_verdict
+
+pytestmark = pytest.mark.browser
+
+AXE = Path(__file__).parent / "vendor" / "axe-core" / "axe.min.js"
+FLAGS = (
+    "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
+    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+)  # fmt: skip
+
+
+def chromium_path() -> str | None:
+    """A Chromium of this machine: SYNCLINE_CHROMIUM, or one on the PATH."""
+    named = os.environ.get("SYNCLINE_CHROMIUM")
+    found = (shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome"))
+    return named or next((path for path in found if path), None)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
+    path = chromium_path()
+    if path is None:
+        pytest.skip("no Chromium on this machine")
+    with sync_api.sync_playwright() as playwright:
+        launched = playwright.chromium.launch(executable_path=path, args=list(FLAGS))
+        yield launched
+        launched.close()
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    path.write_text(render_verdict(samples.fixed_wing()), encoding="utf-8")
+    return path
+
+
+class Opened:
+    """A page with everything it said and asked for."""
+
+    def __init__(self, browser: Any, path: Path, **options: Any) -> None:
+        self.context = browser.new_context(**options)
+        self.page = self.context.new_page()
+        self.console: list[str] = []
+        self.requests: list[str] = []
+        self.dialogs: list[str] = []
+        self.page.on("console", lambda message: self.console.append(message.text))
+        self.page.on("pageerror", lambda error: self.console.append(str(error)))
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.failed: dict[str, str] = {}
+        self.page.on("requestfailed", lambda r: self.failed.update({r.url: r.failure or ""}))
+        self.page.on("dialog", lambda dialog: (self.dialogs.append("x"), dialog.dismiss()))
+        self.page.goto(path.as_uri())
+
+    def __enter__(self) -> Opened:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.context.close()
+
+
+def move(page: Any, selector: str, value: float) -> None:
+    """Set a slider as a user's drag does: value, then the input event."""
+    page.eval_on_selector(
+        selector,
+        "(e, v) => { e.value = v; e.dispatchEvent(new Event('input', {bubbles: true})); }",
+        value,
+    )
+
+
+def test_no_console_message_and_no_request_but_the_file(browser: Any, report: Path) -> None:
+    with Opened(browser, report) as opened:
+        opened.page.keyboard.press("Tab")
+        opened.page.click("thead button >> nth=0")
+        assert opened.console == []
+        assert opened.requests == [report.as_uri()]
+        assert opened.dialogs == []
+
+
+def test_slider_moves_the_point_along_the_drawn_curve(browser: Any, report: Path) -> None:
+    """After each move the marker still lies on the curve that matplotlib drew."""
+    distance = """() => {
+        const marker = document.getElementById('fig-syncline-operating-point');
+        const path = document.querySelector('#fig-syncline-curve path');
+        const at = e => { const b = e.getBoundingClientRect();
+                          return [b.x + b.width / 2, b.y + b.height / 2]; };
+        const [x, y] = at(marker), m = path.getScreenCTM();
+        let best = 1e9;
+        for (let i = 0; i <= 4000; i++) {
+            const p = path.getPointAtLength(path.getTotalLength() * i / 4000).matrixTransform(m);
+            best = Math.min(best, Math.hypot(p.x - x, p.y - y));
+        }
+        return [best, x, y];
+    }"""
+    with Opened(browser, report, viewport={"width": 1280, "height": 900}) as opened:
+        start = opened.page.evaluate(distance)
+        assert start[0] < 1.5
+        seen = [start[1]]
+        for exponent in (-5.5, -4.0, -3.2, -2.5):
+            move(opened.page, "#tau-slider", exponent)
+            off, x, _ = opened.page.evaluate(distance)
+            assert off < 1.5, exponent
+            seen.append(x)
+        assert seen[1] > seen[0] > seen[2] > seen[3] > seen[4]  # larger tau lies further left
+
+
+def test_slider_recolours_the_verdict(browser: Any, report: Path) -> None:
+    with Opened(browser, report) as opened:
+        page = opened.page
+        colour = "e => getComputedStyle(e).borderLeftColor"
+        good = page.eval_on_selector("#banner", colour)
+        assert page.is_hidden("#what-if")
+        move(page, "#tau-slider", -2.0)
+        assert "would not meet" in page.inner_text("#explorer-verdict")
+        assert "the error exceeds the target" in page.inner_text("#explorer-verdict")
+        assert page.is_visible("#what-if")
+        assert page.eval_on_selector("#banner", colour) != good
+        assert page.inner_text("#verdict-word") == "Meets every requirement"  # the proven one stays
+        page.click("#explorer-reset")
+        assert "would meet" in page.inner_text("#explorer-verdict")
+        assert page.is_hidden("#what-if")
+        assert page.eval_on_selector("#banner", colour) == good
+
+
+def test_sliders_agree_with_the_model(browser: Any, report: Path) -> None:
+    """Error at tau = 1 ms, and the target at which the verdict turns, from plain sums."""
+    verdict = samples.fixed_wing()["syncline"]
+    error = verdict["sensor_error_m"] + 1e-3 * verdict["sync_rate_mps"]
+    with Opened(browser, report) as opened:
+        page = opened.page
+        move(page, "#tau-slider", -3.0)
+        assert f"{error * 1000:.4g}\u00a0mm" in page.inner_text("#explorer-verdict")
+        assert page.inner_text("#tau-value") == "1\u00a0ms"
+        page.click("#explorer-reset")
+        total = verdict["total_m"]
+        for factor, word in ((1.001, "would meet"), (0.999, "would not meet")):
+            page.evaluate("() => 0")
+            move(page, "#target-slider", page.evaluate("v => Math.log10(v)", total * factor))
+            assert word in page.inner_text("#explorer-verdict")
+
+
+def test_slider_works_by_keyboard(browser: Any, report: Path) -> None:
+    with Opened(browser, report) as opened:
+        opened.page.focus("#tau-slider")
+        opened.page.keyboard.press("End")
+        assert "would not meet" in opened.page.inner_text("#explorer-verdict")
+        spoken = opened.page.get_attribute("#tau-slider", "aria-valuetext")
+        assert spoken == opened.page.inner_text("#tau-value")
+
+
+def test_tables_sort_and_return(browser: Any, report: Path) -> None:
+    with Opened(browser, report) as opened:
+        page = opened.page
+        names = (
+            "() => [...document.querySelectorAll('#ledger tbody tr')]"
+            ".map(r => parseFloat(r.cells[3].dataset.sort))"
+        )
+        before = page.evaluate(names)
+        button = page.locator("#ledger thead button").nth(3)
+        head = page.locator("#ledger thead th").nth(3)
+        for expected, order in (
+            ("ascending", sorted(before)),
+            ("descending", sorted(before)[::-1]),
+        ):
+            button.focus()
+            page.keyboard.press("Enter")
+            assert page.evaluate(names) == order
+            assert head.get_attribute("aria-sort") == expected
+        button.click()
+        assert page.evaluate(names) == before
+        assert head.get_attribute("aria-sort") is None
+
+
+def test_sorting_text(browser: Any, report: Path) -> None:
+    with Opened(browser, report) as opened:
+        page = opened.page
+        page.locator("#requirements thead button").first.click()
+        ids = page.eval_on_selector_all(
+            "#requirements tbody th", "all => all.map(e => e.textContent.trim())"
+        )
+        assert ids == sorted(ids)
+
+
+def luminance(colour: str) -> float:
+    """Relative luminance (WCAG 2.2) of a CSS rgb() colour."""
+    parts = [float(p) / 255 for p in colour[colour.index("(") + 1 : -1].split(",")[:3]]
+    linear = [p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def test_dark_and_light_follow_the_reader(browser: Any, report: Path) -> None:
+    found = {}
+    for scheme in ("light", "dark"):
+        with Opened(browser, report, color_scheme=scheme) as opened:
+            background = opened.page.eval_on_selector(
+                "section", "e => getComputedStyle(e).backgroundColor"
+            )
+            text = opened.page.eval_on_selector(
+                "#syncline figure text", "e => getComputedStyle(e).fill"
+            )
+            found[scheme] = (luminance(background), luminance(text))
+    for back, ink in found.values():
+        high, low = max(back, ink), min(back, ink)
+        assert (high + 0.05) / (low + 0.05) > 4.5
+    assert found["light"][0] > 0.8 > 0.1 > found["dark"][0]
+
+
+def test_print_is_light_and_complete(browser: Any, report: Path) -> None:
+    with Opened(browser, report, color_scheme="dark") as opened:
+        opened.page.emulate_media(media="print")
+        background = opened.page.eval_on_selector(
+            "body", "e => getComputedStyle(e).backgroundColor"
+        )
+        assert luminance(background) > 0.99
+        assert opened.page.is_hidden("nav")
+        assert opened.page.is_hidden("#explorer")
+        assert opened.page.is_visible("#provenance")
+        pdf = opened.page.pdf(format="A4")
+        assert pdf.startswith(b"%PDF")
+        assert 2 <= pdf.count(b"/Type /Page\n") <= 16
+
+
+def test_all_is_there_without_javascript(browser: Any, report: Path) -> None:
+    with Opened(browser, report, java_script_enabled=False) as opened:
+        assert opened.page.is_hidden("#explorer")
+        assert opened.page.locator("section:visible").count() == 11
+        assert opened.page.locator("figure svg:visible").count() == 6
+        assert opened.page.locator("thead button").count() == 0
+
+
+@pytest.mark.parametrize("width", [320, 400, 768, 1280])
+def test_page_fits_the_window(browser: Any, report: Path, width: int) -> None:
+    with Opened(browser, report, viewport={"width": width, "height": 800}) as opened:
+        assert opened.page.evaluate("() => document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("make", [samples.fixed_wing, samples.failing, samples.infeasible,
+                                  samples.two_stages])  # fmt: skip
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 400)])
+def test_axe_finds_nothing(
+    browser: Any, tmp_path: Path, make: Any, scheme: str, width: int
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(render_verdict(make()), encoding="utf-8")
+    size = {"width": width, "height": 900}
+    with Opened(browser, path, color_scheme=scheme, viewport=size) as opened:
+        opened.page.evaluate(AXE.read_text(encoding="utf-8"))
+        result = opened.page.evaluate("() => axe.run(document)")
+        found = [
+            (v["id"], v["impact"], [n["html"][:120] for n in v["nodes"]][:3])
+            for v in result["violations"]
+        ]
+        assert found == []
+        assert len(result["passes"]) > 20
+
+
+@pytest.mark.parametrize("text", ["".join(samples.HOSTILE), *samples.HOSTILE])
+def test_hostile_names_run_nothing(browser: Any, tmp_path: Path, text: str) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(render_verdict(samples.with_hostile_text(text)), encoding="utf-8")
+    with Opened(browser, path, viewport={"width": 400, "height": 800}) as opened:
+        assert opened.page.evaluate("() => document.scripts.length") == 1
+        assert opened.page.evaluate("() => document.images.length") == 0
+        assert opened.page.evaluate("() => document.documentElement.scrollWidth") <= 400
+        assert opened.dialogs == []
+        assert opened.console == []
+        assert opened.requests == [path.as_uri()]
+
+
+def test_injected_script_is_stopped_by_the_policy(browser: Any, tmp_path: Path) -> None:
+    """Second line of defence: had something slipped through the escaping, it would not run."""
+    path = tmp_path / "report.html"
+    page = render_verdict(samples.fixed_wing())
+    hole = "<script>window.owned = 1</script><img src='https://example.invalid/x.png'>"
+    path.write_text(page.replace('<main id="main">', '<main id="main">' + hole), "utf-8")
+    with Opened(browser, path) as opened:
+        assert opened.page.evaluate("() => window.owned") is None
+        assert opened.failed == {"https://example.invalid/x.png": "csp"}
+        assert len(opened.console) == 2  # the browser reports both refusals

@@ -1,0 +1,365 @@
+"""Output formats of verdicts: read back by readers of their own, and fed hostile text."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from typing import Any
+from xml.etree import ElementTree
+
+import jsonschema
+import pytest
+
+import report_samples as samples
+from syncline_design.report.checks import CHECK_FORMATS, render_checks
+from syncline_design.report.findings import findings
+from syncline_design.report.json_out import json_text
+from syncline_design.report.sarif import artifact_uri
+from syncline_design.report.text import markdown_safe, spreadsheet_safe, visible
+
+REFUSED: dict[str, Any] = {
+    "verdict": "refused",
+    "file": "specs/bad.yaml",
+    "problems": [
+        {
+            "file": "specs/bad.yaml",
+            "line": 3,
+            "column": 7,
+            "path": "stages[0].platform",
+            "message": "unknown id uav_fixd_wing; did you mean uav_fixed_wing?",
+        }
+    ],
+}
+TEXT_FORMATS = [name for name in CHECK_FORMATS if name != "html"]
+
+# The objects of SARIF 2.1.0 that this tool writes, typed from the standard (OASIS, sections 3.11
+# to 3.52): nothing beyond the listed properties may appear, as in the standard's own schema.
+_TEXT = {"type": "string"}
+
+
+def _closed(required: list[str], **properties: Any) -> dict[str, Any]:
+    return {
+        "type": "object",
+        "required": required,
+        "properties": properties,
+        "additionalProperties": False,
+    }
+
+
+_MESSAGE = _closed(["text"], text=_TEXT)
+_LOCATION = _closed(
+    ["physicalLocation"],
+    physicalLocation=_closed(
+        ["artifactLocation"],
+        artifactLocation=_closed(["uri"], uri={"type": "string", "format": "uri-reference"}),
+        region=_closed(
+            ["startLine"],
+            startLine={"type": "integer", "minimum": 1},
+            startColumn={"type": "integer", "minimum": 1},
+        ),
+    ),
+)
+_RESULT = _closed(
+    ["message"],
+    ruleId=_TEXT,
+    ruleIndex={"type": "integer", "minimum": 0},
+    kind={"enum": ["notApplicable", "pass", "fail", "review", "open", "informational"]},
+    level={"enum": ["none", "note", "warning", "error"]},
+    message=_MESSAGE,
+    locations={"type": "array", "items": _LOCATION},
+    partialFingerprints={"type": "object", "additionalProperties": _TEXT},
+    suppressions={
+        "type": "array",
+        "uniqueItems": True,
+        "items": _closed(["kind"], kind={"enum": ["inSource", "external"]}, justification=_TEXT),
+    },
+)
+_DRIVER = _closed(
+    ["name"],
+    name=_TEXT,
+    version=_TEXT,
+    rules={
+        "type": "array",
+        "uniqueItems": True,
+        "items": _closed(["id"], id=_TEXT, shortDescription=_MESSAGE),
+    },
+)
+SARIF_SCHEMA = _closed(
+    ["version", "runs"],
+    **{"$schema": {"type": "string", "format": "uri"}},
+    version={"const": "2.1.0"},
+    runs={
+        "type": "array",
+        "items": _closed(
+            ["tool"],
+            tool=_closed(["driver"], driver=_DRIVER),
+            columnKind={"enum": ["utf16CodeUnits", "unicodeCodePoints"]},
+            results={"type": "array", "items": _RESULT},
+        ),
+    },
+)
+
+
+def sarif_of(*verdicts: dict[str, Any]) -> dict[str, Any]:
+    log: dict[str, Any] = json.loads(render_checks("sarif", verdicts))
+    jsonschema.Draft7Validator(SARIF_SCHEMA).validate(log)
+    return log
+
+
+def junit_of(*verdicts: dict[str, Any]) -> ElementTree.Element:
+    """Parse and hold against what CI readers count on: totals that add up, places, messages."""
+    root = ElementTree.fromstring(render_checks("junit", verdicts).encode())
+    assert root.tag == "testsuites"
+    for kind, tag in (("failures", "failure"), ("errors", "error"), ("skipped", "skipped")):
+        for suite in root:
+            assert suite.tag == "testsuite"
+            assert int(suite.attrib[kind]) == len(suite.findall(f"testcase/{tag}"))
+            assert int(suite.attrib["tests"]) == len(suite.findall("testcase"))
+        assert int(root.attrib[kind]) == sum(int(suite.attrib[kind]) for suite in root)
+    for case in root.iter("testcase"):
+        assert case.attrib["name"]
+        assert case.attrib["classname"]
+        assert int(case.attrib["line"]) >= 1
+    return root
+
+
+def test_json_is_the_verdict_itself() -> None:
+    verdict = samples.fixed_wing()
+    assert json.loads(render_checks("json", [verdict])) == verdict
+
+
+def test_json_of_several_keeps_each() -> None:
+    verdicts = [samples.fixed_wing(), samples.failing()]
+    assert json.loads(render_checks("json", verdicts))["verdicts"] == verdicts
+
+
+def test_json_has_no_infinity() -> None:
+    text = json_text({"a": math.inf, "b": [math.nan, 1.5], "c": {"d": -math.inf}})
+    assert json.loads(text) == {"a": None, "b": [None, 1.5], "c": {"d": None}}
+
+
+def test_junit_fails_where_the_verdict_fails() -> None:
+    root = junit_of(samples.fixed_wing(), samples.failing())
+    assert [suite.attrib["failures"] for suite in root] == ["0", "1"]
+    (failed,) = [case for case in root.iter("testcase") if case.find("failure") is not None]
+    assert failed.attrib["name"].startswith("ACC-1")
+    assert failed.attrib["file"] == "specs/uav_corridor.yaml"
+    assert failed.attrib["line"] == "8"
+    failure = failed.find("failure")
+    assert failure is not None
+    assert "93.91" in failure.attrib["message"]
+    assert "specs/uav_corridor.yaml:8:5" in (failure.text or "")
+
+
+def test_junit_of_an_infeasible_spec_fails_the_conflicting_requirements() -> None:
+    root = junit_of(samples.infeasible())
+    failures = {
+        case.attrib["name"]: case.attrib["line"]
+        for case in root.iter("testcase")
+        if case.find("failure") is not None
+    }
+    assert failures == {"ACC-1 accuracy": "8", "COST-1 cost": "10"}
+
+
+def test_junit_of_an_infeasible_spec_without_a_conflict_still_fails() -> None:
+    verdict = samples.infeasible()
+    verdict["infeasibility"]["conflict"] = None
+    root = junit_of(verdict)
+    assert root.attrib["failures"] == "1"
+    assert root.attrib["skipped"] == "2"
+
+
+def test_junit_of_no_verdict_errs() -> None:
+    verdict = samples.infeasible() | {"verdict": "indeterminate", "infeasibility": None}
+    assert junit_of(verdict).attrib["errors"] == "1"
+
+
+def test_undecided_monte_carlo_errs() -> None:
+    verdict = samples.fixed_wing() | {"verdict": "indeterminate"}
+    verdict["requirements"][4]["status"] = "indeterminate"
+    root = junit_of(verdict)
+    names = [c.attrib["name"] for c in root.iter("testcase") if c.find("error") is not None]
+    assert "MC-1 monte_carlo" in names
+
+
+def waived() -> dict[str, Any]:
+    verdict = samples.failing()
+    verdict["verdict"] = "meets"
+    verdict["requirements"][0]["waiver"] = {"reason": "prototype", "expires": "2027-01-31"}
+    return verdict
+
+
+def test_a_waived_requirement_is_skipped_with_its_reason() -> None:
+    root = junit_of(waived())
+    assert (root.attrib["failures"], root.attrib["skipped"]) == ("0", "1")
+    skipped = next(root.iter("skipped"))
+    assert "prototype" in skipped.attrib["message"]
+    assert "2027-01-31" in skipped.attrib["message"]
+    (result,) = [r for r in sarif_of(waived())["runs"][0]["results"] if r["level"] == "error"]
+    assert result["suppressions"][0]["justification"].endswith("prototype")
+    assert "::error" not in render_checks("github", [waived()])
+    assert "(waived)" in render_checks("github", [waived()])
+
+
+def test_an_expired_waiver_does_not_help() -> None:
+    verdict = samples.failing()
+    verdict["requirements"][0]["waiver"] = {
+        "reason": "prototype",
+        "expires": "2020-01-31",
+        "expired": True,
+    }
+    assert junit_of(verdict).attrib["failures"] == "1"
+
+
+def test_sarif_points_at_the_specs_line() -> None:
+    results = sarif_of(samples.failing())["runs"][0]["results"]
+    (error,) = [result for result in results if result["level"] == "error"]
+    place = error["locations"][0]["physicalLocation"]
+    assert place["artifactLocation"]["uri"] == "specs/uav_corridor.yaml"
+    assert place["region"] == {"startLine": 8, "startColumn": 5}
+    rules = sarif_of(samples.failing())["runs"][0]["tool"]["driver"]["rules"]
+    assert rules[error["ruleIndex"]]["id"] == error["ruleId"] == "accuracy"
+
+
+def test_sarif_of_a_passing_spec_has_no_error() -> None:
+    results = sarif_of(samples.fixed_wing())["runs"][0]["results"]
+    assert {result["level"] for result in results} == {"note"}
+
+
+def test_sarif_fingerprint_survives_a_change_of_figures() -> None:
+    first, second = samples.failing(), samples.failing()
+    second["requirements"][0]["value"] = 0.0612
+    prints = [
+        [r["partialFingerprints"] for r in sarif_of(v)["runs"][0]["results"]]
+        for v in (first, second)
+    ]
+    assert prints[0] == prints[1]
+
+
+@pytest.mark.parametrize(
+    ("path", "uri"),
+    [
+        ("specs/a b.yaml", "specs/a%20b.yaml"),
+        ("/home/x/s.yaml", "file:///home/x/s.yaml"),
+        ("sp\u00e9c#1%.yaml", "sp%C3%A9c%231%25.yaml"),
+    ],
+)
+def test_sarif_uri(path: str, uri: str) -> None:
+    assert artifact_uri(path) == uri
+
+
+def test_refused_spec_reaches_every_ci_format() -> None:
+    (result,) = sarif_of(REFUSED)["runs"][0]["results"]
+    assert result["locations"][0]["physicalLocation"]["region"]["startLine"] == 3
+    assert "did you mean uav_fixed_wing" in result["message"]["text"]
+    root = junit_of(REFUSED)
+    assert root.attrib["failures"] == "1"
+    first = render_checks("github", [REFUSED]).splitlines()[0]
+    assert first.startswith("::error file=specs/bad.yaml,line=3,col=7,title=spec::")
+    assert "did you mean" in render_checks("markdown", [REFUSED])
+    assert "uav\\_fixd\\_wing" in render_checks("markdown", [REFUSED])
+
+
+COMMAND = re.compile(r"::(error|warning|notice) file=[^:]*,line=\d+(,col=\d+)?,title=[^:]*::.*")
+
+
+@pytest.mark.parametrize("text", samples.HOSTILE)
+def test_hostile_text_starts_no_github_command_of_its_own(text: str) -> None:
+    lines = render_checks("github", [samples.with_hostile_text(text)]).splitlines()
+    for line in lines:
+        assert COMMAND.fullmatch(line), line
+    assert len(lines) == 5 + 1 + 1  # requirements, one warning, the outcome
+
+
+@pytest.mark.parametrize("text", samples.HOSTILE)
+def test_hostile_text_keeps_junit_well_formed(text: str) -> None:
+    root = junit_of(samples.with_hostile_text(text))
+    failure = next(root.iter("failure"))
+    assert visible(text) in failure.attrib["message"]
+
+
+@pytest.mark.parametrize("text", samples.HOSTILE)
+def test_hostile_text_keeps_sarif_valid(text: str) -> None:
+    results = sarif_of(samples.with_hostile_text(text))["runs"][0]["results"]
+    assert any(visible(text) in result["message"]["text"] for result in results)
+
+
+@pytest.mark.parametrize("text", samples.HOSTILE)
+def test_hostile_text_is_no_formula_in_csv(text: str) -> None:
+    out = render_checks("csv", [samples.with_hostile_text(text)])
+    rows = list(csv.reader(io.StringIO(out, newline="")))
+    assert len(rows) == 1 + 5
+    assert len({len(row) for row in rows}) == 1
+    cells = [cell for row in rows for cell in row]
+    assert not [c for c in cells if c.startswith(("=", "+", "@", "\t", "\r"))]
+    assert not [c for c in cells if c.startswith("-") and not c[1:2].isdigit()]
+
+
+def test_csv_keeps_figures_exactly() -> None:
+    verdict = samples.fixed_wing()
+    rows = list(csv.DictReader(io.StringIO(render_checks("csv", [verdict]), newline="")))
+    assert [float(row["value"]) for row in rows] == [r["value"] for r in verdict["requirements"]]
+    assert rows[0]["requirement"] == "ACC-1"
+
+
+def test_spreadsheet_safe_leaves_plain_text_alone() -> None:
+    assert spreadsheet_safe("u-blox F9P") == "u-blox F9P"
+    assert spreadsheet_safe("=1+1") == "'=1+1"
+    assert spreadsheet_safe("  =1+1") == "'  =1+1"
+
+
+@pytest.mark.parametrize("text", samples.HOSTILE)
+def test_hostile_text_is_literal_in_markdown(text: str) -> None:
+    out = render_checks("markdown", [samples.with_hostile_text(text)])
+    assert "<script" not in out
+    assert "<img" not in out
+    assert not re.search(r"(?<!&#64;)@everyone", out)
+    for row in [line for line in out.splitlines() if line.startswith("|")]:
+        bare = len(re.findall(r"(?<!\\)\|", row))
+        assert bare in (8, 9), row
+
+
+def test_markdown_escapes_what_markup_is_made_of() -> None:
+    assert markdown_safe("a*b_c`d`[e](f)|g") == r"a\*b\_c\`d\`\[e\]\(f\)\|g"
+
+
+@pytest.mark.parametrize(
+    "code", [*range(32), 127, *range(128, 160), 0xD800, 0xFFFE, 0x202E, 0x2028]
+)
+def test_visible_leaves_no_character_that_breaks_an_output(code: int) -> None:
+    shown = visible(f"a{chr(code)}b")
+    assert chr(code) not in shown
+    assert shown.startswith("a")
+    assert shown.endswith("b")
+    ElementTree.fromstring(f"<x>{shown}</x>")
+    shown.encode("utf-8")
+
+
+def test_visible_keeps_ordinary_text() -> None:
+    text = "Måling 100 µs, 測量, \N{GREEK SMALL LETTER TAU}_crit 😀"
+    assert visible(text) == text
+
+
+@pytest.mark.parametrize("name", TEXT_FORMATS)
+def test_same_input_same_bytes(name: str) -> None:
+    verdicts = [samples.fixed_wing(), samples.infeasible(), samples.two_stages(), REFUSED]
+    assert render_checks(name, verdicts) == render_checks(name, verdicts)
+
+
+@pytest.mark.parametrize("name", TEXT_FORMATS)
+def test_a_bare_verdict_is_enough(name: str) -> None:
+    verdict = {"schema": "syncline-design/verdict/v1", "verdict": "indeterminate", "spec": None}
+    assert render_checks(name, [verdict])
+
+
+def test_findings_count_what_counts() -> None:
+    levels = [finding.level for finding in findings(samples.failing())]
+    assert levels == ["fail", "pass", "pass", "pass", "pass", "warning"]
+
+
+def test_unknown_format_is_refused() -> None:
+    with pytest.raises(ValueError, match="unknown format pdf"):
+        render_checks("pdf", [samples.fixed_wing()])

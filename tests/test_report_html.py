@@ -1,0 +1,342 @@
+"""HTML pages without a browser: structure, escaping, policy, bytes, what is left out."""
+
+from __future__ import annotations
+
+import base64
+import copy
+import hashlib
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+import report_samples as samples
+from syncline_design.report import figures
+from syncline_design.report.pages import render_verdict, render_verdicts
+from syncline_design.report.text import visible
+
+VOID = {"meta", "input", "br", "img", "link", "hr"}
+SVG_EMPTY = {"use", "path", "rect", "circle", "line"}
+
+
+class Page(HTMLParser):
+    """What a browser would see: tags with attributes, ids, scripts, texts."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.texts: list[str] = []
+        self.unbalanced: list[str] = []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        if not self.open or self.open.pop() != tag:
+            self.unbalanced.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            self.scripts[-1] += data
+        elif not (self.open and self.open[-1] == "style"):
+            self.texts.append(data)
+
+    @property
+    def text(self) -> str:
+        return re.sub(r"[ \n\t]+", " ", " ".join(self.texts))
+
+    def attribute(self, tag: str, name: str) -> list[str]:
+        return [found[name] or "" for t, found in self.tags if t == tag and name in found]
+
+
+@pytest.fixture(scope="module")
+def page() -> Page:
+    return Page(render_verdict(samples.fixed_wing()))
+
+
+def test_page_is_balanced_and_its_ids_are_unique(page: Page) -> None:
+    assert page.unbalanced == []
+    assert page.open == []
+    ids = [found["id"] for _, found in page.tags if "id" in found]
+    assert len(ids) == len(set(ids)) > 20
+
+
+def test_every_reference_inside_the_page_leads_somewhere() -> None:
+    html = render_verdict(samples.fixed_wing())
+    page = Page(html)
+    ids = {found["id"] for _, found in page.tags if "id" in found}
+    targets = set(re.findall(r'href="#([^"]+)"', html)) | set(re.findall(r"url\(#([^)]+)\)", html))
+    for name in ("aria-labelledby", "for"):
+        for _, found in page.tags:
+            targets |= set((found.get(name) or "").split())
+    assert targets
+    assert targets <= ids
+
+
+def test_nothing_is_fetched(page: Page) -> None:
+    fetching = {"src", "srcset", "href", "xlink:href", "action", "data", "poster", "ping"}
+    for tag, found in page.tags:
+        for name in fetching & found.keys():
+            assert (found[name] or "").startswith("#"), (tag, name, found[name])
+    html = render_verdict(samples.fixed_wing())
+    assert not re.search(r"@import|url\((?!#)", html)
+
+
+def test_policy_allows_exactly_the_pages_own_script(page: Page) -> None:
+    (policy,) = [
+        found["content"] or ""
+        for tag, found in page.tags
+        if tag == "meta" and found.get("http-equiv") == "Content-Security-Policy"
+    ]
+    (script,) = page.scripts
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"script-src 'sha256-{digest}'" in policy
+    assert policy.startswith("default-src 'none'")
+    assert "http" not in policy
+    assert not [name for _, found in page.tags for name in found if name.startswith("on")]
+
+
+def test_answer_comes_first(page: Page) -> None:
+    words = (
+        "UAV corridor mapping", "Meets every requirement", "u-blox F9P RTK", "38\u00a0400",
+        "to spare", "ACC-1",
+    )  # fmt: skip
+    places = [page.text.index(word) for word in words]
+    assert places == sorted(places)
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "93.91\u00a0mm",  # total error, from the sums in report_samples
+        "578.3\u00a0\u00b5s",  # tau_crit of the system
+        "157\u00a0m/s",  # slope
+        "proven optimal",
+        "recomputed exactly",
+        "tau 2 ms exceeds its tau_crit of 38 us",
+        "price of riegl_vux1uav is an assumption",
+        "The position data are 2 ms older than their stamp.",
+        "Errata of the paper that bear on this design",
+        "45\u00b7\u221a3",
+        "a" * 64,
+        "200\u00a0000",
+        "30.9\u00a0mm to 31.1\u00a0mm",
+        "99.998\u00a0%",
+    ],
+)
+def test_page_says(page: Page, words: str) -> None:
+    assert words in page.text
+
+
+def test_every_section_is_there_and_listed(page: Page) -> None:
+    sections = page.attribute("section", "id")
+    listed = [target[1:] for target in page.attribute("a", "href") if target != "#main"]
+    assert sections == listed
+    assert len(sections) == 11
+
+
+def test_missing_parts_are_left_out() -> None:
+    page = Page(render_verdict(samples.two_stages()))
+    sections = page.attribute("section", "id")
+    assert {"simulation", "choice", "effects", "infeasibility"}.isdisjoint(sections)
+    assert "unlimited" in page.text
+
+
+@pytest.mark.parametrize("key", sorted(samples.fixed_wing()))
+def test_any_part_may_be_missing_or_null(key: str) -> None:
+    for change in ("drop", "null"):
+        verdict = samples.fixed_wing()
+        if change == "drop":
+            del verdict[key]
+        else:
+            verdict[key] = None
+        page = Page(render_verdict(verdict))
+        assert page.unbalanced == []
+
+
+def _leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    if isinstance(value, dict):
+        return [p for k, v in value.items() for p in [(*path, k), *_leaves(v, (*path, k))]]
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return [p for i, v in enumerate(value) for p in _leaves(v, (*path, i))]
+    return []
+
+
+def test_any_optional_leaf_may_be_null() -> None:
+    """Every key below the first level set to null in one of ten passes: never a crash."""
+    full = samples.fixed_wing()
+    paths = [path for path in _leaves(full) if len(path) > 1]
+    for start in range(10):
+        verdict = copy.deepcopy(full)
+        for path in paths[start::10]:
+            holder: Any = verdict
+            for step in path[:-1]:
+                holder = holder[step] if holder is not None else None
+            if holder is not None:
+                holder[path[-1]] = None
+        assert Page(render_verdict(verdict)).unbalanced == []
+
+
+def test_infeasible_says_why_first() -> None:
+    page = Page(render_verdict(samples.infeasible()))
+    assert page.attribute("section", "id")[0] == "infeasibility"
+    assert "Infeasible: no design meets the requirements" in page.text
+    assert "ACC-1 and COST-1 cannot hold together" in page.text
+    assert "a factor of 1.8" in page.text
+    assert "COST-1 by 3 400 EUR" in page.text
+
+
+def test_failing_verdict_shows_word_and_symbol() -> None:
+    page = Page(render_verdict(samples.failing()))
+    assert "Does not meet its requirements" in page.text
+    assert "\u2717" in page.text
+    assert "87.8\u00a0% over" in page.text
+
+
+@pytest.mark.parametrize("text", [*samples.HOSTILE, "".join(samples.HOSTILE)])
+def test_hostile_text_stays_text(text: str) -> None:
+    html = render_verdict(samples.with_hostile_text(text))
+    page = Page(html)
+    assert len(page.scripts) == 1
+    assert "alert(" not in page.scripts[0]
+    assert page.attribute("img", "src") == []
+    assert page.unbalanced == []
+    assert visible(text).strip() in " ".join(page.texts)
+    html.encode("utf-8")
+    assert not re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e]", html)
+
+
+@pytest.mark.parametrize("text", [*samples.HOSTILE, "$x^2$", "a_b", "\\alpha", "%d"])
+def test_hostile_text_is_literal_in_figures(text: str) -> None:
+    bars = [figures.TauBar(visible(text)[:30], 1e-6, 1e-3, True)]
+    svg = figures.tau_bars(bars).svg
+    root = ElementTree.fromstring(svg)
+    texts = ["".join(node.itertext()) for node in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert visible(text)[:30] in texts
+
+
+@pytest.mark.parametrize("make", [samples.fixed_wing, samples.infeasible, samples.two_stages])
+def test_same_input_same_bytes(make: Any) -> None:
+    assert render_verdict(make()) == render_verdict(make())
+
+
+def test_same_bytes_in_another_process() -> None:
+    code = (
+        "import sys; sys.path.insert(0, sys.argv[1]); import report_samples, hashlib\n"
+        "from syncline_design.report.pages import render_verdict\n"
+        "page = render_verdict(report_samples.fixed_wing())\n"
+        "print(hashlib.sha256(page.encode()).hexdigest())"
+    )
+    tests = str(__import__("pathlib").Path(__file__).parent)
+    out = subprocess.run(
+        [sys.executable, "-c", code, tests],
+        env={"PYTHONHASHSEED": "7", "PATH": "/usr/bin:/bin", "TZ": "Asia/Tokyo"},
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
+    here = hashlib.sha256(render_verdict(samples.fixed_wing()).encode()).hexdigest()
+    assert out == here
+
+
+def test_size_is_far_below_three_megabytes() -> None:
+    verdict = samples.fixed_wing()
+    entry = verdict["choice"]["excluded"][0]
+    verdict["choice"]["excluded"] = [dict(entry, sensor=f"sensor_{i}") for i in range(2000)]
+    verdict["choice"]["front"] = [
+        {"cost": 1000.0 + i, "error_m": 1.0 / (i + 1), "design": "x" * 80} for i in range(500)
+    ]
+    assert len(render_verdict(verdict).encode()) < 3_000_000
+
+
+def test_importing_the_report_package_loads_nothing_heavy() -> None:
+    code = (
+        "import sys\n"
+        "import syncline_design.report.pages, syncline_design.report.checks\n"
+        "import syncline_design.report.write\n"
+        "heavy = {'jinja2', 'matplotlib', 'numpy', 'scipy', 'cvxpy', 'polars'} & set(sys.modules)\n"
+        "print(sorted(heavy))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.stdout.strip(), done.stderr) == ("[]", "")
+
+
+def test_several_verdicts_get_an_overview() -> None:
+    refused = {
+        "verdict": "refused",
+        "file": "bad.yaml",
+        "problems": [{"line": 2, "column": 1, "path": "stages", "message": "missing key"}],
+    }
+    page = Page(render_verdicts([samples.fixed_wing(), samples.infeasible(), refused]))
+    assert "1 of 3 specs meet every requirement" in page.text
+    assert "missing key" in page.text
+    assert page.unbalanced == []
+
+
+def curve(**changes: Any) -> figures.SynclineCurve:
+    values: dict[str, Any] = {
+        "floor_m": 0.1,
+        "rate_mps": 45.0,
+        "tau_crit_s": 0.1 / 45.0,
+        "tau_s": 1e-3,
+        "total_m": 0.145,
+        "target_m": 0.2,
+    }
+    return figures.SynclineCurve(**(values | changes))
+
+
+def test_operating_point_lies_where_the_axes_say() -> None:
+    """The marker's place in the SVG against the place its own tick labels give."""
+    drawn = figures.syncline(curve())
+    box = drawn.box
+    assert box is not None
+    root = ElementTree.fromstring(drawn.svg)
+    (group,) = [g for g in root.iter() if g.get("id") == "fig-syncline-operating-point"]
+    (marker,) = [g for g in group.iter() if g.get("x") is not None]
+    across = (3.0 - box.log_left) / (box.log_right - box.log_left)  # 1/tau = 1000 per second
+    assert float(marker.attrib["x"]) == pytest.approx(
+        box.left + across * (box.right - box.left), abs=0.01
+    )
+    ticks = {
+        "".join(text.itertext()): text
+        for text in root.iter("{http://www.w3.org/2000/svg}text")
+        if "".join(text.itertext()) == "10\u00b3"
+    }
+    assert float(ticks["10\u00b3"].attrib["x"]) == pytest.approx(float(marker.attrib["x"]), abs=0.5)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"tau_crit_s": None, "rate_mps": 0.0, "total_m": 0.1},
+        {"tau_s": 0.0, "total_m": 0.1},
+        {"tau_s": None, "total_m": None},
+        {"target_m": None},
+        {"target_m": 50.0},
+        {"target_m": 1e-6},
+        {"tau_s": 1e3, "total_m": 45_000.1},
+        {"tau_s": 1e-12},
+        {"floor_m": 1e-9, "tau_crit_s": 1e-9 / 45.0, "total_m": 0.045},
+        {"tau_crit_s": None, "rate_mps": 0.0, "tau_s": None, "total_m": None, "target_m": None},
+    ],
+)
+def test_syncline_figure_takes_extreme_systems(changes: dict[str, Any]) -> None:
+    drawn = figures.syncline(curve(**changes))
+    ElementTree.fromstring(drawn.svg)
+    assert drawn.box is not None
+    assert "nan" not in drawn.svg.lower().replace("nano", "")

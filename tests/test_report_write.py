@@ -1,0 +1,175 @@
+"""Writing results: all or nothing, and the old file stays when something goes wrong."""
+
+from __future__ import annotations
+
+import os
+import resource
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from syncline_design.report.write import (
+    OutputError,
+    Target,
+    check_targets,
+    parse_target,
+    write_outputs,
+)
+
+KNOWN = ("json", "html")
+
+
+def test_parse_target() -> None:
+    assert parse_target("html:out/a.html", KNOWN) == Target("html", "out/a.html")
+    assert parse_target("json:-", KNOWN) == Target("json", "-")
+    assert parse_target("json", KNOWN) == Target("json", "-")
+    assert parse_target("html:C:/x.html", KNOWN) == Target("html", "C:/x.html")
+
+
+@pytest.mark.parametrize("text", ["pdf:a.pdf", "html:", "", ":a", "a.html"])
+def test_bad_targets_say_what_is_expected(text: str) -> None:
+    with pytest.raises(OutputError, match="expected"):
+        parse_target(text, KNOWN)
+
+
+def test_writes_files_and_folders(tmp_path: Path) -> None:
+    target = tmp_path / "new" / "deep" / "a.json"
+    write_outputs([(Target("json", str(target)), "{}\n"), (Target("html", f"{tmp_path}/b"), "µ")])
+    assert target.read_text() == "{}\n"
+    assert (tmp_path / "b").read_bytes() == "µ".encode()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["b", "new"]
+
+
+def test_permissions_are_those_of_a_new_or_of_the_old_file(tmp_path: Path) -> None:
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.write_text("x")
+    old.chmod(0o640)
+    mask = os.umask(0o027)
+    try:
+        write_outputs([(Target("json", str(old)), "y"), (Target("html", str(new)), "z")])
+    finally:
+        os.umask(mask)
+    assert stat.S_IMODE(old.stat().st_mode) == 0o640
+    assert stat.S_IMODE(new.stat().st_mode) == 0o640  # 0666 without 027
+
+
+def test_symlink_is_written_through(tmp_path: Path) -> None:
+    real = tmp_path / "real.json"
+    real.write_text("old")
+    link = tmp_path / "link.json"
+    link.symlink_to(real)
+    write_outputs([(Target("json", str(link)), "new")])
+    assert link.is_symlink()
+    assert real.read_text() == "new"
+
+
+def test_stdout_gets_utf8_and_a_final_newline(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
+    write_outputs([(Target("json", "-"), "τ")])
+    sys.stdout.flush()
+    assert capfdbinary.readouterr().out == "τ\n".encode()
+
+
+def test_two_targets_must_not_collide(tmp_path: Path) -> None:
+    same = [Target("json", str(tmp_path / "a")), Target("html", f"{tmp_path}/x/../a")]
+    with pytest.raises(OutputError, match="two outputs"):
+        check_targets(same)
+    with pytest.raises(OutputError, match="standard output"):
+        check_targets([Target("json", "-"), Target("html", "-")])
+
+
+def test_a_folder_is_no_target(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="is a folder"):
+        check_targets([Target("json", str(tmp_path))])
+
+
+def test_a_file_is_no_folder(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(OutputError, match="is not a folder"):
+        check_targets([Target("json", str(tmp_path / "file" / "a.json"))])
+
+
+def test_devices_are_written_to() -> None:
+    target = Target("json", os.devnull)
+    check_targets([target])
+    write_outputs([(target, "{}")])
+    assert not Path(os.devnull).is_file()
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_full_device_is_a_clear_error() -> None:
+    with pytest.raises(OutputError, match=r"/dev/full: cannot write: No space left"):
+        write_outputs([(Target("json", "/dev/full"), "{}")])
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
+def test_full_standard_output_is_a_clear_error_and_nothing_more() -> None:
+    code = (
+        "import sys\n"
+        "from syncline_design.report.write import *\n"
+        "try:\n"
+        "    write_outputs([(Target('json', '-'), 'x' * 100000)])\n"
+        "except OutputError as error:\n"
+        "    print(error, file=sys.stderr)\n"
+        "    sys.exit(3)\n"
+    )
+    with Path("/dev/full").open("w") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+    assert done.returncode == 3
+    assert done.stderr.strip() == "standard output: cannot write: No space left on device"
+
+
+def _with_file_limit(
+    size: int, pairs: list[tuple[Target, str]]
+) -> pytest.ExceptionInfo[OutputError]:
+    """Write while no file may grow beyond `size` bytes, as on a disk that fills up."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
+        with pytest.raises(OutputError) as caught:
+            write_outputs(pairs)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    return caught
+
+
+def test_full_disk_leaves_every_old_file(tmp_path: Path) -> None:
+    first, second = tmp_path / "a.json", tmp_path / "b.html"
+    first.write_text("old a")
+    second.write_text("old b")
+    pairs = [(Target("json", str(first)), "small"), (Target("html", str(second)), "x" * 100_000)]
+    caught = _with_file_limit(4096, pairs)
+    assert "b.html: cannot write" in str(caught.value)
+    assert "the file that was there is unchanged" in str(caught.value)
+    assert first.read_text() == "old a"  # although its own text would have fitted
+    assert second.read_text() == "old b"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["a.json", "b.html"]
+
+
+def test_full_disk_leaves_nothing_half_written(tmp_path: Path) -> None:
+    caught = _with_file_limit(4096, [(Target("html", str(tmp_path / "n.html")), "x" * 100_000)])
+    assert "nothing was written" in str(caught.value)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_unwritable_folder_is_a_clear_error(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(OutputError, match="no permission"):
+            check_targets([Target("json", str(tmp_path / "a.json"))])
+    finally:
+        tmp_path.chmod(0o700)
+
+
+def test_a_folder_that_cannot_be_made_is_a_clear_error() -> None:
+    with pytest.raises(OutputError, match="cannot write"):
+        write_outputs([(Target("json", "/proc/no/such/a.json"), "{}")])
