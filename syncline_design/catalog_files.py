@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design.catalog import SECTIONS, Catalog, CatalogFile
-from syncline_design.units import Dimension, Quantity, UnitError, parse_quantity
+from syncline_design.units import UNITS, Dimension, Quantity, UnitError, parse_quantity
 from syncline_design.validation import validate
 from syncline_design.values import did_you_mean
 from syncline_design.yaml_reader import (
@@ -41,6 +41,16 @@ class Collection:
     def catalog(self) -> Catalog:
         """The merged catalog; its entries have been validated one by one."""
         return Catalog.model_construct(**self.entries)  # type: ignore[arg-type]
+
+    def copy(self) -> Collection:
+        """A copy to which problems, digests and entries can be added."""
+        return Collection(
+            {section: dict(found) for section, found in self.entries.items()},
+            dict(self.origins),
+            dict(self.documents),
+            list(self.problems),
+            list(self.digests),
+        )
 
     def sha256(self) -> str:
         """One hash over all files, in the order they were drawn in."""
@@ -208,7 +218,7 @@ def _read_values(text: str, name: str) -> list[Quantity]:
     if not lines:
         raise UnitError(f"{name} holds no values", "one time per line")
     unit = ""
-    if not any(c.isdigit() for c in lines[0][1]):
+    if lines[0][1].strip("[]") in UNITS:
         unit = " " + lines.pop(0)[1].strip("[]")
         parse_quantity(f"1{unit}", Dimension.TIME)
     values: list[Quantity] = []

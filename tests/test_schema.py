@@ -1,0 +1,114 @@
+"""The JSON Schema in the draft that editors read, and the starter spec of `init`."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+
+from syncline_design.loading import BadInput, load
+from syncline_design.scaffold import SCHEMA_NAME, SPEC_NAME, init_project
+from syncline_design.schema import json_schema, schema_text
+from syncline_design.yaml_reader import read
+
+ROOT = Path(__file__).parent.parent
+CORPUS = Path(__file__).parent / "corpus"
+SPECS, CATALOGS = sorted(ROOT.glob("specs/*.yaml")), sorted(ROOT.glob("catalogs/*.yaml"))
+EXPECTED: dict[str, dict[str, Any]] = read(CORPUS / "expected.yaml").data
+
+# Slips that a schema alone can see: the shape of one value, not what it refers to.
+VISIBLE = (
+    "numbers/no_as_number", "numbers/quoted", "numbers/true_as_number", "numbers/zero",
+    "numbers/number_as_name", "numbers/fraction_as_count", "units/megamolar", "units/bare_number",
+    "units/seconds_for_length", "units/decimal_comma", "units/angle_without_unit",
+    "units/tolerance_on_limit", "model/typo_key", "model/typo_key_nested", "model/unknown_kind",
+    "model/quantile_missing", "model/quantile_on_accuracy", "model/quantile_out_of_range",
+    "model/missing_stages", "model/lever_arm_two_axes", "model/format_version",
+    "model/distribution_unknown", "model/sync_limit_with_unit", "yaml/list_at_top",
+)  # fmt: skip
+
+
+def plain(value: Any) -> Any:
+    """As JSON has it: lists for tuples."""
+    if isinstance(value, dict):
+        return {key: plain(item) for key, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+def validator(name: Any) -> jsonschema.Draft7Validator:
+    return jsonschema.Draft7Validator(json.loads(schema_text(name)))
+
+
+@pytest.mark.parametrize("name", ["spec", "catalog"])
+def test_the_schema_is_valid_draft_07(name: Any) -> None:
+    schema = json_schema(name)
+    assert schema["$schema"] == "http://json-schema.org/draft-07/schema#"
+    jsonschema.Draft7Validator.check_schema(schema)
+    text = json.dumps(schema)
+    for newer in ("$defs", "prefixItems", "unevaluatedProperties", "dependentRequired"):
+        assert newer not in text
+
+
+@pytest.mark.parametrize("path", SPECS, ids=lambda p: p.stem)
+def test_shipped_specs_satisfy_it(path: Path) -> None:
+    validator("spec").validate(plain(read(path).data))
+
+
+@pytest.mark.parametrize("path", CATALOGS, ids=lambda p: p.stem)
+def test_shipped_catalogs_satisfy_it(path: Path) -> None:
+    validator("catalog").validate(plain(read(path).data))
+
+
+def test_accepted_files_of_the_corpus_satisfy_it() -> None:
+    check = validator("spec")
+    for name, case in EXPECTED.items():
+        if case["outcome"] == "accepted":
+            check.validate(plain(read(CORPUS / f"{name}.yaml").data))
+
+
+@pytest.mark.parametrize("name", VISIBLE)
+def test_slips_of_shape_do_not(name: str) -> None:
+    data = plain(read(CORPUS / f"{name}.yaml").data)
+    assert not validator("spec").is_valid(data)
+
+
+def test_a_wrong_catalog_does_not_satisfy_it() -> None:
+    check = validator("catalog")
+    data = plain(read(CATALOGS[0]).data)
+    section, entries = next((k, v) for k, v in data.items() if isinstance(v, dict))
+    entries[next(iter(entries))]["costt"] = "1 EUR"
+    assert not check.is_valid({section: entries})
+
+
+def test_the_starter_spec_is_accepted_by_loader_and_schema(tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "project"
+    written = init_project(folder)
+    assert [path.name for path in written] == [SPEC_NAME, SCHEMA_NAME]
+    spec = load(folder / SPEC_NAME)
+    assert spec.spec.stages
+    assert spec.text.startswith(f"# yaml-language-server: $schema=./{SCHEMA_NAME}\n")
+    schema = json.loads((folder / SCHEMA_NAME).read_text(encoding="utf-8"))
+    jsonschema.Draft7Validator(schema).validate(plain(read(folder / SPEC_NAME).data))
+
+
+@pytest.mark.parametrize("taken", [SPEC_NAME, SCHEMA_NAME])
+def test_init_never_overwrites(tmp_path: Path, taken: str) -> None:
+    (tmp_path / taken).write_text("mine", encoding="utf-8")
+    with pytest.raises(BadInput, match="there already"):
+        init_project(tmp_path)
+    assert [p.name for p in tmp_path.iterdir()] == [taken]
+    assert (tmp_path / taken).read_text(encoding="utf-8") == "mine"
+
+
+def test_init_leaves_nothing_when_it_cannot_write(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(BadInput, match="cannot write"):
+        init_project(tmp_path / "file" / "inside")
+    (tmp_path / SPEC_NAME).symlink_to(tmp_path / "dangling")
+    with pytest.raises(BadInput, match="there already"):
+        init_project(tmp_path)
+    assert not os.path.lexists(tmp_path / SCHEMA_NAME)
