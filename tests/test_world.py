@@ -36,6 +36,7 @@ from tests.world.motions import Sensors
 from tests.world.noise import gauss_markov, unit_draws
 from tests.world.scenarios import Carrier
 from tests.world.sensing import lagged_track
+from tests.world.streams import write_streams
 from tests.world.trajectory import GRAVITY_MPS2, Path, fit, grid
 
 Array = NDArray[np.float64]
@@ -545,3 +546,22 @@ def test_the_example_in_the_repository_is_what_its_script_writes(tmp_path: FileP
     )
     np.testing.assert_allclose(found, expected, atol=1.5e-3)  # a last digit may round elsewhere
     assert (kept / "hidden_latency.csv").stat().st_size < 500_000
+
+
+def test_streams_hold_each_sensor_at_its_own_rate(tmp_path: FilePath) -> None:
+    run = scenario("multirotor_lines", 4, 20.0)
+    files = write_streams(run, tmp_path, (), SILENT, rates_hz=(5.0, 50.0))
+    tables = {}
+    for file in files:
+        names = file.read_text(encoding="utf-8").split("\n", 1)[0].split(",")
+        table = np.loadtxt(file, delimiter=",", skiprows=1)
+        tables[file.stem] = dict(zip(names, table.T, strict=True))
+    for name, rate in (("position", 5.0), ("attitude", 50.0), ("ranging", 10.0)):
+        assert np.median(np.diff(tables[name]["time_s"])) == pytest.approx(1.0 / rate, rel=0.01)
+    path = run.carriers[0].path
+    inner = tables["attitude"]
+    yaw = np.unwrap(np.radians(inner["yaw_deg"])) - path.euler(inner["time_s"])[:, 0]
+    turns = np.round(yaw[0] / (2.0 * np.pi)) * 2.0 * np.pi
+    np.testing.assert_allclose(yaw, turns, atol=1e-6)
+    north = path.position(tables["position"]["time_s"])[:, 0]
+    np.testing.assert_allclose(tables["position"]["position_north_m"], north, atol=0.7)  # the arm

@@ -58,15 +58,20 @@ class WorldLog:
         local frame is then the first row's position, as who reads the log takes it.
         """
         columns = self.columns if geodetic is None else _in_wgs84(self.columns, geodetic)
-        texts = [_texts(name, values, coarser) for name, values in columns.items()]
-        lines = [",".join(columns)] + [",".join(row) for row in zip(*texts, strict=True)]
-        target = FilePath(path)
-        target.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        return target
+        return write_columns(path, columns, coarser)
 
     def spec_yaml(self, known: Sequence[Hidden] = ()) -> str:
         """The spec: sensors and arms as their owner believes them, everything pinned."""
         return spec_text(self.run, known)
+
+
+def write_columns(path: FilePath | str, columns: dict[str, Array], coarser: int = 0) -> FilePath:
+    """Columns as CSV, each with the digits its unit deserves."""
+    texts = [_texts(name, values, coarser) for name, values in columns.items()]
+    lines = [",".join(columns)] + [",".join(row) for row in zip(*texts, strict=True)]
+    target = FilePath(path)
+    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return target
 
 
 def _texts(name: str, values: Array, coarser: int) -> list[str]:
