@@ -76,6 +76,22 @@ def load_text(text: str, path: str | Path, builtin: bool = True) -> LoadedSpec:
     return _loaded(parse(text, str(path)), Path(path), builtin)
 
 
+def catalogs_of(document: Document, path: Path, builtin: bool = True) -> Collection:
+    """The catalogs that a spec draws in: the shipped ones and its own."""
+    collection = Collection()
+    if builtin:
+        add_builtin(collection)
+    add_own(collection, document, path.parent)
+    return collection
+
+
+def load_document(
+    document: Document, path: Path, collection: Collection, builtin: bool = True
+) -> LoadedSpec:
+    """A spec that was read already, with catalogs drawn together once for many specs."""
+    return _complete(document, path, collection.copy(), builtin)
+
+
 def load_builtin() -> Catalog:
     """The shipped catalogs alone."""
     collection = Collection()
@@ -101,10 +117,10 @@ def _stop_at(problems: list[Problem]) -> None:
 def _loaded(document: Document, path: Path, builtin: bool) -> LoadedSpec:
     if document.data is None:
         raise BadInput(document.problems)
-    collection = Collection()
-    if builtin:
-        add_builtin(collection)
-    add_own(collection, document, path.parent)
+    return _complete(document, path, catalogs_of(document, path, builtin), builtin)
+
+
+def _complete(document: Document, path: Path, collection: Collection, builtin: bool) -> LoadedSpec:
     filled = fill_empirical(document, path.parent, path.parent, collection)
     spec, problems = validate(Spec, document, filled)
     problems = [*document.problems, *problems, *collection.problems]
@@ -134,4 +150,14 @@ def _missing_files(document: Document, spec: Spec, folder: Path) -> list[Problem
     return [item for item in found if isinstance(item, Problem)]
 
 
-__all__ = ["BadInput", "LoadedSpec", "Problem", "load", "load_builtin", "load_text", "problem_at"]
+__all__ = [
+    "BadInput",
+    "LoadedSpec",
+    "Problem",
+    "catalogs_of",
+    "load",
+    "load_builtin",
+    "load_document",
+    "load_text",
+    "problem_at",
+]
