@@ -87,7 +87,8 @@ class Rays:
             last, q = q, np.where(usable, step, 0.5 * (low + high))
             if np.all(np.abs(q - last) <= 1e-7 * q):
                 break
-        return q
+        found: Array = q
+        return found
 
 
 def rays(system: System, settings: SimulationSettings, points: int, group: int) -> Rays:
