@@ -22,6 +22,9 @@ if TYPE_CHECKING:
 BAD_INPUT, NO_VERDICT = 2, 3
 DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal error
 
+# Looking for validation plugins among all installed packages costs a tenth of a short check.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+
 app = typer.Typer(
     name="syncline-design",
     help="Choose, verify and diagnose sensor payloads and their time synchronisation.",

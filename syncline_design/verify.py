@@ -10,6 +10,7 @@ from typing import Any
 
 from syncline_design import __version__
 from syncline_design.cautions import cautions
+from syncline_design.choice_data import choice_json
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
@@ -18,6 +19,7 @@ from syncline_design.known_effects import describe, effect_entries, known_of
 from syncline_design.loading import BadInput, LoadedSpec, Problem, load
 from syncline_design.model.budget import budget
 from syncline_design.model.system import System
+from syncline_design.open_choice import MOST_SIMULATED, Picked, pick
 from syncline_design.problem import build_problem, selection_of, sole_design
 from syncline_design.recheck import Recheck, recheck
 from syncline_design.resolution import platform_of
@@ -120,6 +122,40 @@ def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
         verified = verify(loaded, problem, design, settings)
         return _verdict_json(loaded, problem, verified, settings, {})
     return _check_open(loaded, problem, settings)
+
+
+def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
+    """Choose, then verify; without any design say why and what would help."""
+    picked = pick(
+        problem,
+        settings.method,
+        settings.time_limit_s,
+        lambda design: verify(loaded, problem, design, settings),
+    )
+    if picked.verified is None:
+        data = _frame(loaded, problem, "infeasible", settings)
+        data["infeasibility"] = explain_json(loaded, problem, picked.choice)
+        return data
+    choice = choice_json(loaded, problem, picked, known_of(loaded))
+    data = _verdict_json(loaded, problem, picked.verified, settings, choice)
+    if picked.verified.word != "meets" and not picked.exhausted:
+        data["verdict"] = "indeterminate"
+    if picked.passed_over:
+        data["warnings"].insert(0, _passed_over(picked))
+    return data
+
+
+def _passed_over(picked: Picked) -> Json:
+    count = f"{picked.passed_over} design{'s' if picked.passed_over > 1 else ''}"
+    met = picked.verified is not None and picked.verified.word == "meets"
+    message = (
+        f"{count} that come before this one meet the Syncline but not the Monte Carlo requirements"
+        if met
+        else f"{count} meet the Syncline requirements, none of them the Monte Carlo ones; "
+        "shown is the first"
+        + ("" if picked.exhausted else f"; the search stopped after {MOST_SIMULATED} designs")
+    )
+    return {"code": "passed-over", "message": message}
 
 
 def exit_code(verdict: Json) -> int:
