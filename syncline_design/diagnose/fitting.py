@@ -1,0 +1,208 @@
+"""Fit effects and noise together: generalised least squares on the re-simulated error.
+
+Gauss-Newton with step halving, on the scene itself and not on its linearisation; the noise is
+fitted again after every change of the effects, as what it absorbs depends on what is removed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.diagnose.candidates import Candidate, slopes
+from syncline_design.diagnose.covariance import Precision
+from syncline_design.diagnose.noise import (
+    Bounds,
+    NoiseLevel,
+    Structure,
+    first_guess,
+    fit_noise,
+    precision,
+    spec_bounds,
+)
+from syncline_design.diagnose.simulation import Acting, Scene
+from syncline_design.effects.base import Array
+
+NOISE_ROWS = 800  # rows on which the noise is fitted; stretches spread over the whole log
+STRETCH = 80
+LONG, SHORT = 30, 10  # iterations of a noise fit from scratch, and from a good start
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """A scene with its noise structure, the rows the noise is fitted on, and the rows in use."""
+
+    view: Scene
+    structure: Structure
+    noise_rows: NDArray[np.int64]
+    noise_structure: Structure
+    used: NDArray[np.int64] | None = None  # None: all rows
+
+    def error(self, acting: Sequence[Acting]) -> Array:
+        """Corrected error with unknown components at zero (they have a huge variance)."""
+        return np.nan_to_num(self.view.error(acting))
+
+
+def stretches(rows: int) -> NDArray[np.int64]:
+    """Indices of contiguous stretches spread over a log, NOISE_ROWS rows at most."""
+    if rows <= NOISE_ROWS:
+        return np.arange(rows)
+    count = NOISE_ROWS // STRETCH
+    starts = np.linspace(0, rows - STRETCH, count).astype(np.int64)
+    return (starts[:, None] + np.arange(STRETCH)).ravel()
+
+
+def data_of(view: Scene, structure: Structure) -> Data:
+    """A scene ready for fitting."""
+    index = stretches(len(view))
+    return Data(view, structure, index, structure.rows(index))
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A stochastic effect that is part of the model: what it lets the noise do.
+
+    what: "factor", "slow" or "down" of a sensor, or "size" of a directed part.
+    """
+
+    candidate: Candidate
+    what: str
+    directed: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """Effects and noise fitted to a log.
+
+    nll: of all rows in use [nat]; covariance (P, P) of the continuous parameters of `acting`, in
+    their order; error (n, 3) what is left [m].
+    """
+
+    acting: tuple[Acting, ...]
+    opened: tuple[Opened, ...]
+    bounds: Bounds
+    level: NoiseLevel
+    nll: float
+    covariance: Array
+    error: Array
+    precision: Precision
+
+    @property
+    def labels(self) -> tuple[tuple[str, str, int], ...]:
+        """Everything named, in order: deterministic effects first."""
+        return tuple(a.label for a in self.acting) + tuple(o.candidate.label for o in self.opened)
+
+    @property
+    def free_sizes(self) -> tuple[int, ...]:
+        return tuple(o.directed for o in self.opened if o.directed >= 0)
+
+
+def bounds_of(data: Data, opened: Sequence[Opened]) -> Bounds:
+    """What the noise may be once some effects open it."""
+    bounds = spec_bounds(data.structure)
+    for one in opened:
+        if one.what != "size":
+            stage = data.view.system.stages[one.candidate.stage].name
+            bounds = bounds.opened(data.structure, (stage, one.candidate.sensor), one.what)
+    return bounds
+
+
+def fit(
+    data: Data,
+    acting: Sequence[Acting] = (),
+    opened: Sequence[Opened] = (),
+    start: NoiseLevel | None = None,
+    passes: int = 1,
+) -> Model:
+    """Fit the parameters of the effects and the noise, in turn.
+
+    Without a start the noise is fitted from the spec's; with one, the effects are adjusted at that
+    noise first, so that what they explain is not taken for noise.
+    """
+    bounds = bounds_of(data, opened)
+    sizes = tuple(o.directed for o in opened if o.directed >= 0)
+    level = start or first_guess(data.structure)
+    now = tuple(acting)
+    error = data.error(now)
+    iterations = LONG if start is None else SHORT
+    for _ in range(passes):
+        if now:
+            now, error, _ = adjusted(data, now, precision(data.structure, level), error)
+        level, _ = fit_noise(
+            data.noise_structure, error[data.noise_rows], bounds, level, sizes, iterations
+        )
+    if now:
+        now, error, _ = adjusted(data, now, precision(data.structure, level), error)
+    factored = precision(data.structure, level)
+    _, _, covariance = adjusted(data, now, factored, error, steps=0)
+    nll = factored.negative_log_likelihood(error)
+    return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
+
+
+def adjusted(
+    data: Data, acting: tuple[Acting, ...], known: Precision, error: Array, steps: int = 3
+) -> tuple[tuple[Acting, ...], Array, Array]:
+    """Parameters of least e' C^-1 e at a known C; (effects, their error, covariance (P, P))."""
+    if not acting:
+        return acting, error, np.zeros((0, 0))
+    for _ in range(steps):
+        columns = np.nan_to_num(slopes(data.view, acting))
+        weighted = known.solve(columns)
+        normal, right = inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0]
+        change = solve_scaled(normal, right)
+        acting, error, moved = _stepped(data, acting, change, known, error)
+        if moved * moved * float(change @ normal @ change) < 1e-4:
+            break
+    columns = np.nan_to_num(slopes(data.view, acting))
+    return acting, error, inverse_scaled(inner(columns, known.solve(columns)))
+
+
+def inner(first: Array, second: Array) -> Array:
+    """Sum over rows and components of first (n, 3, p) times second (n, 3, q); (p, q)."""
+    product: Array = first.reshape(-1, first.shape[2]).T @ second.reshape(-1, second.shape[2])
+    return product
+
+
+def _stepped(
+    data: Data, acting: tuple[Acting, ...], change: Array, known: Precision, error: Array
+) -> tuple[tuple[Acting, ...], Array, float]:
+    """The longest of the full step and its halves that lowers the weighted squares."""
+    before = _squares(known, error)
+    for share in (1.0, 0.5, 0.25, 0.1):
+        trial = _moved(acting, share * change)
+        left = data.error(trial)
+        if _squares(known, left) <= before:
+            return trial, left, share
+    return acting, error, 0.0
+
+
+def _squares(known: Precision, error: Array) -> float:
+    return float(np.sum(error * known.solve(error[:, :, None])[:, :, 0]))
+
+
+def _moved(acting: Sequence[Acting], change: Array) -> tuple[Acting, ...]:
+    at, result = 0, []
+    for one in acting:
+        names = [p.name for p in one.effect.slopes()]
+        added = {n: one.values[n] + float(change[at + i]) for i, n in enumerate(names)}
+        at += len(names)
+        result.append(replace(one, values={**one.values, **added}))
+    return tuple(result)
+
+
+def solve_scaled(normal: Array, right: Array) -> Array:
+    """Solve normal x = right with columns scaled alike; directions the log cannot see stay put."""
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scaled = normal / scale[:, None] / scale
+    solution: Array = np.linalg.lstsq(scaled, right / scale, rcond=1e-10)[0] / scale
+    return solution
+
+
+def inverse_scaled(normal: Array) -> Array:
+    """Inverse of the normal matrix, columns scaled alike first."""
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    inverse: Array = np.linalg.pinv(normal / scale[:, None] / scale, rcond=1e-12)
+    return inverse / scale[:, None] / scale

@@ -1,0 +1,422 @@
+"""Which effects are missing: forward and backward search over whole effects.
+
+Each candidate is scored as a whole (all its parameters at once) under a ladder of noise models, the
+best few are fitted with the noise fitted anew, and the best of these is accepted if it beats what
+the largest of all candidates' scores reaches by chance on this very trajectory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+
+import numpy as np
+from scipy.stats import chi2
+
+from syncline_design.diagnose.candidates import (
+    Candidate,
+    Signature,
+    candidates,
+    signature,
+    signatures,
+    slopes,
+    zero_values,
+)
+from syncline_design.diagnose.fitting import (
+    Data,
+    Model,
+    Opened,
+    adjusted,
+    fit,
+    inner,
+    inverse_scaled,
+    solve_scaled,
+)
+from syncline_design.diagnose.noise import NoiseLevel, as_specified, precision
+from syncline_design.diagnose.settings import DiagnosisSettings
+from syncline_design.diagnose.simulation import Acting
+from syncline_design.effects.base import Array
+
+TRIED = 4  # candidates fitted with their own noise per step
+SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
+WITHIN_NATS, WITHIN_SHARE = 12.0, 0.35  # how far behind the best a candidate may be to be fitted
+DRAWS = 3000  # clean scores drawn for the distribution of the largest
+MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
+SCATTER_SHARE = 0.2  # for effects that only scatter; the rest is the remainder test's
+RIDGE = 1e-9
+RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A model with one more effect."""
+
+    candidate: Candidate
+    model: Model
+    gain: float  # NLL saved [nat]
+    freedom: int
+
+    @property
+    def log_p(self) -> float:
+        """log of the chance that noise alone saves as much in this one candidate."""
+        return float(chi2.logsf(max(2.0 * self.gain, 0.0), self.freedom))
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One accepted addition."""
+
+    label: tuple[str, str, int]
+    gain: float
+    log_p: float
+    threshold: float  # log p that clean logs reach at the stated rate
+    model: Model
+
+
+@dataclass(frozen=True, slots=True)
+class SearchResult:
+    base: Model
+    model: Model
+    steps: tuple[Step, ...]
+    rivals: dict[tuple[str, str, int], tuple[Candidate, ...]] = field(default_factory=dict)
+
+
+@dataclass(slots=True)
+class Search:
+    """A running search over one log."""
+
+    data: Data
+    settings: DiagnosisSettings
+    rng: np.random.Generator
+    candidates: tuple[Candidate, ...]
+    signatures: tuple[Signature, ...]
+    progress: Callable[[float], None]
+
+    def run(self) -> SearchResult:
+        """Add effects while they beat chance; then take out what is no longer needed."""
+        base = fit(self.data)
+        model, steps = base, []
+        while len(model.labels) < self.settings.max_effects:
+            scores = gram(self.data, model, self.free_signatures(model), model.level)
+            threshold = self.threshold(scores)
+            trial = self.best(model, scores)
+            if trial is None or trial.log_p > threshold:
+                break
+            model = self.exchanged(trial.model)
+            steps.append(Step(trial.candidate.label, trial.gain, trial.log_p, threshold, model))
+            self.progress(len(steps) / self.settings.max_effects)
+        model = self.pruned(model)
+        return SearchResult(base, model, tuple(steps))
+
+    def threshold(self, scores: Gram) -> float:
+        """log p that the best candidate of a clean log falls below at the stated rate."""
+        return clean_threshold(scores, MEAN_SHARE * self.settings.false_alarm_rate, self.rng)
+
+    def free_signatures(self, model: Model) -> list[Signature]:
+        """Signatures of what the model does not hold yet."""
+        return [s for s in self.signatures if s.candidate.label not in model.labels]
+
+    def best(self, model: Model, scores: Gram) -> Trial | None:
+        """The candidate that best explains what is left, its noise fitted anew."""
+        trials = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
+        trials += self.scatter_trials(model)
+        kept = [t for t in trials if plausible(t.model)]
+        return min(kept, key=lambda t: (t.log_p, -t.gain, t.candidate.label), default=None)
+
+    def screened(self, model: Model, scores: Gram) -> list[tuple[Signature, NoiseLevel]]:
+        """Signatures that gain most under any noise of the ladder, one per candidate."""
+        free = self.free_signatures(model)
+        best: dict[tuple[str, str, int], tuple[float, Signature, NoiseLevel]] = {}
+        for level in ladder(self.data, model):
+            seen = scores if level is model.level else gram(self.data, model, free, level)
+            for s, gain in zip(free, seen.gains(), strict=True):
+                total = gain - seen.nll - 2.0 * s.columns.shape[2]
+                known = best.get(s.candidate.label)
+                if gain > SCREENED_OUT and (known is None or known[0] < total):
+                    best[s.candidate.label] = (total, s, level)
+        ranked = sorted(best.values(), key=lambda entry: -entry[0])
+        if not ranked:
+            return []
+        reach = max(WITHIN_NATS, WITHIN_SHARE * (ranked[0][0] + model.nll))
+        close = [entry for entry in ranked if entry[0] > ranked[0][0] - reach]
+        return [(s, level) for _, s, level in close[:TRIED]]
+
+    def trial(self, model: Model, found: Signature, level: NoiseLevel) -> Trial:
+        """The model with this candidate, fitted by re-simulation."""
+        start = found.candidate.acting(zero_values(found.candidate.effect, found.at))
+        opened = model.opened
+        if found.candidate.effect.kind == "stochastic":
+            directed = directed_index(self.data, found.candidate)
+            opened = (*opened, Opened(found.candidate, "size", directed))
+            level = _with_size(level, directed, 0.3 * _usual_size(self.data, directed))
+        fitted = fit(self.data, (*model.acting, start), opened, start=level)
+        fitted = located(self.data, fitted) if found.at else fitted
+        freedom = found.columns.shape[2] + len(found.at) + (len(opened) - len(model.opened))
+        return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
+
+    def scatter_trials(self, model: Model) -> list[Trial]:
+        """Candidates that only change the covariance."""
+        trials = []
+        for one, level in scatter_candidates(self.data, self.candidates, model):
+            fitted = fit(self.data, model.acting, (*model.opened, one), start=level)
+            gain = model.nll - fitted.nll
+            if gain > 2.0:
+                trials.append(Trial(one.candidate, fitted, gain, 2 if one.what == "slow" else 1))
+        return trials
+
+    def exchanged(self, model: Model) -> Model:
+        """Try every earlier effect's rivals in its place now that there is company."""
+        if len(model.acting) < 2:
+            return model
+        for k, one in enumerate(model.acting[:-1]):
+            rest = tuple(a for i, a in enumerate(model.acting) if i != k)
+            without = fit(self.data, rest, model.opened, start=model.level)
+            scores = gram(self.data, without, self.free_signatures(without), without.level)
+            for s, level in self.screened(without, scores):
+                if s.candidate.label == one.label or s.candidate.effect.kind == "stochastic":
+                    continue
+                trial = self.trial(without, s, level)
+                if plausible(trial.model) and clearly_better(trial.model, model):
+                    model = trial.model
+                    break
+        return model
+
+    def pruned(self, model: Model) -> Model:
+        """Leave out effects that the others have made needless."""
+        for label in model.labels:
+            if len(model.labels) < 2:
+                break
+            acting = tuple(a for a in model.acting if a.label != label)
+            opened = tuple(o for o in model.opened if o.candidate.label != label)
+            less = fit(self.data, acting, opened, start=model.level)
+            freedom = max(len(model.covariance) - len(less.covariance), 1)
+            loss = max(2.0 * (less.nll - model.nll), 0.0)
+            scores = gram(self.data, less, self.free_signatures(less), less.level)
+            if float(chi2.logsf(loss, freedom)) > self.threshold(scores):
+                model = less
+        return model
+
+
+@dataclass(frozen=True, slots=True)
+class Gram:
+    """Scores of all signatures: g = X' C^-1 e and M = X' C^-1 X, freed of the model's effects."""
+
+    score: Array
+    normal: Array
+    groups: tuple[slice, ...]
+    nll: float
+
+    def gains(self) -> list[float]:
+        """NLL saved [nat] by each signature alone, to first order."""
+        return [self._gain(self.score[g], self.normal[g, g]) for g in self.groups]
+
+    def _gain(self, score: Array, normal: Array) -> float:
+        return 0.5 * float(score @ solve_scaled(normal, score))
+
+
+def gram(data: Data, model: Model, found: Sequence[Signature], level: NoiseLevel) -> Gram:
+    """Scores of signatures under a noise level."""
+    own = np.nan_to_num(slopes(data.view, model.acting))
+    width = own.shape[2]
+    groups, at = [], 0
+    for s in found:
+        groups.append(slice(at, at + s.columns.shape[2]))
+        at = groups[-1].stop
+    columns = np.concatenate([own, *(np.nan_to_num(s.columns) for s in found)], axis=2)
+    known = model.precision if level is model.level else precision(data.structure, level)
+    weighted = known.solve(columns)
+    normal = inner(columns, weighted)
+    score = inner(weighted, model.error[:, :, None])[:, 0]
+    if width:
+        inverse = inverse_scaled(normal[:width, :width])
+        cross = normal[:width, width:]
+        score = score[width:] - cross.T @ inverse @ score[:width]
+        normal = normal[width:, width:] - cross.T @ inverse @ cross
+    nll = known.negative_log_likelihood(model.error)
+    return Gram(score, normal, tuple(groups), nll)
+
+
+def clean_threshold(scores: Gram, rate: float, rng: np.random.Generator) -> float:
+    """Quantile of the least log p over all signatures when there is nothing but noise.
+
+    g is normal with covariance M when the model is right, so the least p over all (correlated)
+    candidates is drawn without simulating a log.
+    """
+    scale = np.sqrt(np.maximum(np.diag(scores.normal), 1e-300))
+    correlation = scores.normal / scale[:, None] / scale
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = root @ rng.standard_normal((root.shape[1], DRAWS))
+    least = np.zeros(DRAWS)
+    for g in scores.groups:
+        inverse = np.linalg.pinv(correlation[g, g], rcond=RIDGE)
+        squares = np.sum(draws[g] * (inverse @ draws[g]), axis=0)
+        least = np.minimum(least, _log_p(squares, g.stop - g.start))
+    return float(np.quantile(least, rate))
+
+
+_GRID = np.linspace(0.0, 80.0, 401)
+
+
+@cache
+def _log_p_grid(freedom: int) -> Array:
+    grid: Array = chi2.logsf(_GRID, freedom)
+    return grid
+
+
+def _log_p(squares: Array, freedom: int) -> Array:
+    """log of the upper tail of chi-square, by interpolation (it is nearly straight)."""
+    log_p: Array = np.interp(squares, _GRID, _log_p_grid(freedom))
+    return log_p
+
+
+def clearly_better(new: Model, old: Model) -> bool:
+    """Whether another effect in the place of one fits better by more than its freedom and luck."""
+    extra = len(new.covariance) - len(old.covariance)
+    return old.nll - new.nll > RIVAL_NATS * (1 + max(extra, 0))
+
+
+def ladder(data: Data, model: Model) -> list[NoiseLevel]:
+    """Noise models to screen under: as fitted, and with the slow part as small as can be.
+
+    Slow noise fitted while an effect is missing has swallowed part of it.
+    """
+    spec = as_specified(data.structure)
+    kept = replace(
+        spec,
+        size=model.level.size,
+        factor=tuple(max(f, 0.3) for f in model.level.factor),
+    )
+    return [model.level, kept]
+
+
+def plausible(model: Model) -> bool:
+    """Whether every fitted parameter is of a size that its effect can have."""
+    for one in model.acting:
+        for p in one.effect.slopes():
+            value = one.values[p.name]
+            if abs(value) > p.high or (not p.signed and value < 0.0):
+                return False
+    return True
+
+
+def directed_index(data: Data, candidate: Candidate) -> int:
+    """Which directed part of the noise structure is this candidate's."""
+    return [d.key for d in data.structure.directed].index(candidate.key)
+
+
+def located(data: Data, model: Model) -> Model:
+    """Refine where the newest effect starts, by halving the grid around the best place."""
+    last = model.acting[-1]
+    name = next(p.name for p in last.effect.parameters if p.located)
+    times = data.view.log.time_s
+    reach = (times[-1] - times[0]) / 24.0
+    best = model
+    for _ in range(4):
+        centre = best.acting[-1].values[name]
+        for t in np.linspace(centre - reach, centre + reach, 7):
+            moved = replace(best.acting[-1], values={**best.acting[-1].values, name: float(t)})
+            trial = refitted(data, (*best.acting[:-1], moved), best)
+            best = trial if trial.nll < best.nll else best
+        reach /= 3.5
+    return best
+
+
+def refitted(data: Data, acting: tuple[Acting, ...], like: Model) -> Model:
+    """The same noise, other effects, one adjustment."""
+    now, error, covariance = adjusted(data, acting, like.precision, data.error(acting), steps=1)
+    nll = like.precision.negative_log_likelihood(error)
+    return replace(like, acting=now, error=error, covariance=covariance, nll=nll)
+
+
+def scatter_candidates(
+    data: Data, found: Sequence[Candidate], model: Model
+) -> list[tuple[Opened, NoiseLevel]]:
+    """Stochastic effects worth a fit, each with a noise level to start from.
+
+    Worth a fit is what lowers the NLL when some of it is simply put in.
+    """
+    result = []
+    error = model.error[data.noise_rows]
+    base = precision(data.noise_structure, model.level).negative_log_likelihood(error)
+    for candidate in found:
+        if candidate.label in model.labels or candidate.effect.sensitivity is not None:
+            continue
+        for opened, level in _put_in(data, candidate, model):
+            found_nll = precision(data.noise_structure, level).negative_log_likelihood(error)
+            if found_nll < base - 1.0:
+                result.append((opened, level))
+                break
+    return result
+
+
+def _put_in(data: Data, candidate: Candidate, model: Model) -> list[tuple[Opened, NoiseLevel]]:
+    """Noise levels with a moderate, then a large share of a stochastic effect."""
+    level, name = model.level, candidate.effect.name
+    sensor = (data.view.system.stages[candidate.stage].name, candidate.sensor)
+    if name == "noise_understated":
+        return [
+            (Opened(candidate, "factor"), _times_factor(data, level, sensor, k))
+            for k in (1.15, 2.0)
+        ]
+    if name in ("correlated_noise", "height_drift"):
+        what = "slow" if name == "correlated_noise" else "down"
+        return [
+            (Opened(candidate, what), _times_slow(data, level, sensor, what, k)) for k in (1.5, 6.0)
+        ]
+    if name == "timestamp_jitter":
+        index = directed_index(data, candidate)
+        unit = _usual_size(data, index)
+        return [
+            (Opened(candidate, "size", index), _with_size(level, index, k * unit))
+            for k in (0.3, 1.0)
+        ]
+    return []
+
+
+def _times_factor(data: Data, level: NoiseLevel, sensor: tuple[str, str], by: float) -> NoiseLevel:
+    pairs = zip(data.structure.white, level.factor, strict=True)
+    return replace(level, factor=tuple(f * by if w.sensor == sensor else f for w, f in pairs))
+
+
+def _times_slow(
+    data: Data, level: NoiseLevel, sensor: tuple[str, str], what: str, by: float
+) -> NoiseLevel:
+    slow = tuple(
+        tuple(
+            max(v, 0.5) * by if part.sensor == sensor and (what == "slow" or k == 2) else v
+            for k, v in enumerate(values)
+        )
+        for part, values in zip(data.structure.slow, level.slow, strict=True)
+    )
+    return replace(level, slow=slow)
+
+
+def _usual_size(data: Data, index: int) -> float:
+    """Size at which a directed part has the variance of the white noise, in the median row."""
+    direction = data.noise_structure.directed[index].direction
+    own = float(np.median(np.sum(direction**2, axis=(1, 2))))
+    white = sum(np.einsum("nii->n", w.covariance) for w in data.noise_structure.white)
+    return float(np.sqrt(np.median(white) / max(own, 1e-300)))
+
+
+def _with_size(level: NoiseLevel, index: int, size: float) -> NoiseLevel:
+    sizes = tuple(size if k == index else s for k, s in enumerate(level.size))
+    return replace(level, size=sizes)
+
+
+def start_search(
+    data: Data, settings: DiagnosisSettings, progress: Callable[[float], None]
+) -> Search:
+    """Candidates and signatures of a log."""
+    found = candidates(data.view, settings.exclude_effects)
+    rng = np.random.Generator(np.random.Philox(settings.seed))
+    shown = signatures(data.view, found)
+    return Search(data, settings, rng, found, shown, progress)
+
+
+def signature_of(data: Data, one: Acting) -> Array:
+    """Columns of one acting effect where it stands."""
+    at = {p.name: one.values[p.name] for p in one.effect.parameters if p.located}
+    return signature(data.view, Candidate(one.effect, one.sensor, one.stage), at)
