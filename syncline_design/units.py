@@ -3,118 +3,27 @@
 Grammar: `NUMBER UNIT`, as in `10 ns` or `77.9 deg/s`; where a tolerance is allowed also
 `NUMBER UNIT +/- NUMBER UNIT`, `NUMBER UNIT +/- NUMBER %` and `NUMBER UNIT .. NUMBER UNIT`.
 The table is closed: what it does not list is refused, with the nearest entry as a suggestion.
-Factors are the exact ones of the SI brochure (9th edition, tables 5 to 8); the degree uses pi
-to 60 digits.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from enum import Enum
 from fractions import Fraction
 from typing import Any, NoReturn
 
-PI = Fraction("3.141592653589793238462643383279502884197169399375105820974945")
+from syncline_design.unit_table import CURRENCIES as CURRENCIES
+from syncline_design.unit_table import DEG, LADDERS, SI_SUFFIX, SPELLINGS, SUFFIXES
+from syncline_design.unit_table import EXAMPLES as EXAMPLES
+from syncline_design.unit_table import PI as PI
+from syncline_design.unit_table import UNITS as UNITS
+from syncline_design.unit_table import Dimension as Dimension
 
 # Magnitudes outside this span (SI, zero excepted) are slips of the pen, and their squares and
 # products would leave the range of a float.
 SMALLEST, LARGEST = Fraction(1, 10**30), Fraction(10**30)
 MAX_NUMBER_LENGTH = 60
 
-
-class Dimension(Enum):
-    """What a figure measures; the value is the word for people."""
-
-    LENGTH = "length"
-    TIME = "time"
-    ANGLE = "angle"
-    SPEED = "speed"
-    ANGULAR_RATE = "angular rate"
-    MASS = "mass"
-    POWER = "power"
-    MONEY = "amount of money"
-    RATIO = "ratio"
-    FREQUENCY = "frequency"
-    ACCELERATION = "acceleration"
-    DIMENSIONLESS = "plain number"
-
-
-_D = Dimension
-_PREFIX = {
-    prefix: Fraction(10) ** power
-    for prefix, power in {
-        "p": -12, "n": -9, "u": -6, "\u00b5": -6, "\u03bc": -6, "m": -3, "c": -2, "": 0, "k": 3,
-        "M": 6, "G": 9,
-    }.items()
-}  # fmt: skip
-_MICRO = ("u", "\u00b5", "\u03bc")  # ASCII, the micro sign and the Greek letter
-_DEG = PI / 180
-CURRENCIES = ("EUR", "USD", "GBP", "NOK", "SEK", "DKK", "CHF", "CAD", "AUD", "JPY")
-
-
-def _prefixed(
-    dimension: Dimension, unit: str, prefixes: tuple[str, ...], factor: Fraction = Fraction(1)
-) -> dict[str, tuple[Dimension, Fraction]]:
-    return {prefix + unit: (dimension, _PREFIX[prefix] * factor) for prefix in prefixes}
-
-
-# unit -> (dimension, SI value of one unit)
-UNITS: dict[str, tuple[Dimension, Fraction]] = {
-    **_prefixed(_D.LENGTH, "m", ("n", *_MICRO, "m", "c", "", "k")),
-    "nmi": (_D.LENGTH, Fraction(1852)),
-    **_prefixed(_D.TIME, "s", ("p", "n", *_MICRO, "m", "")),
-    "min": (_D.TIME, Fraction(60)),
-    "h": (_D.TIME, Fraction(3600)),
-    "d": (_D.TIME, Fraction(86400)),
-    **_prefixed(_D.ANGLE, "rad", (*_MICRO, "m", "")),
-    **_prefixed(_D.ANGLE, "deg", ("m", ""), _DEG),
-    "arcmin": (_D.ANGLE, _DEG / 60),
-    "arcsec": (_D.ANGLE, _DEG / 3600),
-    **_prefixed(_D.SPEED, "m/s", (*_MICRO, "m", "c", "", "k")),
-    "km/h": (_D.SPEED, Fraction(1000, 3600)),
-    "kn": (_D.SPEED, Fraction(1852, 3600)),
-    **_prefixed(_D.ANGULAR_RATE, "rad/s", (*_MICRO, "m", "")),
-    **_prefixed(_D.ANGULAR_RATE, "deg/s", ("m", ""), _DEG),
-    "deg/min": (_D.ANGULAR_RATE, _DEG / 60),
-    "deg/h": (_D.ANGULAR_RATE, _DEG / 3600),
-    **_prefixed(_D.MASS, "g", ("m", "", "k"), Fraction(1, 1000)),
-    **_prefixed(_D.POWER, "W", (*_MICRO, "m", "", "k")),
-    **{currency: (_D.MONEY, Fraction(1)) for currency in CURRENCIES},
-    "%": (_D.RATIO, Fraction(1, 100)),
-    "ppm": (_D.RATIO, Fraction(1, 10**6)),
-    "ppb": (_D.RATIO, Fraction(1, 10**9)),
-    **_prefixed(_D.RATIO, "s/s", ("n", *_MICRO, "m")),
-    **_prefixed(_D.FREQUENCY, "Hz", ("m", "", "k", "M", "G")),
-    "m/s^2": (_D.ACCELERATION, Fraction(1)),
-    "m/s2": (_D.ACCELERATION, Fraction(1)),
-}
-
-EXAMPLES: dict[Dimension, str] = {
-    _D.LENGTH: "1.5 m",
-    _D.TIME: "10 ns",
-    _D.ANGLE: "0.1 deg",
-    _D.SPEED: "21 m/s",
-    _D.ANGULAR_RATE: "77.9 deg/s",
-    _D.MASS: "3 kg",
-    _D.POWER: "12 W",
-    _D.MONEY: "400 EUR",
-    _D.RATIO: "20 ppm",
-    _D.FREQUENCY: "10 Hz",
-    _D.ACCELERATION: "9.81 m/s^2",
-    _D.DIMENSIONLESS: "1.0",
-}
-
-# Spellings people use, for suggestions only.
-_SPELLINGS = {
-    "meter": "m", "metre": "m", "meters": "m", "metres": "m", "sec": "s", "second": "s",
-    "seconds": "s", "msec": "ms", "usec": "us", "nsec": "ns", "hr": "h", "hours": "h",
-    "degree": "deg", "degrees": "deg", "\u00b0": "deg", "\u00b0/s": "deg/s", "dps": "deg/s",
-    "degps": "deg/s", "radian": "rad", "radians": "rad", "radps": "rad/s", "mps": "m/s",
-    "kmh": "km/h", "kph": "km/h", "knot": "kn", "knots": "kn", "kt": "kn", "gram": "g",
-    "grams": "g", "kilogram": "kg", "watt": "W", "watts": "W", "hz": "Hz", "euro": "EUR",
-    "euros": "EUR", "\u20ac": "EUR", "$": "USD", "\u00a3": "GBP", "percent": "%",
-}  # fmt: skip
 
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _EXPONENT = re.compile(r"[eE]([-+]?[0-9]+)$")
@@ -223,7 +132,7 @@ def _shown(text: str) -> str:
 
 def parse_quantity(value: Any, dimension: Dimension, *, tolerance: bool = True) -> Quantity:
     """Read `NUMBER UNIT` of the wanted dimension into SI."""
-    if dimension is _D.DIMENSIONLESS and not isinstance(value, str):
+    if dimension is Dimension.DIMENSIONLESS and not isinstance(value, str):
         return plain_number(value)
     if not isinstance(value, str):
         raise _not_text(value, dimension)
@@ -233,7 +142,7 @@ def parse_quantity(value: Any, dimension: Dimension, *, tolerance: bool = True) 
     if found := _TOLERANCE.fullmatch(text):
         return _with_spread(text, found["nominal"], found["spread"], dimension, tolerance)
     exact, unit = _single(text, dimension)
-    return Quantity(exact, text, currency=unit if dimension is _D.MONEY else None)
+    return Quantity(exact, text, currency=unit if dimension is Dimension.MONEY else None)
 
 
 def expected_text(dimension: Dimension) -> str:
@@ -302,7 +211,7 @@ def _factor(unit: str, dimension: Dimension) -> Fraction:
 
 def suggest_unit(unit: str, dimension: Dimension) -> str | None:
     """The unit most likely meant, of the wanted dimension first."""
-    spelled = _SPELLINGS.get(unit.lower())
+    spelled = SPELLINGS.get(unit.lower())
     if spelled:
         return spelled
     wanted = [u for u, (d, _) in UNITS.items() if d is dimension and u.isascii()]
@@ -325,11 +234,11 @@ def _with_range(
 ) -> Quantity:
     _allow(tolerance, text)
     (low, unit), (high, high_unit) = _single(low_text, dimension), _single(high_text, dimension)
-    if dimension is _D.MONEY and unit != high_unit:
+    if dimension is Dimension.MONEY and unit != high_unit:
         raise UnitError("two currencies in one range", found=_shown(text))
     if low > high:
         raise UnitError("a range with its ends swapped", "LOW .. HIGH", _shown(text))
-    currency = unit if dimension is _D.MONEY else None
+    currency = unit if dimension is Dimension.MONEY else None
     return Quantity((low + high) / 2, text, (low, high), currency)
 
 
@@ -344,7 +253,7 @@ def _with_spread(
         spread = _single(spread_text, dimension)[0]
     if spread < 0:
         raise UnitError("a negative tolerance", "0 or more after +/-", _shown(text))
-    currency = unit if dimension is _D.MONEY else None
+    currency = unit if dimension is Dimension.MONEY else None
     return Quantity(nominal, text, (nominal - spread, nominal + spread), currency)
 
 
@@ -357,27 +266,12 @@ def plain_number(value: Any) -> Quantity:
         parse_number(value)
         raise UnitError("a number in quotes", expected, _shown(value), "unquote it")
     if not isinstance(value, int | float):
-        raise _not_text(value, _D.DIMENSIONLESS)
+        raise _not_text(value, Dimension.DIMENSIONLESS)
     text = getattr(value, "text", None) or repr(value)
     exact = parse_number(text)
     if exact and not SMALLEST <= abs(exact) <= LARGEST:
         raise UnitError("a magnitude outside 1e-30 to 1e30", expected, _shorten(text))
     return Quantity(exact, text)
-
-
-# Units that a result is shown in, smallest first.
-_LADDERS: dict[Dimension, tuple[str, ...]] = {
-    _D.LENGTH: ("nm", "um", "mm", "m", "km"),
-    _D.TIME: ("ps", "ns", "us", "ms", "s"),
-    _D.ANGLE: ("mdeg", "deg"),
-    _D.SPEED: ("um/s", "mm/s", "m/s"),
-    _D.ANGULAR_RATE: ("mdeg/s", "deg/s"),
-    _D.MASS: ("mg", "g", "kg"),
-    _D.POWER: ("uW", "mW", "W", "kW"),
-    _D.RATIO: ("ppb", "ppm", "%"),
-    _D.FREQUENCY: ("mHz", "Hz", "kHz", "MHz", "GHz"),
-    _D.ACCELERATION: ("m/s^2",),
-}
 
 
 def format_quantity(
@@ -392,18 +286,18 @@ def format_quantity(
         return "not a number"
     if math.isinf(si_value):
         return "unlimited" if si_value > 0 else "-unlimited"
-    if dimension is _D.MONEY:
+    if dimension is Dimension.MONEY:
         return f"{si_value:,.2f}".removesuffix(".00").replace(",", " ") + f" {currency}"
-    if dimension is _D.DIMENSIONLESS:
+    if dimension is Dimension.DIMENSIONLESS:
         return _figure(si_value, digits)
-    ladder = _LADDERS[dimension]
+    ladder = LADDERS[dimension]
     chosen = ladder[-1] if si_value == 0.0 else ladder[0]
     for unit in ladder:
         scaled = abs(si_value) / float(UNITS[unit][1])
         if float(f"{scaled:.{digits - 1}e}") >= 1.0:
             chosen = unit
     if si_value == 0.0:
-        chosen = next(u for u in reversed(ladder) if UNITS[u][1] in (1, _DEG, Fraction(1, 10**6)))
+        chosen = next(u for u in reversed(ladder) if UNITS[u][1] in (1, DEG, Fraction(1, 10**6)))
     return f"{_figure(si_value / float(UNITS[chosen][1]), digits)} {chosen}"
 
 
@@ -419,38 +313,11 @@ def _figure(value: float, digits: int) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-# Suffixes of column and parameter names; the first is the SI one of its dimension.
-_SUFFIXES: dict[str, str] = {
-    "_s": "s",
-    "_ms": "ms",
-    "_us": "us",
-    "_ns": "ns",
-    "_m": "m",
-    "_mm": "mm",
-    "_cm": "cm",
-    "_rad": "rad",
-    "_deg": "deg",
-    "_mps": "m/s",
-    "_radps": "rad/s",
-    "_degps": "deg/s",
-    "_mps2": "m/s^2",
-    "_ppm": "ppm",
-}
-_SI_SUFFIX = {
-    _D.TIME: "_s",
-    _D.LENGTH: "_m",
-    _D.ANGLE: "_rad",
-    _D.SPEED: "_mps",
-    _D.ANGULAR_RATE: "_radps",
-    _D.ACCELERATION: "_mps2",
-}
-
-
 def split_suffix(name: str) -> tuple[str, str]:
     """Stem and unit suffix of a name; the suffix is empty when there is none."""
     stem, underscore, tail = name.rpartition("_")
     suffix = underscore + tail
-    return (stem, suffix) if stem and suffix in _SUFFIXES else (name, "")
+    return (stem, suffix) if stem and suffix in SUFFIXES else (name, "")
 
 
 def suffix_unit(name: str) -> tuple[float, Dimension]:
@@ -458,7 +325,7 @@ def suffix_unit(name: str) -> tuple[float, Dimension]:
     _, suffix = split_suffix(name)
     if not suffix:
         return 1.0, Dimension.DIMENSIONLESS
-    dimension, factor = UNITS[_SUFFIXES[suffix]]
+    dimension, factor = UNITS[SUFFIXES[suffix]]
     return float(factor), dimension
 
 
@@ -467,4 +334,4 @@ def si_name(name: str) -> str:
     stem, suffix = split_suffix(name)
     if not suffix:
         return name
-    return stem + _SI_SUFFIX.get(UNITS[_SUFFIXES[suffix]][0], suffix if suffix != "_ppm" else "")
+    return stem + SI_SUFFIX.get(UNITS[SUFFIXES[suffix]][0], suffix if suffix != "_ppm" else "")

@@ -22,9 +22,11 @@ from typing import Any
 
 import yaml
 
+from syncline_design.yaml_scalars import Number as Number
+from syncline_design.yaml_scalars import plain_scalar as plain_scalar
+
 MAX_DEPTH = 64
 MAX_BYTES = 3 * 2**19  # 1.5 MiB: one MiB is honest work, two are not
-MAX_NUMBER_LENGTH = 60
 
 KeyPath = tuple[str | int, ...]
 Position = tuple[int, int]
@@ -33,28 +35,10 @@ _CParser: Any = None  # stays so where PyYAML was built without libyaml
 with suppress(ImportError):
     _CParser = importlib.import_module("yaml._yaml").CParser
 
-_INT = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
-_FLOAT = re.compile(r"[-+]?(?:(?:0|[1-9][0-9]*)(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?")
-_WORDS: dict[str, bool | None] = {
-    "": None, "~": None, "null": None, "Null": None, "NULL": None,
-    "true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False,
-}  # fmt: skip
 _BIDI = "\u202a-\u202e\u2066-\u2069"
 _SEPARATORS = "\x85\u2028\u2029"  # line breaks to YAML 1.1 only: positions would be off
 _RAW_REFUSED = re.compile(f"[\x00-\x08\x0b-\x1f\x7f-\x84\x86-\x9f\ufffe\uffff{_BIDI}{_SEPARATORS}]")
 _VALUE_REFUSED = re.compile(f"[\x00\ud800-\udfff\ufffe\uffff{_BIDI}]")
-
-
-class Number(float):
-    """A decimal number of a file: its value, and its text for exact work."""
-
-    __slots__ = ("text",)
-    text: str
-
-    def __new__(cls, text: str) -> Number:
-        self = super().__new__(cls, text)
-        self.text = text
-        return self
 
 
 @dataclass(frozen=True, slots=True)
@@ -413,24 +397,3 @@ class _Builder:
         context = getattr(error, "context", None)
         message = f"{context}: {problem}" if context else str(problem)
         self.refuse((), place, f"not YAML: {printable(message, 120)}")
-
-
-def plain_scalar(text: str) -> Any:
-    """Value of an unquoted scalar, YAML 1.2 core schema.
-
-    What that schema takes for a number but people do not mean as one (leading zeros, 0x, 0o, .inf,
-    .nan) or what no float holds stays text, so that a numeric field can say what is wrong with it.
-    """
-    if text in _WORDS:
-        return _WORDS[text]
-    if len(text) > MAX_NUMBER_LENGTH or text[0] not in "+-.0123456789":
-        return text
-    if _INT.fullmatch(text):
-        return int(text) if len(text) <= 18 else _number_or_text(text)
-    return _number_or_text(text) if _FLOAT.fullmatch(text) else text
-
-
-def _number_or_text(text: str) -> Number | str:
-    number = Number(text)
-    vanished = number == 0.0 and re.search(r"[1-9]", re.split("[eE]", text)[0])
-    return text if number in (float("inf"), float("-inf")) or vanished else number
