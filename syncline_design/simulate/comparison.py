@@ -16,6 +16,12 @@ from syncline_design.simulate.worst_case import WorstCase, worst_cases
 DEFAULT_GRID_S = tuple(float(f"{tau:.6g}") for tau in np.logspace(-6, 0, 25))
 CLOSE = 0.02  # a ratio this near to 1 needs no reason
 WORTH_SAYING = 0.005  # parts of the Syncline below this are left out of a reason
+CAUSES = {
+    "lever_arm": "lever arms swing with the turn, which the Syncline leaves out",
+    "chord": "a turn moves the object along a chord, shorter than the Syncline's arc",
+    "range_noise": "range noise acts along the line of sight, angular errors across it, so that "
+    "they do not add up as in the Syncline",
+}
 
 
 def comparison(
@@ -28,22 +34,24 @@ def comparison(
     """
     demand_simulable(system)
     found = worst_cases(system, np.asarray(taus_s, dtype=np.float64), seed)
-    return tuple(ComparisonRow(row, reason(system, row)) for row in found)
+    return tuple(ComparisonRow(row, *reason(system, row)) for row in found)
 
 
-def reason(system: System, found: WorstCase) -> str:
-    """In words: where the worst case leaves the Syncline and why."""
+def reason(system: System, found: WorstCase) -> tuple[str, tuple[str, ...]]:
+    """(words, causes): where the worst case leaves the Syncline and why."""
     if abs(found.ratio - 1.0) <= CLOSE:
-        return f"within {100 * CLOSE:g} % of the Syncline"
-    parts = _parts(system, found)
-    told = [text for share, text in sorted(parts, reverse=True) if share > WORTH_SAYING]
+        return f"within {100 * CLOSE:g} % of the Syncline", ()
+    parts = sorted(_parts(system, found), reverse=True)
+    told = [(cause, text) for share, cause, text in parts if share > WORTH_SAYING]
     side = "above" if found.ratio > 1.0 else "below"
-    size = f"{100 * abs(found.ratio - 1.0):.1f} % {side} the Syncline"
-    return f"{size}: {'; '.join(told)}" if told else size
+    words = f"{100 * abs(found.ratio - 1.0):.1f} % {side} the Syncline"
+    if told:
+        words += f": {'; '.join(text for _, text in told)}"
+    return words, tuple(cause for cause, _ in told)
 
 
-def _parts(system: System, found: WorstCase) -> list[tuple[float, str]]:
-    """(share of the Syncline, sentence) of everything that makes the two differ."""
+def _parts(system: System, found: WorstCase) -> list[tuple[float, str, str]]:
+    """(share of the Syncline, cause, sentence) of everything that makes the two differ."""
     bounds = chain_bounds(system, found.tau_s)
     whole = found.syncline_m if found.syncline_m > 0.0 else 1.0
     lever = math.fsum(part.lever_arm_m for part in bounds) / whole
@@ -51,17 +59,13 @@ def _parts(system: System, found: WorstCase) -> list[tuple[float, str]]:
     lost = math.fsum(_lost_range(part) for part in bounds) / whole
     turn = max(stage.platform.omega_max_radps for stage in system.stages) * found.tau_s
     return [
-        (lever, f"lever arms swing with the turn and add up to {100 * lever:.1f} %"),
+        (lever, "lever_arm", f"{CAUSES['lever_arm']} (up to {100 * lever:.1f} %)"),
         (
             bent,
-            f"a turn by {math.degrees(turn):.0f} deg moves the object along a chord, shorter than "
-            f"its arc by {100 * bent:.1f} %",
+            "chord",
+            f"{CAUSES['chord']} (a turn of {math.degrees(turn):.0f} deg, {100 * bent:.1f} %)",
         ),
-        (
-            lost,
-            "range noise acts along the line of sight, angular errors across it, so they do not "
-            f"add up, which takes {100 * lost:.1f} %",
-        ),
+        (lost, "range_noise", f"{CAUSES['range_noise']} ({100 * lost:.1f} %)"),
     ]
 
 

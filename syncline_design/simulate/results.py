@@ -107,10 +107,15 @@ class MonteCarlo:
 
 @dataclass(frozen=True, slots=True)
 class ComparisonRow:
-    """The worst case against the Syncline at one tau, and in words why the ratio is what it is."""
+    """The worst case against the Syncline at one tau, and in words why the ratio is what it is.
+
+    causes: of `lever_arm`, `chord`, `range_noise`, those that matter, strongest first; empty
+    where the ratio is near 1.
+    """
 
     worst_case: WorstCase
     reason: str
+    causes: tuple[str, ...] = ()
 
     def to_json(self) -> Json:
         found = self.worst_case
@@ -122,6 +127,7 @@ class ComparisonRow:
             "bound_m": found.bound_m,
             "gap": found.gap,
             "reason": self.reason,
+            "causes": list(self.causes),
         }
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+
 from syncline_design.model.system import System
-from syncline_design.simulate.results import MonteCarlo, SimulationResult
+from syncline_design.simulate.comparison import CAUSES
+from syncline_design.simulate.results import ComparisonRow, MonteCarlo, SimulationResult
 
 ENVELOPE_WORDS = {
     "limits": "speed and turn rate at their limits, directions free",
@@ -72,15 +75,33 @@ def _worst_case_lines(result: SimulationResult) -> list[str]:
 def _grid_lines(result: SimulationResult) -> list[str]:
     lines = [
         f"Over tau (tau_crit = {duration(result.tau_crit_s)}):",
-        f"  {'tau':>10}  {'worst case':>12}  {'Syncline':>12}  {'ratio':>7}  why",
+        f"  {'tau':>10}  {'worst case':>12}  {'Syncline':>12}  {'ratio':>7}",
     ]
     for row in result.grid:
         found = row.worst_case
         lines.append(
             f"  {duration(found.tau_s):>10}  {length(found.value_m):>12}  "
-            f"{length(found.syncline_m):>12}  {found.ratio:7.4f}  {row.reason}"
+            f"{length(found.syncline_m):>12}  {found.ratio:7.4f}"
         )
-    return lines
+    return [*lines, *_cause_lines(result.grid)]
+
+
+def _cause_lines(grid: tuple[ComparisonRow, ...]) -> list[str]:
+    """Runs of neighbouring taus whose ratio leaves 1 for the same main cause, each in words."""
+    lines = []
+    for cause, run in groupby(grid, key=lambda row: row.causes[0] if row.causes else ""):
+        rows = list(run)
+        if not cause:
+            continue
+        ratios = [row.worst_case.ratio for row in rows]
+        taus = _span(duration(rows[0].worst_case.tau_s), duration(rows[-1].worst_case.tau_s))
+        span = _span(f"{min(ratios):.3f}", f"{max(ratios):.3f}")
+        lines.append(f"  {taus}, ratio {span}: {CAUSES[cause]}")
+    return ["Where it leaves 1 by more than 2 %, and why:", *lines] if lines else []
+
+
+def _span(first: str, last: str) -> str:
+    return first if first == last else f"{first} to {last}"
 
 
 def grid_csv(result: SimulationResult) -> str:
