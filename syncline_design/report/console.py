@@ -80,14 +80,8 @@ def _resource(design: Data, key: str, dimension: Dimension) -> str | None:
     if value is None:
         return None
     if dimension is Dimension.MONEY:
-        return money(value, design["currency"])
+        return format_quantity(value, dimension, currency=design["currency"])
     return format_quantity(value, dimension)
-
-
-def money(value: float, currency: str) -> str:
-    """Whole amounts without cents, others with two, thousands apart: `41 500 EUR`."""
-    figure = f"{value:,.0f}" if float(value).is_integer() else f"{value:,.2f}"
-    return f"{figure.replace(',', ' ')} {currency}"
 
 
 def _design(data: Data) -> list[str]:
@@ -165,7 +159,7 @@ def _figure(kind: str, value: float | None, unit: str) -> str:
     if kind == "sync":
         return f"{value:.4g}"
     if kind == "cost":
-        return money(value, unit)
+        return format_quantity(value, Dimension.MONEY, currency=unit)
     return format_quantity(value, DIMENSIONS[kind])
 
 
@@ -248,7 +242,11 @@ def _monte_carlo(data: Data) -> list[str]:
     mc = data.get("monte_carlo")
     if not mc:
         return []
-    lines = [f"Monte Carlo on the nonlinear chain ({mc['samples']} samples, seed {mc['seed']})"]
+    lines = [
+        f"Monte Carlo on the nonlinear chain ({mc['samples']} samples, seed {mc['seed']}); noise is"
+        " Gaussian, so single",
+        "  errors do exceed the Syncline, which adds one-sigma magnitudes: no contradiction",
+    ]
     rows = [
         [
             f"{percent(float(q))} quantile",

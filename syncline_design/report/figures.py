@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 540.0  # SVG units; shown near their size on a desk, still readable on a phone
+WIDTH = 440.0  # SVG units; shown near their size on a desk, still readable on a phone
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +70,7 @@ def syncline(
         _syncline_labels(axes)
         return axes
 
-    return draw(name, title, _describe(curve), (WIDTH, 372.0), build)
+    return draw(name, title, _describe(curve), (WIDTH, 318.0), build)
 
 
 def _set_accuracy_limits(axes: Axes, curve: SynclineCurve, worst_m: float) -> None:
@@ -234,7 +234,7 @@ def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineFigure:
         for b in bars
     )
     title = "Timestamp error of each sensor against its tau_crit"
-    return draw(name, title, spoken, (WIDTH, 64.0 + 27.0 * len(bars)), build)
+    return draw(name, title, spoken, (WIDTH, 60.0 + 26.0 * len(bars)), build)
 
 
 def _tau_row(axes: Axes, row: int, bar: TauBar, low: float, high: float) -> None:
@@ -303,14 +303,14 @@ def ledger(
     spoken += f"; total {numbers.length(total)}"
     if target_m:
         spoken += f"; target {numbers.length(target_m)}"
-    size = (WIDTH, 70.0 + 23.0 * (len(terms) + 1))
+    size = (WIDTH, 66.0 + 22.0 * (len(terms) + 1))
     return draw(name, "Terms that add up to the total error", spoken, size, build)
 
 
 def _beside(axes: Axes, x: float, row: float, text: str) -> None:
     axes.annotate(
         text, (x, row), xytext=(5, 0), textcoords="offset points", va="center", color=INK,
-        zorder=5,
+        zorder=5, bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.5},
     )  # fmt: skip
 
 
@@ -332,7 +332,7 @@ def _length_ticks(axes: Axes) -> None:
     """Linear ticks in the unit ladder of the axis's end."""
     from matplotlib.ticker import MaxNLocator
 
-    ticks = [float(t) for t in MaxNLocator(6).tick_values(*axes.get_xlim())]
+    ticks = [float(t) for t in MaxNLocator(5).tick_values(*axes.get_xlim())]
     high = axes.get_xlim()[1]
     scales.set_ticks(
         axes,

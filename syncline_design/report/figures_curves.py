@@ -63,7 +63,7 @@ def synclines(
         axes.legend(loc="lower right", fontsize=9, handlelength=3.2)
         return axes
 
-    return draw(name, title, _spoken(curves, simulated), (WIDTH, 340.0), build)
+    return draw(name, title, _spoken(curves, simulated), (WIDTH, 300.0), build)
 
 
 def letters(curves: Sequence[LabelledCurve]) -> list[str]:

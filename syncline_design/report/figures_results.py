@@ -58,7 +58,7 @@ def error_histogram(data: Histogram, name: str = "fig-mc") -> InlineFigure:
     for word, value in (("target", data.target_m), ("Syncline", data.syncline_m)):
         if value is not None:
             spoken += f"; {word} at {numbers.length(value)}"
-    return draw(name, "Distribution of the simulated error", spoken, (WIDTH, 290.0), build)
+    return draw(name, "Distribution of the simulated error", spoken, (WIDTH, 250.0), build)
 
 
 def _vertical_marks(
@@ -91,7 +91,7 @@ def _plain_length_axis(axes: Axes) -> None:
     from matplotlib.ticker import MaxNLocator
 
     low, high = axes.get_xlim()
-    places = [float(t) for t in MaxNLocator(6).tick_values(low, high) if low <= t <= high]
+    places = [float(t) for t in MaxNLocator(5).tick_values(low, high) if low <= t <= high]
     scales.set_ticks(axes, "x", places, lambda v: "0" if v == 0 else scales.short_length(v))
     scales.grid(axes, "x")
 
@@ -146,7 +146,7 @@ def simulated_against_syncline(
             f"{numbers.percent(min(ratios))} to {numbers.percent(max(ratios))} of the Syncline."
         )
     heading = title or "Simulated worst case against the Syncline"
-    return draw(name, heading, spoken, (WIDTH, 400.0), build)
+    return draw(name, heading, spoken, (WIDTH, 360.0), build)
 
 
 @dataclass(frozen=True, slots=True)
@@ -204,15 +204,15 @@ def pareto_front(
             spoken += (
                 f" Chosen: {numbers.money(point.cost, currency)}, {numbers.length(point.error_m)}."
             )
-    return draw(name, "Pareto front of cost against error", spoken, (WIDTH, 330.0), build)
+    return draw(name, "Pareto front of cost against error", spoken, (WIDTH, 290.0), build)
 
 
 def _limits(axes: Axes, target_m: float | None, cost_limit: float | None, currency: str) -> None:
     if target_m:
         axes.axhline(target_m, color=WARN, linewidth=1.6)
-        axes.annotate(f"target {numbers.length(target_m, 4)}", (1, target_m),
-                      xycoords=("axes fraction", "data"), xytext=(-4, 4),
-                      textcoords="offset points", ha="right", color=WARN)  # fmt: skip
+        axes.annotate(f"target {numbers.length(target_m, 4)}", (0, target_m),
+                      xycoords=("axes fraction", "data"), xytext=(4, -4),
+                      textcoords="offset points", va="top", color=WARN)  # fmt: skip
     if cost_limit:
         axes.axvline(cost_limit, color=WARN, linewidth=1.6, linestyle=(0, (5, 3)))
         axes.annotate(f"limit {numbers.money(cost_limit, currency)}", (cost_limit, 1),
@@ -224,5 +224,5 @@ def _money_ticks(axes: Axes) -> None:
     from matplotlib.ticker import MaxNLocator
 
     low, high = axes.get_xlim()
-    places = [float(t) for t in MaxNLocator(5).tick_values(low, high) if low <= t <= high]
+    places = [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]
     scales.set_ticks(axes, "x", places, numbers.count)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,17 +51,18 @@ def render_verdict(verdict: Json) -> str:
         name=str(part(verdict, "spec").get("name") or "Unnamed system"),
         sentence=verdict_words.design_sentence(verdict),
         key_facts=_key_facts(verdict),
-        figures={key: _drawing(drawn.get(key)) for key in _FIGURES},
+        figures={key: drawing(drawn.get(key)) for key in _FIGURES},
         box=drawn["syncline"].box if "syncline" in drawn else None,
         numbers=numbers,
         explorer=_explorer(verdict),
         syncline_facts=_syncline_facts(verdict),
-        simulation_facts=_simulation_facts(verdict),
+        simulation_facts=simulation_facts(verdict),
         proof=_proof(verdict),
     )
 
 
-def _drawing(figure: InlineFigure | None) -> Any:
+def drawing(figure: InlineFigure | None) -> Any:
+    """A figure as ready HTML, None as None."""
     return None if figure is None else page.trusted_svg(figure.svg)
 
 
@@ -154,7 +154,7 @@ def _key_facts(verdict: Json) -> list[tuple[str, str]]:
         facts.append(("Worst-case error", total + of))
     row = verdict_words.tightest(items(verdict, "requirements"))
     if row is not None:
-        facts.append(("Tightest margin", f"{verdict_words.margin_text(row)} ({row.get('id')})"))
+        facts.append(("Tightest margin", f"{row.get('id')}: {verdict_words.margin_text(row)}"))
     probability = numbers.finite(
         part(part(verdict, "monte_carlo"), "probability_within_target").get("value")
     )
@@ -181,7 +181,8 @@ def _syncline_facts(verdict: Json) -> list[tuple[str, str]]:
     return facts
 
 
-def _simulation_facts(verdict: Json) -> list[tuple[str, str]]:
+def simulation_facts(verdict: Json) -> list[tuple[str, str]]:
+    """Samples, envelope, probability and worst case of a Monte Carlo part."""
     monte_carlo = part(verdict, "monte_carlo")
     facts = [
         ("Samples", numbers.count(monte_carlo.get("samples"))),
@@ -213,11 +214,18 @@ def _proof(verdict: Json) -> str:
     methods = {"front": "the exact Pareto front", "milp": "an integer program",
                "enumeration": "enumeration of all designs"}  # fmt: skip
     method = methods.get(str(proof.get("method")), str(proof.get("method")))
-    combinations = numbers.finite(proof.get("combinations"))
-    among = f" among {numbers.count(combinations)} combinations" if combinations else ""
+    combinations = str(part(verdict, "spec").get("combinations") or "")
+    among = f" among {_grouped(combinations)} combinations" if combinations.isdigit() else ""
     optimal = "proven optimal" if proof.get("optimal") else "not proven optimal"
     checked = ", recomputed exactly afterwards" if proof.get("rechecked") else ""
     return f"Found by {method}{among}: {optimal}{checked}."
+
+
+def _grouped(digits: str) -> str:
+    """Digits of a whole number of any size, in groups of three; rounded beyond 15 of them."""
+    if len(digits) > 15:
+        return f"{digits[0]}.{digits[1:3]}e{len(digits) - 1}"
+    return f"{int(digits):,}".replace(",", "\N{NO-BREAK SPACE}")
 
 
 def accuracy_target(verdict: Json) -> float | None:
@@ -260,7 +268,7 @@ def _figures(verdict: Json) -> dict[str, InlineFigure]:
     terms = _ledger_terms(verdict)
     if terms:
         drawn["ledger"] = figures.ledger(terms, target)
-    drawn |= _simulation_figures(verdict, target)
+    drawn |= simulation_figures(verdict, target)
     front = _front(verdict)
     if len(front) > 1:
         cost_limit = _limit(verdict, "cost")
@@ -286,7 +294,7 @@ def _ledger_terms(verdict: Json) -> list[figures.LedgerTerm]:
     return [
         figures.LedgerTerm(
             (f"{shortened(str(entry['stage']), 14)}: " if many and entry.get("stage") else "")
-            + shortened(str(entry.get("term"))),
+            + shortened(verdict_words.term_text(entry)),
             value,
             str(entry.get("kind")),
         )
@@ -295,7 +303,8 @@ def _ledger_terms(verdict: Json) -> list[figures.LedgerTerm]:
     ]
 
 
-def _simulation_figures(verdict: Json, target: float | None) -> dict[str, InlineFigure]:
+def simulation_figures(verdict: Json, target: float | None) -> dict[str, InlineFigure]:
+    """Histogram and grid, where the data are there; the grid may stand beside `monte_carlo`."""
     drawn: dict[str, InlineFigure] = {}
     monte_carlo = part(verdict, "monte_carlo")
     histogram = part(monte_carlo, "histogram")
@@ -312,7 +321,7 @@ def _simulation_figures(verdict: Json, target: float | None) -> dict[str, Inline
         drawn["histogram"] = figures_results.error_histogram(
             figures_results.Histogram(tuple(known), tuple(density), marks, target, total)
         )
-    points = grid_points(items(monte_carlo, "grid"))
+    points = grid_points(items(monte_carlo, "grid") or items(verdict, "grid"))
     if len(points) > 1:
         drawn["grid"] = figures_results.simulated_against_syncline(points)
     return drawn
@@ -331,15 +340,11 @@ def grid_points(rows: list[Json]) -> list[figures_results.GridPoint]:
 
 
 def _front(verdict: Json) -> list[figures_results.FrontPoint]:
-    cost = numbers.finite(part(verdict, "design").get("cost"))
-    total = numbers.finite(part(verdict, "syncline").get("total_m"))
     points = []
     for entry in items(part(verdict, "choice"), "front"):
         price, error = numbers.finite(entry.get("cost")), numbers.finite(entry.get("error_m"))
         if price is not None and error:
-            chosen = (
-                price == cost and total is not None and math.isclose(error, total, rel_tol=1e-6)
-            )
+            chosen = verdict_tables.is_chosen(verdict, entry)
             points.append(figures_results.FrontPoint(price, error, chosen))
     return sorted(points, key=lambda point: point.cost)
 

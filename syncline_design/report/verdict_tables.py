@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 from syncline_design.report import numbers
-from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.tables import Cell, Table, Tone, table
 from syncline_design.report.verdict_words import (
     PRIMITIVES,
     Json,
@@ -17,6 +18,7 @@ from syncline_design.report.verdict_words import (
     relative_margin,
     selection_reason,
     status_of,
+    term_text,
     value_text,
     waiver_text,
 )
@@ -139,7 +141,7 @@ def ledger(verdict: Json) -> Table:
     words = {"sensor": "sensor", "sync": "synchronisation", "systematic": "known effect"}
     rows = [
         (
-            str(entry.get("term")),
+            term_text(entry),
             str(entry.get("stage") or ""),
             words.get(str(entry.get("kind")), str(entry.get("kind"))),
             Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
@@ -191,16 +193,27 @@ def quantiles(verdict: Json) -> Table:
     return table("Quantiles of the simulated error", heads, rows)
 
 
+def is_chosen(verdict: Json, entry: Json) -> bool:
+    """Whether a point of the front is the chosen design: same price, same error."""
+    cost = numbers.finite(part(verdict, "design").get("cost"))
+    total = numbers.finite(part(verdict, "syncline").get("total_m"))
+    error = numbers.finite(entry.get("error_m"))
+    if cost is None or total is None or error is None or entry.get("cost") != cost:
+        return False
+    return math.isclose(error, total, rel_tol=1e-6)
+
+
 def priced(verdict: Json, key: str, caption: str, error_head: str) -> Table | None:
     """A list of designs with price and error: the front, the staircase, the next best."""
     currency = currency_of(verdict)
     rows = []
     for entry in items(part(verdict, "choice"), key):
         error = entry.get("error_m", entry.get("limit_m"))
+        shown: tuple[str, Tone] = ("\u25c6", "good") if is_chosen(verdict, entry) else ("", "")
         rows.append((
             Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
             Cell(numbers.length(error), numbers.finite(error)),
-            design_text(entry.get("design")),
+            Cell(design_text(entry.get("design")), tone=shown[1], mark=shown[0]),
         ))  # fmt: skip
     return table(caption, ("Cost #", error_head, "Design"), rows) if rows else None
 
@@ -235,17 +248,15 @@ def excluded(verdict: Json) -> Table | None:
 
 
 def assumptions(verdict: Json) -> Table | None:
-    """Figures without a public source that this verdict rests on."""
+    """Figures without a public source that this verdict rests on, a row per catalog entry."""
+    figures: dict[tuple[str, str], list[str]] = {}
+    for entry in items(verdict, "assumptions"):
+        key = (str(entry.get("entry")), str(entry.get("note") or ""))
+        figures.setdefault(key, []).append(f"{entry.get('figure')} {entry.get('value')}")
     rows = [
-        (
-            Cell(str(entry.get("entry")), code=True),
-            str(entry.get("figure")),
-            str(entry.get("value")),
-            str(entry.get("note") or ""),
-        )
-        for entry in items(verdict, "assumptions")
+        (Cell(name, code=True), "; ".join(values), note) for (name, note), values in figures.items()
     ]
-    heads = ("Entry", "Figure", "Value", "Note")
+    heads = ("Entry", "Assumed figures", "Note")
     return table("Assumptions: figures without a public source", heads, rows) if rows else None
 
 

@@ -43,6 +43,14 @@ KINDS: Final[dict[str, str]] = {
     "power": "power",
     "monte_carlo": "simulated error, quantile",
 }
+TERMS: Final[dict[str, str]] = {
+    "sigma_p": "position noise \u03c3_p",
+    "sigma_Theta*d": "attitude noise \u03c3_\u0398\u00b7d",
+    "sigma_r": "range noise \u03c3_r",
+    "sigma_u*d": "bearing noise \u03c3_u\u00b7d",
+    "v_max*tau": "translation v_max\u00b7\u03c4",
+    "d*omega_max*tau": "rotation d\u00b7\u03c9_max\u00b7\u03c4",
+}
 PRIMITIVES: Final[dict[str, str]] = {
     "pps": "1PPS input",
     "network": "network time",
@@ -140,6 +148,12 @@ def tightest(rows: list[Json]) -> Json | None:
     return min(known, key=lambda row: relative_margin(row) or 0.0) if known else None
 
 
+def term_text(entry: Json) -> str:
+    """A ledger term in words with its symbol; an unknown one as it stands."""
+    term = str(entry.get("term"))
+    return TERMS.get(term, term)
+
+
 def role_phrase(entry: Json) -> str:
     """`SBG Apogee (1PPS input, timer capture)`."""
     primitive = PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive")))
@@ -188,8 +202,8 @@ def _no_design_sentence(verdict: Json) -> str:
 
 def selection_reason(verdict: Json, stage: str, role: str) -> str:
     """Why this option stands in the design: pinned, or chosen among how many."""
-    open_roles = {str(name) for name in part(verdict, "spec").get("open_roles") or []}
-    if not {f"{stage}.{role}", f"stages[{stage}].{role}", f"{stage} {role}"} & open_roles:
+    open_roles = part(verdict, "spec").get("open_roles")
+    if not isinstance(open_roles, list) or f"{stage}.{role}" not in open_roles:
         return "pinned in the spec"
     objective = str(part(verdict, "spec").get("objective") or "cost")
     word = {"error": "smallest error", "cost": "least cost", "mass": "least mass",
