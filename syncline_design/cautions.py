@@ -106,4 +106,4 @@ def _assumptions(assumed: Sequence[Mapping[str, Any]]) -> Iterator[Caution]:
     for one in assumed:
         by_entry.setdefault(str(one["entry"]), []).append(str(one["figure"]))
     for entry, figures in by_entry.items():
-        yield "assumption", f"{entry}: {', '.join(figures)} assumed, no public source"
+        yield "assumption", f"assumption, no public source: {', '.join(figures)} of {entry}"

@@ -10,7 +10,7 @@ from typing import Any
 
 from syncline_design import __version__
 from syncline_design.cautions import cautions
-from syncline_design.choice_data import choice_json
+from syncline_design.choice_data import choice_json, excluded_json
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
@@ -37,6 +37,7 @@ from syncline_design.verdict import (
     SCHEMA,
     UNITS,
     RequirementResult,
+    Status,
     Verified,
     syncline_json,
 )
@@ -133,9 +134,7 @@ def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSetti
         lambda design: verify(loaded, problem, design, settings),
     )
     if picked.verified is None:
-        data = _frame(loaded, problem, "infeasible", settings)
-        data["infeasibility"] = explain_json(loaded, problem, picked.choice)
-        return data
+        return _infeasible_json(loaded, problem, settings)
     choice = choice_json(loaded, problem, picked, known_of(loaded))
     data = _verdict_json(loaded, problem, picked.verified, settings, choice)
     if picked.verified.word != "meets" and not picked.exhausted:
@@ -143,6 +142,37 @@ def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSetti
     if picked.passed_over:
         data["warnings"].insert(0, _passed_over(picked))
     return data
+
+
+def _infeasible_json(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
+    """Why there is no design, and which single changes would help."""
+    from syncline_design.choose.explain import explain
+
+    known = known_of(loaded)
+    found = explain(
+        loaded, problem, lambda spec: build_problem(spec, known.extra_tau_s, known.systematic)
+    )
+    data = _frame(loaded, problem, "infeasible", settings)
+    data["infeasibility"] = found.to_json() | {"text": found.lines()}
+    conflict = {member.id for member in found.conflict}
+    data["requirements"] = [
+        _placed(loaded, index, one, _unmet(loaded, one, one.id in conflict), settings).to_json()
+        for index, one in enumerate(loaded.spec.requirements)
+    ]
+    data["choice"] = {"excluded": excluded_json(problem)}
+    return data
+
+
+def _unmet(loaded: LoadedSpec, one: Requirement, in_conflict: bool) -> RequirementResult:
+    """A requirement of a spec without a design: part of the conflict, or not reached."""
+    unit = UNITS.get(one.kind, loaded.spec.currency)
+    quantile = None if one.quantile is None else float(one.quantile)
+    status: Status = "fail" if in_conflict else "indeterminate"
+    note = "part of the conflict" if in_conflict else "no design to judge it by"
+    limit = float(one.limit)
+    return RequirementResult(
+        one.id, one.kind, status, None, limit, unit, quantile=quantile, note=note
+    )
 
 
 def _passed_over(picked: Picked) -> Json:
@@ -358,7 +388,11 @@ def _frame(loaded: LoadedSpec, problem: DesignProblem, word: str, settings: Chec
             "sync_model": spec.sync_model,
             "objective": spec.objective,
             "coverage_factor": float(spec.coverage_factor),
-            "open_roles": sum(len(table.options) > 1 for table in problem.roles),
+            "open_roles": [
+                f"{table.stage_name}.{table.role}"
+                for table in problem.roles
+                if len(table.options) + len(table.excluded) > 1
+            ],
             "combinations": str(problem.combinations),
             "stages": stages,
         },
