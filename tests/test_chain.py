@@ -139,7 +139,9 @@ def drawn(system, index: int = 0, inside: bool = False, count: int = 2000, seed:
 
 @pytest.mark.parametrize("scale", [0.0, 1.0, 1e3, 3e4])
 @pytest.mark.parametrize("inside", [False, True])
-@pytest.mark.parametrize("system", [fixed_wing(), survey(), position_only()], ids=str)
+@pytest.mark.parametrize(
+    "system", [fixed_wing(), survey(), position_only()], ids=["wing", "survey", "car"]
+)
 def test_kernel_agrees_with_chain(system, inside: bool, scale: float) -> None:
     for index, stage in enumerate(system.stages):
         draw = drawn(system, index, inside)
@@ -266,7 +268,7 @@ def test_nothing_moves_without_velocity_and_rate(shift_s: float) -> None:
     np.testing.assert_array_less(np.abs(error_of(rows, shift_s, -shift_s)), 1e-14)
 
 
-@pytest.mark.parametrize("system", [fixed_wing(), survey()], ids=str)
+@pytest.mark.parametrize("system", [fixed_wing(), survey()], ids=["wing", "survey"])
 def test_no_shift_and_no_noise_is_no_error(system) -> None:
     draw = drawn(system)
     for field in (draw.mu_position_s, draw.mu_attitude_s, draw.mu_ranging_s):
