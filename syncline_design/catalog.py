@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
-from syncline_design.units import Dimension
+from syncline_design.units import Dimension, Quantity
 from syncline_design.values import (
     AngularRate,
     AtLeastOne,
@@ -30,6 +30,9 @@ from syncline_design.values import (
     axes,
     did_you_mean,
     kind_of,
+    quantity_schema,
+    read_list,
+    read_quantity,
     refusal,
     refusals,
 )
@@ -170,11 +173,18 @@ class ConstantError(Record):
     calibrated: NonNegativeTime | None = None
 
 
+def _read_times(value: Any) -> tuple[Quantity, ...]:
+    return read_list(value, "times", lambda item: read_quantity(item, Dimension.TIME))
+
+
+_TIMES_SCHEMA = {"type": "array", "items": quantity_schema(Dimension.TIME), "minItems": 1}
+
+
 class EmpiricalError(Record):
     """Measured values, given here or in a file (one per line) whose values loading puts here."""
 
     distribution: Literal["empirical"]
-    values: tuple[Time, ...] | None = None
+    values: Annotated[tuple[float, ...], Reader(_read_times, _TIMES_SCHEMA)] | None = None
     file: str | None = None
     calibrated: NonNegativeTime | None = None
 
@@ -182,8 +192,6 @@ class EmpiricalError(Record):
     def _has_values(self) -> EmpiricalError:
         if self.values is None and self.file is None:
             raise refusals([(("values",), refusal("missing", "values, or a file with values"))])
-        if self.values is not None and not self.values:
-            raise refusals([(("values",), refusal("an empty list", "at least one value"))])
         return self
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import islice
 from typing import Any
 
 from syncline_design.catalog import Catalog, SensorEntry
@@ -23,7 +24,7 @@ from syncline_design.spec import (
     StageChoice,
 )
 from syncline_design.units import Quantity
-from syncline_design.values import did_you_mean
+from syncline_design.values import MAX_SUGGESTIONS, did_you_mean
 from syncline_design.yaml_reader import Document, KeyPath, Problem
 
 _WORDS = {
@@ -37,11 +38,12 @@ _WORDS = {
 
 def unknown_ids(spec: Document, collection: Collection) -> list[Problem]:
     """Ids that no catalog has; looked for in the raw data, so that other errors don't hide them."""
-    problems = [
-        _unknown(spec, path, section, identity, collection)
+    unknown = (
+        (path, section, identity)
         for section, path, identity in _spec_ids(spec.data)
         if (section, identity) not in collection.origins
-    ]
+    )
+    problems = [_unknown(spec, *item, collection) for item in islice(unknown, MAX_SUGGESTIONS)]
     for document, path in collection.documents.values():
         requires = _at(document.data, (*path, "requires"))
         for identity in requires if isinstance(requires, dict) else ():

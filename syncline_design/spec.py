@@ -362,11 +362,11 @@ Located = tuple[Loc, PydanticCustomError]
 
 def _duplicates(section: str, key: str, names: list[str]) -> list[Located]:
     errors: list[Located] = []
+    first: dict[str, int] = {}
     for index, name in enumerate(names):
-        first = names.index(name)
-        if first < index:
-            error = refusal(f"used twice: {name}, first in {section}[{first}]", "each one once")
-            errors.append(((section, index, key), error))
+        if first.setdefault(name, index) < index:
+            message = f"used twice: {name}, first in {section}[{first[name]}]"
+            errors.append(((section, index, key), refusal(message, "each one once")))
     return errors
 
 

@@ -35,6 +35,7 @@ from syncline_design.units import (
 T = TypeVar("T")
 R = TypeVar("R", bound="Record")
 Loc = tuple[str | int, ...]
+MAX_SUGGESTIONS = 50  # of one record or list: more errors than that are no typing slips
 
 
 def refusal(
@@ -97,17 +98,20 @@ class Record(BaseModel):
             details = error.errors(include_url=False)
             if not any(d["type"] == "extra_forbidden" and len(d["loc"]) == 1 for d in details):
                 raise
-            known = [field.alias or name for name, field in cls.model_fields.items()]
-            raise ValidationError.from_exception_data(
-                cls.__name__, [_restated(dict(d), known) for d in details]
-            ) from None
+            known = list(cls.model_fields)
+            restated = [
+                _restated(dict(d), known, suggest=index < MAX_SUGGESTIONS)
+                for index, d in enumerate(details)
+            ]
+            raise ValidationError.from_exception_data(cls.__name__, restated) from None
 
 
-def _restated(detail: dict[str, Any], known: list[str]) -> InitErrorDetails:
+def _restated(detail: dict[str, Any], known: list[str], *, suggest: bool) -> InitErrorDetails:
     """The same error again; an unknown key of this record with the keys it might have meant."""
     kind, loc, context = detail["type"], detail["loc"], detail.get("ctx", {})
     if kind == "extra_forbidden" and len(loc) == 1:
-        hint = did_you_mean(str(loc[0]), known) or f"known keys: {', '.join(known)}"
+        hint = did_you_mean(str(loc[0]), known) if suggest else ""
+        hint = hint or f"known keys: {', '.join(known)}"
         error = PydanticCustomError("unknown_key", "{message}", {"message": "", "hint": hint})
         return InitErrorDetails(type=error, loc=loc, input=detail["input"])
     if kind in ("refused", "unknown_key"):
@@ -256,9 +260,20 @@ def _each(values: Iterable[Any], read: Callable[[Any], T]) -> list[T]:
             items.append(read(value))
         except PydanticCustomError as error:
             errors.append(((index,), error))
+            if len(errors) == MAX_SUGGESTIONS:
+                break
     if errors:
         raise refusals(errors)
     return items
+
+
+def read_list(value: Any, what: str, read: Callable[[Any], T]) -> tuple[T, ...]:
+    """A list of at least one item."""
+    if not isinstance(value, tuple | list):
+        raise refusal(f"not a list of {what}", "a list", kind_of(value))
+    if not value:
+        raise refusal("an empty list", "at least one entry", "[]")
+    return tuple(_each(value, read))
 
 
 def read_ids(value: Any, what: str) -> tuple[str, ...]:
@@ -269,15 +284,17 @@ def read_ids(value: Any, what: str) -> tuple[str, ...]:
         )
     if not value:
         raise refusal("an empty list", f"at least one {what} id", "[]")
-    return tuple(_each(value, lambda item: _read_id(item, what, list(value).count(item))))
+    seen: set[str] = set()
+    return tuple(_each(value, lambda item: _read_id(item, what, seen)))
 
 
-def _read_id(value: Any, what: str, times: int) -> str:
+def _read_id(value: Any, what: str, seen: set[str]) -> str:
     if not isinstance(value, str) or not value:
         hint = "put it in quotes" if isinstance(value, int | float) else ""
         raise refusal(f"not a {what} id", "text", kind_of(value), hint)
-    if times > 1:
+    if value in seen:
         raise refusal("listed twice", "each id once", value)
+    seen.add(value)
     return value
 
 

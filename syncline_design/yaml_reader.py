@@ -26,6 +26,7 @@ from syncline_design.yaml_scalars import Number as Number
 from syncline_design.yaml_scalars import plain_scalar as plain_scalar
 
 MAX_DEPTH = 64
+MAX_PROBLEMS = 500  # then reading stops
 MAX_BYTES = 3 * 2**19  # 1.5 MiB: one MiB is honest work, two are not
 
 KeyPath = tuple[str | int, ...]
@@ -255,6 +256,8 @@ class _Builder:
             Problem(self.file, *place, show_path(path), message, expected, found, hint)
         )
         self.problem_paths.append(path)
+        if len(self.problems) >= MAX_PROBLEMS:
+            raise StopReadingError
 
     def build(self, events: Iterator[Any]) -> Any:
         data, seen = None, 0
