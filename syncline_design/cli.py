@@ -245,13 +245,13 @@ def simulate(
     from syncline_design.loading import load
     from syncline_design.report.simulations import SIMULATE_FORMATS, render_simulate
     from syncline_design.simulate.summary import summary_text
-    from syncline_design.verify import simulate_spec
+    from syncline_design.simulated_spec import simulate_spec
 
     targets = _targets(output, SIMULATE_FORMATS)
     loaded = load(spec)
     run = simulate_spec(loaded, seed=seed, samples=samples, workers=workers)
-    text = summary_text(run.result, run.system)
-    _emit(text, targets, lambda name: render_simulate(name, loaded, run), quiet=quiet)
+    text = f"{loaded.spec.name} ({spec})\n\n{summary_text(run.result, run.system)}"
+    _emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
     return 0
 
 

@@ -1,0 +1,23 @@
+"""The outputs of `simulate`: one simulated spec in every format."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from syncline_design.simulate.summary import grid_csv
+from syncline_design.simulated_spec import SimulatedSpec
+
+SIMULATE_FORMATS: Final = ("json", "html", "csv")
+
+
+def render_simulate(name: str, run: SimulatedSpec) -> str:
+    """The text of one format; csv holds the comparison over tau."""
+    if name == "csv":
+        return grid_csv(run.result)
+    if name == "json":
+        from syncline_design.report.json_out import json_text
+
+        return json_text(run.to_json())
+    from syncline_design.report.simulation_page import render_simulation
+
+    return render_simulation(run.to_json())
