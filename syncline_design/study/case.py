@@ -1,0 +1,191 @@
+"""One case of a study: its key, and the record that the check of it leaves."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from datetime import date
+from typing import Any
+
+from syncline_design import __version__
+from syncline_design.loading import BadInput, LoadedSpec
+from syncline_design.study.factors import plain
+from syncline_design.study.loading import Base, Study, engine_sha256
+from syncline_design.yaml_reader import KeyPath, Position, Problem
+
+Json = dict[str, Any]
+SCHEMA = "syncline-design/study-case/v1"
+
+
+@dataclass(frozen=True, slots=True)
+class CaseSettings:
+    """What every case of a run shares besides the study itself."""
+
+    seed: int
+    today: date
+    engine: str  # hash of the package's sources
+
+    @classmethod
+    def now(cls, seed: int, today: date | None) -> CaseSettings:
+        """Settings of a run that starts now."""
+        return cls(seed, today or date.today(), engine_sha256())
+
+
+def canonical(data: Any) -> str:
+    """JSON of one form only: sorted keys, no spaces, ASCII, no NaN."""
+    return json.dumps(
+        data, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False
+    )
+
+
+def case_keys(study: Study, settings: CaseSettings) -> list[str]:
+    """The content address of every case, in order: equal content, equal key.
+
+    SHA-256 over the base spec's text, its catalogs, what is set in it, how it is checked, the
+    seed, this version and, where waivers expire, the day.
+    """
+    heads = [_head(study, base, settings) for base in study.bases]
+    return [_key(heads, study, index) for index in range(len(study))]
+
+
+def _head(study: Study, base: Base, settings: CaseSettings) -> str:
+    check = study.check
+    return canonical(
+        {
+            "schema": SCHEMA,
+            "version": __version__,
+            "engine": settings.engine,
+            "spec": base.document.sha256,
+            "catalogs": base.catalogs.sha256(),
+            "files": _outside_files(base),
+            "seed": settings.seed,
+            "method": check.method,
+            "time_limit_s": None if check.time_limit is None else float(check.time_limit),
+            "monte_carlo": simulates(study, base),
+            "today": settings.today.isoformat() if base.has_waivers else None,
+        }
+    )
+
+
+def _outside_files(base: Base) -> list[str]:
+    """Hashes of files that a check reads besides spec and catalogs: a recorded trajectory."""
+    data = base.document.data.get("monte_carlo") or {}
+    trajectory = data.get("trajectory") if isinstance(data, Mapping) else None
+    name = trajectory.get("file") if isinstance(trajectory, Mapping) else None
+    if not isinstance(name, str):
+        return []
+    try:
+        content = (base.path.parent / name).read_bytes()
+    except OSError:
+        return ["unreadable"]
+    return [hashlib.sha256(content).hexdigest()]
+
+
+def _key(heads: list[str], study: Study, index: int) -> str:
+    base, chosen = study.case(index)
+    paths = study.bases[base].paths
+    settings = sorted((list(map(str, paths[key])), plain(value)) for key, value in chosen)
+    content = heads[base] + canonical(settings)
+    return hashlib.sha256(content.encode("ascii")).hexdigest()
+
+
+def simulates(study: Study, base: Base) -> bool:
+    """Whether cases of a base run Monte Carlo: as the study says, else where it is required."""
+    asked = study.check.monte_carlo
+    return bool(base.simulated) if asked is None else asked
+
+
+def check_case(study: Study, index: int, settings: CaseSettings) -> Json:
+    """The record of one case; what goes wrong inside it is part of the record."""
+    from syncline_design.choose.outcome import NoVerdict
+    from syncline_design.simulate import SimulationError
+
+    place, chosen = study.case(index)
+    base = study.bases[place]
+    try:
+        loaded = base.load(chosen)
+        return _checked(study, base, loaded, settings)
+    except BadInput as bad:
+        return {"verdict": "refused", "problems": [_problem_json(p) for p in bad.problems]}
+    except (NoVerdict, SimulationError) as error:
+        return {"verdict": "indeterminate", "reason": str(error)}
+    except Exception as error:  # one broken case must not take the others with it
+        return {"verdict": "indeterminate", "reason": f"{type(error).__name__}: {error}"}
+
+
+def _checked(study: Study, base: Base, loaded: LoadedSpec, settings: CaseSettings) -> Json:
+    from syncline_design.verify import CheckSettings, check_loaded
+
+    simulated = simulates(study, base)
+    left_out = () if simulated else base.simulated
+    check = study.check
+    verdict = check_loaded(
+        without_simulated(loaded) if left_out else loaded,
+        CheckSettings(
+            seed=settings.seed,
+            method=check.method,
+            time_limit_s=None if check.time_limit is None else float(check.time_limit),
+            monte_carlo=simulated,
+            today=settings.today,
+        ),
+    )
+    return _record(verdict, left_out)
+
+
+def without_simulated(loaded: LoadedSpec) -> LoadedSpec:
+    """The spec without its monte_carlo requirements, every other one still at its own line."""
+    kept = [i for i, r in enumerate(loaded.spec.requirements) if r.kind != "monte_carlo"]
+    requirements = tuple(loaded.spec.requirements[i] for i in kept)
+    renumbered = {old: new for new, old in enumerate(kept)}
+    positions: dict[KeyPath, Position] = {}
+    for path, position in loaded.positions.items():
+        if path[:1] == ("requirements",) and len(path) > 1:
+            if path[1] not in renumbered:
+                continue
+            path = ("requirements", renumbered[int(path[1])], *path[2:])
+        positions[path] = position
+    spec = loaded.spec.model_copy(update={"requirements": requirements})
+    return replace(loaded, spec=spec, positions=positions)
+
+
+def _problem_json(problem: Problem) -> Json:
+    return {
+        "file": problem.file,
+        "line": problem.line,
+        "column": problem.column,
+        "path": problem.path,
+        "message": str(problem).partition(": ")[2],
+    }
+
+
+_SYNCLINE = (
+    "model", "sensor_error_m", "sync_rate_mps", "tau_s", "tau_crit_s", "sync_error_m",
+    "systematic_error_m", "total_m",
+)  # fmt: skip
+
+
+def _record(verdict: Json, left_out: tuple[str, ...]) -> Json:
+    """What a study keeps of a verdict: all that its tables and findings need, no more."""
+    syncline = verdict.get("syncline")
+    record: Json = {
+        "verdict": verdict["verdict"],
+        "requirements": verdict.get("requirements") or [],
+        "design": verdict.get("design"),
+        "syncline": None if syncline is None else {k: syncline.get(k) for k in _SYNCLINE},
+        "front": [
+            {"cost": point["cost"], "error_m": point["error_m"]}
+            for point in (verdict.get("choice") or {}).get("front") or []
+        ],
+        "infeasibility": verdict.get("infeasibility"),
+        "not_simulated": list(left_out),
+    }
+    if verdict.get("reason"):
+        record["reason"] = verdict["reason"]
+    return record
+
+
+def is_final(record: Json) -> bool:
+    """Whether the same case would come out the same again: not after a time limit or a crash."""
+    return not (record["verdict"] == "indeterminate" and record.get("reason"))

@@ -1,0 +1,79 @@
+"""The study file: base specs, what to vary over which values, how to check each case."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from syncline_design.values import (
+    AtLeastOne,
+    PositiveTime,
+    Record,
+    Text,
+    kind_of,
+    refusal,
+)
+
+MAX_CASES = 1_000_000
+
+
+def _read_base(value: Any) -> Any:
+    if isinstance(value, str) and value:
+        return (value,)
+    if not isinstance(value, tuple | list):
+        raise refusal("no base spec", "a list of spec files", kind_of(value))
+    return value
+
+
+def _read_mapping(value: Any) -> Any:
+    if not isinstance(value, dict):
+        example = 'a mapping such as {"stages[uav].distance": [40 m, 60 m]}'
+        raise refusal("not what to vary", example, kind_of(value))
+    if not value:
+        raise refusal("nothing to vary", "at least one key path", "{}")
+    return value
+
+
+Varied = Annotated[dict[str, Any], BeforeValidator(_read_mapping)]
+
+
+class SampleChoice(Record):
+    """A Latin hypercube: every range is cut into `count` equal parts, each part used once."""
+
+    method: Literal["latin_hypercube"] = "latin_hypercube"
+    count: Annotated[int, Field(ge=1, le=MAX_CASES)]
+    seed: Annotated[int, Field(ge=0)] = 0
+    over: Varied
+
+
+class CheckChoice(Record):
+    """How each case is checked.
+
+    monte_carlo: true, false, or left out: only specs with a monte_carlo requirement simulate.
+    """
+
+    monte_carlo: bool | None = None
+    method: Literal["auto", "front", "milp", "enumerate"] = "auto"
+    time_limit: PositiveTime | None = None
+
+
+class HeatMapChoice(Record):
+    """The two key paths of the heat map."""
+
+    x: Text
+    y: Text
+
+
+class StudyFile(Record):
+    """A study as its file says it; meets_when: which cases have to meet their requirements."""
+
+    study: Literal[1]
+    name: Text
+    note: str = ""
+    base: Annotated[tuple[Text, ...], AtLeastOne, BeforeValidator(_read_base)]
+    grid: Varied | None = None
+    sample: SampleChoice | None = None
+    check: CheckChoice = Field(default_factory=CheckChoice)
+    heat_map: HeatMapChoice | None = None
+    meets_when: Literal["all", "any", "decided"] = "all"

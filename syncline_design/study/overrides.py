@@ -1,0 +1,58 @@
+"""One figure of a catalog entry set to another value for one case."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from syncline_design.catalog import Catalog
+from syncline_design.catalog_files import Collection, problem_at
+from syncline_design.loading import BadInput
+from syncline_design.study.factors import plain
+from syncline_design.study.keys import KeyPathError, put, value_at
+from syncline_design.validation import validate
+from syncline_design.values import did_you_mean
+from syncline_design.yaml_reader import Document, KeyPath, Problem
+
+
+def override_entry(catalogs: Collection, path: KeyPath, value: Any, spec: Document) -> Collection:
+    """The catalogs with `catalog.SECTION[ID].KEY...` set; BadInput says why that cannot be."""
+    section, identity = str(path[1]), str(path[2])
+    origin = catalogs.documents.get((section, identity))
+    if origin is None:
+        known = [name for part, name in catalogs.origins if part == section]
+        hint = did_you_mean(identity, known)
+        raise BadInput((problem_at(spec, (), f"no entry {identity} in {section}", hint=hint),))
+    document, at = origin
+    try:
+        changed = put(value_at(document.data, at), path[3:], value)
+    except KeyPathError as error:
+        raise BadInput((problem_at(spec, (), error.message, error.expected),)) from None
+    model, problems = _validated(document, section, identity, changed)
+    if model is None:
+        raise BadInput(tuple(problems))
+    result = catalogs.copy()
+    result.entries[section][identity] = getattr(model, section)[identity]
+    result.documents[section, identity] = (_entry_document(document, at, changed), at)
+    shown = json.dumps([list(path), plain(value)], ensure_ascii=True)
+    result.digests.append(f"override {shown}")
+    return result
+
+
+def _validated(
+    document: Document, section: str, identity: str, entry: Any
+) -> tuple[Catalog | None, list[Problem]]:
+    """The entry through the catalog's own model, its errors placed in its own file."""
+    single = Document(
+        document.file, {section: {identity: entry}}, document.positions, document.key_positions,
+        document.sha256, document.text,
+    )  # fmt: skip
+    return validate(Catalog, single)
+
+
+def _entry_document(document: Document, at: KeyPath, entry: Any) -> Document:
+    """The document with one entry changed, so that a further override starts from it."""
+    return Document(
+        document.file, put(document.data, at, entry), document.positions, document.key_positions,
+        document.sha256, document.text,
+    )  # fmt: skip

@@ -1,0 +1,130 @@
+"""Run a study: reuse what is there, compute the rest, keep every case as soon as it is done."""
+
+from __future__ import annotations
+
+import json
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from syncline_design.study.case import CaseSettings, case_keys, is_final
+from syncline_design.study.cluster import run_on_cluster
+from syncline_design.study.loading import Study, load_study
+from syncline_design.study.pool import Pool, PoolError, Result, encoded_case
+from syncline_design.study.progress import Progress, Report
+from syncline_design.study.result import StudyResult
+from syncline_design.study.store import FOLDER, Store, StoreError
+
+Json = dict[str, Any]
+FEW_CASES = 8  # as many are done sooner than a worker process starts
+
+
+class StudyError(Exception):
+    """A study could not be run to its end; what it computed so far is kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class StudySettings:
+    """How to run a study; none of it but the seed changes a result.
+
+    workers: local processes (of a local cluster with `dask`).  store: folder of the case files;
+    None: `.syncline-cases` beside the study file.  scheduler: address of a Dask scheduler.
+    today: the day on which waivers are judged; None: the machine's date.
+    """
+
+    seed: int = 0
+    workers: int = 2
+    store: Path | None = None
+    scheduler: str | None = None
+    dask: bool = False
+    today: date | None = None
+
+
+def run_study(
+    path: str | Path, settings: StudySettings | None = None, progress: Report | None = None
+) -> StudyResult:
+    """Run a study file to its end; cases whose file is there already are not computed again."""
+    chosen = settings or StudySettings()
+    study = load_study(path)
+    return run_loaded(study, chosen, progress)
+
+
+def run_loaded(
+    study: Study, settings: StudySettings, progress: Report | None = None
+) -> StudyResult:
+    """The same for a study that was read already."""
+    started = time.monotonic()
+    shared = CaseSettings.now(settings.seed, settings.today)
+    store = Store(settings.store or study.path.parent / FOLDER)
+    run = _Run(study, settings, shared, store, started, progress)
+    try:
+        store.open()
+        return run.finish()
+    except (PoolError, StoreError) as error:
+        raise StudyError(str(error)) from None
+
+
+@dataclass
+class _Run:
+    """One run: counts as it goes."""
+
+    study: Study
+    settings: StudySettings
+    shared: CaseSettings
+    store: Store
+    started: float
+    progress: Report | None
+    retried: int = 0
+
+    def finish(self) -> StudyResult:
+        keys = case_keys(self.study, self.shared)
+        missing = self._missing(keys)
+        reused = len(keys) - len(missing)
+        self._say(reused, len(keys), reused)
+        unsettled: dict[str, Json] = {}
+        for done, (index, encoded) in enumerate(self._records(missing), 1):
+            record = json.loads(encoded) if '"reason":' in encoded else None
+            if record is not None and not is_final(record):
+                unsettled[keys[index]] = record
+            else:
+                self.store.write(keys[index], encoded)
+            self._say(reused + done, len(keys), reused)
+        elapsed = time.monotonic() - self.started
+        return StudyResult(
+            self.study, self.settings.seed, tuple(keys), self.store, unsettled, reused,
+            len(missing), self.retried, elapsed,
+        )  # fmt: skip
+
+    def _missing(self, keys: Sequence[str]) -> list[int]:
+        """Cases without a whole file; of several with the same content only the first."""
+        seen: set[str] = set()
+        missing = []
+        for index, key in enumerate(keys):
+            if key not in seen and self.store.read(key) is None:
+                missing.append(index)
+            seen.add(key)
+        return missing
+
+    def _records(self, missing: Sequence[int]) -> Iterator[Result]:
+        settings = self.settings
+        if settings.dask or settings.scheduler is not None:
+            yield from run_on_cluster(
+                self.study, self.shared, missing, address=settings.scheduler,
+                workers=settings.workers,
+            )  # fmt: skip
+        elif settings.workers <= 1 or len(missing) <= FEW_CASES:
+            for index in missing:
+                yield index, encoded_case(self.study, index, self.shared)
+        else:
+            pool = Pool(self.study, self.shared, settings.workers)
+            for result in pool.run(missing):
+                self.retried = pool.retried
+                yield result
+
+    def _say(self, done: int, total: int, reused: int) -> None:
+        if self.progress is not None:
+            elapsed = time.monotonic() - self.started
+            self.progress(Progress(done, total, reused, elapsed, self.retried))
