@@ -301,8 +301,10 @@ def infeasible() -> dict[str, Any]:
     verdict["verdict"] = "infeasible"
     verdict["requirements"] = [
         requirement("ACC-1", "accuracy", 1.0, 0.05, "m", 8)
-        | {"status": "indeterminate", "value": None, "margin": None},
+        | {"status": "fail", "value": None, "margin": None, "note": "part of the conflict"},
         requirement("COST-1", "cost", 1.0, 9_000.0, "EUR", 10)
+        | {"status": "fail", "value": None, "margin": None, "note": "part of the conflict"},
+        requirement("SYNC-1", "sync", 0.5, 1.0, "1", 9)
         | {"status": "indeterminate", "value": None, "margin": None},
     ]
     verdict["infeasibility"] = {

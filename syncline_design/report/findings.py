@@ -89,7 +89,7 @@ def _requirement(row: Json, file: str, verdict: Json, conflict: list[str]) -> Fi
     message = requirement_sentence(row)
     if level == "fail" and is_waived(row):
         level = "waived"
-    elif level == "undecided" and str(row.get("id")) in conflict:
+    elif level != "pass" and not part(verdict, "design") and str(row.get("id")) in conflict:
         others = [name for name in conflict if name != str(row.get("id"))]
         level, message = "fail", _conflict_text(row, others, verdict)
     elif level == "undecided" and not part(verdict, "design"):

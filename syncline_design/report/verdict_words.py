@@ -192,7 +192,7 @@ def _no_design_sentence(verdict: Json) -> str:
     infeasibility = part(verdict, "infeasibility")
     conflict = [str(r.get("id")) for r in items(part(infeasibility, "conflict"), "requirements")]
     if conflict:
-        return f"{sentence_list(conflict)} cannot hold together."
+        return f"{sentence_list(conflict)} cannot {'hold together' if conflict[1:] else 'be met'}."
     stuck = [f"{r.get('stage')} {r.get('role')}"
              for r in items(infeasibility, "roles_without_options")]  # fmt: skip
     if stuck:
