@@ -11,6 +11,10 @@ import random
 import re
 import shutil
 import string
+import subprocess
+import sys
+import tempfile
+import threading
 import time
 from pathlib import Path
 from typing import Any
@@ -27,12 +31,16 @@ BASE = (CORPUS / "yaml" / "base.yaml").read_text(encoding="utf-8")
 MESSAGE = re.compile(r"^[^:]+(:[^:]+\.ya?ml)?:\d+:\d+: \S")
 
 
-@pytest.fixture
-def corpus(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+@pytest.fixture(scope="module")
+def copied(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A copy of the corpus to work in, so that anything written would be seen."""
-    shutil.copytree(CORPUS, tmp_path / "corpus")
-    monkeypatch.chdir(tmp_path / "corpus")
-    return tmp_path / "corpus"
+    return Path(shutil.copytree(CORPUS, tmp_path_factory.mktemp("bad") / "corpus"))
+
+
+@pytest.fixture
+def corpus(copied: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(copied)
+    return copied
 
 
 def refused(path: str | Path) -> tuple[str, tuple[Problem, ...]]:
@@ -188,6 +196,48 @@ def test_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr("syncline_design.yaml_reader.os.open", denied)
     assert "permission denied" in refused(spec)[0]
+
+
+COMMAND = (sys.executable, "-m", "syncline_design.cli", "check")
+THROUGH_THE_COMMAND = (
+    "yaml/billion_laughs.yaml", "yaml/nul.yaml", "yaml/latin1.yaml", "units/power_tower.yaml",
+    "numbers/digits_5000.yaml", "model/typo_key.yaml", "paths/cycle.yaml", "deep", "fifo",
+    "/dev/zero", "absent.yaml",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("name", THROUGH_THE_COMMAND)
+def test_the_command_refuses_with_exit_2_and_writes_nothing(
+    name: str, corpus: Path, tmp_path: Path
+) -> None:
+    """Exit 2, a place, no traceback, under 300 MB, even where reports were asked for.
+
+    The second that a refusal may take is held in-process above; here a slow start is allowed for.
+    """
+    if name == "deep":
+        (tmp_path / name).write_text("[" * 100_000, encoding="utf-8")
+        name = str(tmp_path / name)
+    elif name == "fifo":
+        os.mkfifo(tmp_path / name)
+        name = str(tmp_path / name)
+    before = files_under(corpus)
+    with tempfile.TemporaryFile() as out, tempfile.TemporaryFile() as err:
+        wanted = ("--output", "html:report.html", "--output", "json:report.json")
+        process = subprocess.Popen([*COMMAND, name, *wanted], stdout=out, stderr=err, cwd=corpus)
+        timer = threading.Timer(20.0, process.kill)
+        timer.start()
+        _, status, usage = os.wait4(process.pid, 0)
+        timer.cancel()
+        process.returncode = os.waitstatus_to_exitcode(status)
+        out.seek(0)
+        err.seek(0)
+        stdout, stderr = out.read().decode(), err.read().decode()
+    assert process.returncode == 2, stderr
+    assert stdout.strip() == ""
+    assert "Traceback" not in stderr
+    assert re.search(r":\d+:\d+: ", stderr), stderr
+    assert usage.ru_maxrss < 300_000  # kB
+    assert files_under(corpus) == before
 
 
 WEIRD = (
