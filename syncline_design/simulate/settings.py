@@ -65,7 +65,7 @@ class SimulationSettings:
 
 def _demand(holds: bool, path: str, expected: str, found: object) -> None:
     if not holds:
-        raise SimulationError(f"{path}: expected {expected}, found {found!r}")
+        raise SimulationError(f"{path}: expected {expected}, found {found}")
 
 
 def _demand_whole(path: str, value: object, least: int) -> None:
