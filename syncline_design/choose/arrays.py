@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
+from syncline_design.choose.outcome import TooLarge
 from syncline_design.choose.pareto import Bools, Column, Columns, Floats, Indices, undominated
 from syncline_design.design_space import (
     RESOURCES,
@@ -21,6 +23,7 @@ from syncline_design.design_space import (
 
 MARGIN = 1e-12  # sums of floats are trusted to this; what lies closer to a limit is decided exactly
 INT64_ROOM = 2**61
+MOST_CHANNELS = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +69,6 @@ class Scaled:
         top, bottom = amount.as_integer_ratio()
         return top * (self.denominator // bottom)
 
-    def column(self, amounts: list[Fraction | None]) -> Column:
-        """Amounts as an integer column."""
-        if self.denominator == 1:
-            whole = [0 if a is None else a.numerator for a in amounts]
-        else:
-            whole = [self.whole(a) for a in amounts]
-        return np.array(whole, dtype=self.dtype)
-
 
 @dataclass(frozen=True, slots=True)
 class Tables:
@@ -91,61 +86,89 @@ def tabulate(problem: Problem, primary: ResourceName) -> Tables:
     """Arrays for a front of `primary` against error; other budgets become further keys."""
     names = [primary]
     names += [n for n in RESOURCES if n != primary and problem.limits.budget(n) is not None]
-    scales = {name: _scale(problem, name) for name in RESOURCES}
-    keys = tuple(scales[name] for name in names)
-    ties = tuple(scales[n] for n in RESOURCES if n not in names and _is_known(problem, n))
-    tracked = _tracked(problem)
     orders = tuple(_by_name(table) for table in problem.roles)
-    roles = tuple(
-        _role_arrays([table.options[i] for i in order], keys, ties, tracked, problem)
+    options = [
+        [table.options[i] for i in order]
         for table, order in zip(problem.roles, orders, strict=True)
+    ]
+    spent = [[option.resources for option in role] for role in options]
+    amounts = {name: _Amounts(problem, name, spent) for name in RESOURCES}
+    ties = [n for n in RESOURCES if n not in names and amounts[n].matter]
+    tracked = _tracked(problem, options)
+    roles = tuple(
+        _role_arrays(
+            problem, role, [amounts[n].columns[r] for n in (*names, *ties)], len(names), tracked
+        )
+        for r, role in enumerate(options)
     )
-    return Tables(problem, roles, orders, keys, ties, tracked)
+    keys = tuple(amounts[name].scaled for name in names)
+    return Tables(problem, roles, orders, keys, tuple(amounts[n].scaled for n in ties), tracked)
+
+
+_names = attrgetter("sensor", "primitive", "method")
 
 
 def _by_name(table: RoleTable) -> tuple[int, ...]:
-    names = [option.names for option in table.options]
+    names = [_names(option) for option in table.options]
     return tuple(sorted(range(len(names)), key=names.__getitem__))
 
 
-def _all_resources(problem: Problem) -> list[Resources]:
-    unique = {id(o.resources): o.resources for table in problem.roles for o in table.options}
-    found = list(unique.values())
-    found += [clock.resources for vehicle in problem.vehicles for clock in vehicle.clocks]
-    return found + [item.resources for item in problem.infrastructure]
+class _Amounts:
+    """One resource of all options as integer columns, with the scale they share."""
+
+    def __init__(self, problem: Problem, name: ResourceName, spent: list[list[Resources]]) -> None:
+        amount_of = attrgetter(name)
+        others = [c.resources for v in problem.vehicles for c in v.clocks]
+        others += [item.resources for item in problem.infrastructure]
+        rest = [a for a in (*map(amount_of, others), problem.limits.budget(name)) if a is not None]
+        ratios = [_ratios(list(map(amount_of, role))) for role in spent]
+        denominator = math.lcm(
+            *(b for _, bottoms in ratios for b in set(bottoms)), *(a.denominator for a in rest)
+        )
+        largest = max((max(map(abs, tops), default=0) for tops, _ in ratios), default=0)
+        largest = max(largest * denominator, *(int(abs(a * denominator)) for a in rest), 0)
+        self.matter = any(any(tops) for tops, _ in ratios) or any(rest)
+        fits = largest * _most_terms(problem) < INT64_ROOM
+        self.scaled = Scaled(name, denominator, np.int64 if fits else object)
+        self.columns = [_whole(tops, bottoms, self.scaled) for tops, bottoms in ratios]
 
 
-def _is_known(problem: Problem, name: ResourceName) -> bool:
-    return any(resources.of(name) for resources in _all_resources(problem))
+def _ratios(amounts: list[Fraction | None]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Numerators and denominators; what the catalog does not say counts nothing."""
+    if not any(amounts):
+        return (0,) * len(amounts), (1,) * len(amounts)
+    pairs = [(0, 1) if a is None else a.as_integer_ratio() for a in amounts]
+    tops, bottoms = zip(*pairs, strict=True)
+    return tops, bottoms
 
 
-def _scale(problem: Problem, name: ResourceName) -> Scaled:
-    amounts = [r.of(name) for r in _all_resources(problem)]
-    amounts.append(problem.limits.budget(name))
-    bottoms = {a.denominator for a in amounts if a is not None}
-    denominator = math.lcm(*bottoms) if bottoms else 1
-    largest = max((abs(a) for a in amounts if a is not None), default=Fraction(0))
-    terms = (len(problem.roles) + len(problem.vehicles)) * (1 + len(problem.infrastructure))
-    channels = max((n for t in problem.roles for o in t.options for _, n in o.requires), default=1)
-    fits = largest * denominator * (terms + 1) * max(1, channels) < INT64_ROOM
-    return Scaled(name, denominator, np.int64 if fits else object)
+def _whole(tops: tuple[int, ...], bottoms: tuple[int, ...], scaled: Scaled) -> Column:
+    factors = np.array(bottoms, dtype=scaled.dtype)
+    return np.asarray(np.array(tops, dtype=scaled.dtype) * (scaled.denominator // factors))
 
 
-def _tracked(problem: Problem) -> tuple[int, ...]:
-    wanted = {name for t in problem.roles for o in t.options for name, _ in o.requires}
-    wanted |= {name for v in problem.vehicles for c in v.clocks for name, _ in c.requires}
+def _most_terms(problem: Problem) -> int:
+    """How many amounts a design can add up at most."""
+    roles = len(problem.roles) + len(problem.vehicles)
+    return roles * (1 + len(problem.infrastructure) * MOST_CHANNELS)
+
+
+def _tracked(problem: Problem, options: list[list[Option]]) -> tuple[int, ...]:
+    needs = {o.requires for role in options for o in role}
+    needs |= {c.requires for v in problem.vehicles for c in v.clocks}
+    wanted = {name for requires in needs for name, _ in requires}
+    if any(count > MOST_CHANNELS for requires in needs for _, count in requires):
+        raise TooLarge(f"an option that needs more than {MOST_CHANNELS} channels")
     return tuple(i for i, item in enumerate(problem.infrastructure) if item.id in wanted)
 
 
 def _role_arrays(
-    options: list[Option],
-    keys: tuple[Scaled, ...],
-    ties: tuple[Scaled, ...],
-    tracked: tuple[int, ...],
     problem: Problem,
+    options: list[Option],
+    columns: list[Column],
+    keys: int,
+    tracked: tuple[int, ...],
 ) -> RoleArrays:
-    resources = [option.resources for option in options]
-    columns = [s.column([r.of(s.name) for r in resources]) for s in (*keys, *ties)]
     channels = [
         np.array([_channels(o.requires, problem.infrastructure[i].id) for o in options], dtype=int)
         for i in tracked
@@ -155,14 +178,14 @@ def _role_arrays(
         np.array([o.sensor_error_m for o in options], dtype=float),
         np.array([o.tau_s for o in options], dtype=float),
         np.array([o.timeline == "host" for o in options], dtype=bool),
-        tuple(columns[: len(keys)]),
-        tuple(columns[len(keys) :]),
+        tuple(columns[:keys]),
+        tuple(columns[keys:]),
         tuple(channels),
     )
 
 
 def _channels(requires: tuple[tuple[str, int], ...], name: str) -> int:
-    return sum(count for item, count in requires if item == name)
+    return sum(count for item, count in requires if item == name) if requires else 0
 
 
 def useful_options(role: RoleArrays, rate_mps: float, per_sensor: bool) -> RoleArrays:

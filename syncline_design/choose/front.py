@@ -59,7 +59,7 @@ def merged_front(
     demand_structure(problem)
     if any(not role.options for role in problem.roles):
         return ()
-    tables = tabulate(problem, resource)
+    tables = _one_timeline(tabulate(problem, resource))
     end = deadline or Deadline()
     relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=None)
     holds = _hold_sync(tables, relaxed)
@@ -84,6 +84,15 @@ def _reduced(tables: Tables) -> Tables:
         rate = math.fsum(rates) if per_sensor else problem.sync_rate_mps * bool(rates)
         roles.append(useful_options(role, rate, per_sensor))
     return replace(tables, roles=tuple(roles))
+
+
+def _one_timeline(tables: Tables) -> Tables:
+    """Tables without timelines where no clock is off: then none of them matters."""
+    clocks = [clock for vehicle in tables.problem.vehicles for clock in vehicle.clocks]
+    if any(clock.offset_bound_s != 0.0 for clock in clocks):
+        return tables
+    roles = tuple(replace(r, host=np.zeros(len(r), dtype=bool)) for r in tables.roles)
+    return replace(tables, roles=roles)
 
 
 def demand_structure(problem: Problem) -> None:

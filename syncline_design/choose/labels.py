@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,7 @@ from syncline_design.choose.outcome import TooLarge
 from syncline_design.choose.pareto import Bools, Column, Floats, Indices
 
 CHUNK = 200_000  # candidates looked at in one go
+MOST_PER_STEP = 10 * CHUNK
 MOST_LABELS = 400_000  # partial designs kept before the merge gives up
 
 
@@ -92,6 +94,8 @@ class Addition:
 def extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) -> Labels:
     """Every label with every option, in the order of their choices; of those what `keep` keeps."""
     n, m = len(labels), len(added.options)
+    if m > MOST_PER_STEP:
+        raise TooLarge(f"{m} options in one role")
     rows = max(1, CHUNK // max(1, m))
     if n <= rows:
         return _extend(labels, added, keep)
@@ -104,13 +108,17 @@ def extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) -
     return joined.take(keep(joined))
 
 
+# Stands in for columns that are only worked out for the candidates that stay.
+_NO_CHOICE: Any = np.broadcast_to(np.zeros((1, 1)), (MOST_PER_STEP, 1))
+
+
 def _extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) -> Labels:
     n, m = len(labels), len(added.options)
     left, right = np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
     options, bound, sync = added.options, labels.bound[left], labels.sync[left]
     if added.bound is not None:
         bound = np.maximum(bound, added.bound[right])
-        sync = sync + added.rate_mps * added.bound[right]
+        sync = sync + (added.rate_mps * added.bound)[right]
     used = [column[left] for column in labels.used]
     for k, channels in enumerate(options.channels):
         used[added.used_at + k] = used[added.used_at + k] + channels[right]
@@ -121,13 +129,18 @@ def _extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) 
         bound,
         sync,
         tuple(used),
-        np.column_stack([left, right]),
-        labels.reference_tau[left],
-        labels.reference_host[left],
+        _NO_CHOICE[: n * m],
+        _NO_CHOICE[: n * m, 0],
+        _NO_CHOICE[: n * m, 0],
     )
-    kept = candidates.take(keep(candidates))
-    left, right = kept.choice.T
-    return replace(kept, choice=np.column_stack([labels.choice[left], options.place[right]]))
+    rows = keep(candidates)
+    left, right = left[rows], right[rows]
+    return replace(
+        candidates.take(rows),
+        choice=np.column_stack([labels.choice[left], options.place[right]]),
+        reference_tau=labels.reference_tau[left],
+        reference_host=labels.reference_host[left],
+    )
 
 
 def _sums(

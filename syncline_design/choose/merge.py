@@ -236,7 +236,9 @@ class Merge:
         if self.safety is not None:
             safe = self.safety.safe(labels, role, timing)
             guard = Guard(safe, labels.error, labels.bound)
-        value, weak = (total, []) if self.per_sensor else (labels.error, [total])
+        value, weak = (labels.error, [total])
+        if self.per_sensor or role == len(self.problem.roles) - 1:
+            value, weak = total, []
         return Columns((*labels.resources, value), [*weak, *used], labels.ties, guard)
 
     def _within_budgets(self, labels: Labels, role: int) -> Bools:

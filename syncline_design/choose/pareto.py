@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +16,9 @@ Bools = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 
 BLOCK = 256
+MOST_GROUPS = 32  # combinations of columns of few values
+THIN_ABOVE = 3000  # rows from which a sample thins them out first
+SAMPLE = 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,18 +50,70 @@ class Columns:
     def __len__(self) -> int:
         return len(self.keys[0])
 
+    def take(self, rows: Indices) -> Columns:
+        """Some of the rows."""
+        guard = self.guard
+        if guard is not None:
+            guard = Guard(guard.safe[rows], guard.error[rows], guard.bound[rows])
+        return Columns(
+            [column[rows] for column in self.keys],
+            [column[rows] for column in self.weak],
+            [column[rows] for column in self.tie],
+            guard,
+        )
+
 
 def undominated(columns: Columns) -> Indices:
     """Indices, rising, of the rows that no other row replaces."""
     count = len(columns)
     if count <= 1:
         return np.arange(count)
+    if count > THIN_ABOVE:
+        left = _thinned(columns)
+        return left[_exactly_undominated(columns.take(left))]
+    return _exactly_undominated(columns)
+
+
+def _exactly_undominated(columns: Columns) -> Indices:
+    count = len(columns)
     ties = tie_rank(columns.tie, count)
     order = np.lexsort((ties, *_sortable(columns.weak), *_sortable(columns.keys)))
     if len(columns.keys) == 2 and not columns.weak and columns.guard is None:
         return np.sort(order[_staircase(columns.keys[1][order])])
     table = _Sorted(columns, order, ties[order])
     return np.sort(order[table.survivors()])
+
+
+def _thinned(columns: Columns) -> Indices:
+    """Rows left after those that the front of a sample replaces: most, at little cost."""
+    count = len(columns)
+    sample = np.unique(np.random.default_rng(0).integers(0, count, SAMPLE))
+    best = sample[_exactly_undominated(columns.take(sample))]
+    amount = columns.keys[0]
+    best = best[np.argsort(amount[best], kind="stable")]
+    place = np.searchsorted(amount[best], amount, side="right") - 1
+    left = np.flatnonzero(place >= 0)
+    kept = np.flatnonzero(place < 0)
+    for column in (*columns.keys[1:], *columns.weak):
+        values = column[best]
+        lowest = np.maximum.accumulate(np.where(_staircase(values), np.arange(len(best)), 0))
+        left = left[~_clearly_replaces(columns, best[lowest[place[left]]], left)]
+    return np.sort(np.concatenate([kept, left]))
+
+
+def _clearly_replaces(columns: Columns, first: Indices, second: Indices) -> Bools:
+    """Whether rows replace others without any question of ties."""
+    out = np.zeros(len(second), dtype=bool)
+    for key in columns.keys:
+        out |= np.asarray(key[first] < key[second], dtype=bool)
+    for column in (*columns.keys, *columns.weak):
+        out &= np.asarray(column[first] <= column[second], dtype=bool)
+    guard = columns.guard
+    if guard is not None:
+        alike = guard.error[first] >= guard.error[second]
+        alike &= guard.bound[first] <= guard.bound[second]
+        out &= guard.safe[first] | alike
+    return out
 
 
 def tie_rank(tie: Sequence[Column], count: int) -> Indices:
@@ -85,6 +141,36 @@ def _staircase(column: Column) -> Bools:
     return keep
 
 
+def _is_error(weak: Sequence[Column]) -> bool:
+    return bool(weak) and weak[0].dtype == np.float64
+
+
+class _Stairs:
+    """Pairs of figures none of which is smaller in both: first rising, second falling."""
+
+    def __init__(self) -> None:
+        self.first: list[float] = []
+        self.second: list[float] = []
+        self.row: list[int] = []
+
+    def lowest(self, one: float, two: float) -> int | None:
+        """A row that is no larger in either figure."""
+        place = bisect_right(self.first, one) - 1
+        return self.row[place] if place >= 0 and self.second[place] <= two else None
+
+    def add(self, one: float, two: float, row: int) -> None:
+        """Take in a row, and drop those that it makes superfluous."""
+        if self.lowest(one, two) is not None:
+            return
+        start = bisect_left(self.first, one)
+        end = start
+        while end < len(self.first) and self.second[end] >= two:
+            end += 1
+        self.first[start:end] = [one]
+        self.second[start:end] = [two]
+        self.row[start:end] = [row]
+
+
 class _Sorted:
     """Rows in sorted order: a row can only be replaced by an earlier one."""
 
@@ -92,6 +178,9 @@ class _Sorted:
         self.keys = [column[order] for column in columns.keys]
         self.columns = self.keys + [column[order] for column in columns.weak]
         self.ties = ties
+        # The error, and the weak column beside it (the error again where there is none).
+        value = len(self.keys) - 1
+        self.stepped = (value, len(self.keys) if _is_error(columns.weak) else value)
         given = columns.guard
         self.guard = given and Guard(given.safe[order], given.error[order], given.bound[order])
 
@@ -115,6 +204,11 @@ class _Sorted:
         left = np.arange(len(self.ties))
         for column in self.columns[1:]:
             left = left[~self.replaces(self._lowest_before(column, left), left)]
+        groups = self._groups(left)
+        return self._in_blocks(left) if groups is None else self._in_staircases(left, *groups)
+
+    def _in_blocks(self, left: Indices) -> Indices:
+        """Each block of rows against all rows kept before it."""
         kept = left[:0]
         for start in range(0, len(left), BLOCK):
             block = left[start : start + BLOCK]
@@ -123,6 +217,44 @@ class _Sorted:
             block = block[~self.replaces(block[:, None], block[None, :]).any(axis=0)]
             kept = np.concatenate([kept, block])
         return kept
+
+    def _groups(self, left: Indices) -> tuple[list[int], list[list[int]]] | None:
+        """Group of each row by its columns of few values, and the groups that may replace each.
+
+        None where there are too many, or a guard: then rows are compared in blocks.
+        """
+        if self.guard is not None:
+            return None
+        few = [column for k, column in enumerate(self.columns) if k not in (0, *self.stepped)]
+        if not few:
+            return [0] * len(left), [[0]]
+        if any(column.dtype == object for column in few):
+            return None
+        kinds, group = np.unique(
+            np.column_stack([c[left] for c in few]), axis=0, return_inverse=True
+        )
+        if len(kinds) > MOST_GROUPS:
+            return None
+        below = [np.flatnonzero((kinds <= kind).all(axis=1)).tolist() for kind in kinds]
+        return group.reshape(-1).tolist(), below
+
+    def _in_staircases(self, left: Indices, group: list[int], below: list[list[int]]) -> Indices:
+        """Rows by rising first key against the staircases of the other two columns so far."""
+        first, second = (self.columns[k][left].tolist() for k in self.stepped)
+        amount, ties = self.keys[0][left].tolist(), self.ties[left].tolist()
+        stairs = [_Stairs() for _ in below]
+        kept = []
+        for row, (one, two) in enumerate(zip(first, second, strict=True)):
+            for g in below[group[row]]:
+                other = stairs[g].lowest(one, two)
+                if other is not None and (
+                    amount[other] < amount[row] or first[other] < one or ties[other] < ties[row]
+                ):
+                    break
+            else:
+                kept.append(row)
+                stairs[group[row]].add(one, two, row)
+        return left[kept]
 
     def _lowest_before(self, column: Column, left: Indices) -> Indices:
         """For each remaining row the row so far (itself included) that is lowest in a column."""
