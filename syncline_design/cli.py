@@ -124,7 +124,7 @@ def _emit(text: str, targets: list[Target], render: Callable[[str], str], *, qui
     from syncline_design.report.write import STDOUT, Target, write_outputs
 
     rendered = [(target, render(target.format)) for target in targets]
-    if not quiet and not any(target.path == STDOUT for target in targets):
+    if text and not quiet and not any(target.path == STDOUT for target in targets):
         rendered.append((Target("text", STDOUT), text))
     write_outputs(rendered)
 

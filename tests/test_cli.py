@@ -1,0 +1,147 @@
+"""The command line as a user meets it: exit codes, streams, what is written and what is not."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+SPECS = ROOT / "specs"
+HEAVY = {"cvxpy", "highspy", "scipy", "matplotlib", "polars", "pymap3d", "jinja2", "rich"}
+
+
+def run(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    """A run of the real command in a process of its own."""
+    environment = {**os.environ, "NO_COLOR": "1", "PYTHONPATH": str(ROOT)}
+    environment.pop("SYNCLINE_DEBUG", None)
+    return subprocess.run(
+        [sys.executable, "-m", "syncline_design.cli", *arguments],
+        cwd=cwd,
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize(
+    ("spec", "code", "words"),
+    [
+        ("uav_corridor.yaml", 0, "MEETS"),
+        ("subsea_survey_small_sv.yaml", 0, "MEETS"),
+        ("usv_wire_missing.yaml", 1, "DOES NOT MEET"),
+        ("infeasible_example.yaml", 1, "INFEASIBLE"),
+    ],
+)
+def test_check_ends_with_the_code_of_its_verdict(spec: str, code: int, words: str) -> None:
+    done = run("check", str(SPECS / spec))
+    assert done.returncode == code
+    assert words in done.stdout
+    assert done.stderr == ""
+
+
+def test_a_typo_is_refused_at_its_place_and_nothing_is_written(tmp_path: Path) -> None:
+    text = (SPECS / "uav_corridor.yaml").read_text("utf-8")
+    spec = tmp_path / "typo.yaml"
+    spec.write_text(text.replace("platform:", "platfrom:"), "utf-8")
+    done = run("check", str(spec), "--output", f"json:{tmp_path / 'out.json'}")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    line = text.splitlines().index("    platform: uav_fixed_wing") + 1
+    assert done.stderr.startswith(f"{spec}:{line}:5: stages[0].platfrom: unknown key")
+    assert "did you mean platform?" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["typo.yaml"]
+
+
+def test_every_format_keeps_the_exit_code_and_only_one_thing_goes_to_stdout(tmp_path: Path) -> None:
+    spec = str(SPECS / "usv_wire_missing.yaml")
+    targets = [f"{name}:{tmp_path / name}" for name in ("junit", "sarif", "markdown", "csv")]
+    options = [part for target in ("json:-", *targets) for part in ("--output", target)]
+    done = run("check", spec, *options)
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["verdict"] == "fails"
+    assert {p.name for p in tmp_path.iterdir()} == {"junit", "sarif", "markdown", "csv"}
+
+
+def test_several_specs_end_with_the_worst_of_their_codes(tmp_path: Path) -> None:
+    bad = tmp_path / "bad.yaml"
+    bad.write_text("syncline: 2\n", "utf-8")
+    done = run("check", str(SPECS / "usv_mapping.yaml"), str(bad), "--output", "github:-")
+    assert done.returncode == 2
+    assert "::error file=" in done.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("check",),
+        ("check", "missing.yaml"),
+        ("check", "specs/usv_mapping.yaml", "--output", "pdf:x"),
+        ("check", "specs/usv_mapping.yaml", "--output", "json:"),
+        ("check", "specs/usv_mapping.yaml", "-o", "json:-", "-o", "csv:-"),
+        ("check", "specs/usv_mapping.yaml", "--method", "guess"),
+        ("check", "specs/usv_mapping.yaml", "--seed", "-1"),
+        ("simulate", "specs/usv_mapping.yaml", "--samples", "0"),
+        ("catalog", "show", "ublox_f9p_rtkk"),
+        ("catalog", "list", "sensor"),
+        ("schema", "specs"),
+        ("chekc", "specs/usv_mapping.yaml"),
+    ],
+)
+def test_wrong_usage_is_two_with_a_message_and_no_traceback(arguments: tuple[str, ...]) -> None:
+    done = run(*arguments)
+    assert done.returncode == 2
+    assert done.stderr.strip()
+    assert "Traceback" not in done.stderr
+
+
+def test_init_writes_a_starter_that_check_accepts_and_never_overwrites(tmp_path: Path) -> None:
+    assert run("init", str(tmp_path / "new")).returncode == 0
+    (spec,) = (tmp_path / "new").glob("*.yaml")
+    assert run("check", str(spec)).returncode == 0
+    before = spec.read_bytes()
+    again = run("init", str(tmp_path / "new"))
+    assert again.returncode == 2
+    assert spec.read_bytes() == before
+
+
+def test_schema_and_catalogs_print_to_stdout() -> None:
+    assert json.loads(run("schema", "spec").stdout)["$schema"]
+    assert json.loads(run("schema", "catalog").stdout)["$schema"]
+    assert "ublox_f9p_rtk" in run("catalog", "list", "sensors").stdout
+    assert "assumption" in run("catalog", "show", "ublox_f9p_rtk").stdout
+
+
+def test_reproduce_accounts_for_every_cell() -> None:
+    done = run("reproduce", "--output", "json:-")
+    assert done.returncode == 0
+    cells = json.loads(done.stdout)["cells"]
+    assert len([c for c in cells if c["table"].startswith("tau_crit")]) >= 46
+    assert {c["status"] for c in cells} == {"agrees", "erratum"}
+    assert all(c["note"] for c in cells if c["status"] == "erratum")
+
+
+def test_version_and_quiet() -> None:
+    assert run("--version").stdout.startswith("syncline-design ")
+    quiet = run("check", str(SPECS / "usv_mapping.yaml"), "--quiet")
+    assert (quiet.returncode, quiet.stdout) == (0, "")
+
+
+def test_a_pinned_check_imports_nothing_heavy() -> None:
+    code = (
+        "import sys; from pathlib import Path; from syncline_design.verify import *; "
+        "from syncline_design.report.console import verdict_text; "
+        "verdict_text(check_file(Path('specs/usv_mapping.yaml'))); "
+        f"print(sorted({HEAVY} & set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
+    )
+    assert done.stdout.strip() == "[]"
