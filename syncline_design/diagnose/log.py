@@ -16,12 +16,21 @@ Rows = NDArray[np.int64] | NDArray[np.bool_] | slice
 
 
 @dataclass(frozen=True, slots=True)
+class Track:
+    """Motion at its own, often higher rate: stamps (m,) [s] and vectors (m, 3)."""
+
+    time_s: Array
+    value: Array
+
+
+@dataclass(frozen=True, slots=True)
 class StageLog:
     """What one stage measured at every stamp.
 
     antenna_m (n, 3) NED, None from the second stage on; euler_rad (n, 3) roll, pitch, yaw;
     velocity_mps (n, 3) NED, reference point; rate_radps (n, 3) body; range_m, azimuth_rad,
-    elevation_rad (n,), None in a position log.
+    elevation_rad (n,), None in a position log.  velocity_track, rate_track: where the motion was
+    logged at a rate of its own.  follows_position: the velocity was derived from antenna_m.
     """
 
     name: str
@@ -32,6 +41,9 @@ class StageLog:
     range_m: Array | None = None
     azimuth_rad: Array | None = None
     elevation_rad: Array | None = None
+    velocity_track: Track | None = None
+    rate_track: Track | None = None
+    follows_position: bool = False
 
     def rows(self, index: Rows) -> StageLog:
         """Some of the rows."""

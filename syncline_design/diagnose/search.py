@@ -7,6 +7,7 @@ the largest of all candidates' scores reaches by chance on this very trajectory.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -45,6 +46,7 @@ DRAWS = 3000  # clean scores drawn for the distribution of the largest
 MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
 SCATTER_SHARE = 0.2  # for effects that only scatter; the rest is the remainder test's
 RIDGE = 1e-9
+AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
 
@@ -60,7 +62,7 @@ class Trial:
     @property
     def log_p(self) -> float:
         """log of the chance that noise alone saves as much in this one candidate."""
-        return float(chi2.logsf(max(2.0 * self.gain, 0.0), self.freedom))
+        return log_p_of(2.0 * self.gain, self.freedom)
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,7 +195,7 @@ class Search:
             freedom = max(len(model.covariance) - len(less.covariance), 1)
             loss = max(2.0 * (less.nll - model.nll), 0.0)
             scores = gram(self.data, less, self.free_signatures(less), less.level)
-            if float(chi2.logsf(loss, freedom)) > self.threshold(scores):
+            if log_p_of(loss, freedom) > self.threshold(scores):
                 model = less
         return model
 
@@ -291,6 +293,15 @@ def ladder(data: Data, model: Model) -> list[NoiseLevel]:
     return [model.level, kept]
 
 
+def log_p_of(statistic: float, freedom: int) -> float:
+    """log of the upper tail of chi-square, by its asymptote where the library's underflows."""
+    found = float(chi2.logsf(max(statistic, 0.0), freedom))
+    if math.isfinite(found):
+        return found
+    half = 0.5 * statistic
+    return -half + (0.5 * freedom - 1.0) * math.log(half) - math.lgamma(0.5 * freedom)
+
+
 def plausible(model: Model) -> bool:
     """Whether every fitted parameter is of a size that its effect can have."""
     for one in model.acting:
@@ -298,6 +309,15 @@ def plausible(model: Model) -> bool:
             value = one.values[p.name]
             if abs(value) > p.high or (not p.signed and value < 0.0):
                 return False
+    return all(_mean_and_scatter_agree(model, one) for one in model.opened)
+
+
+def _mean_and_scatter_agree(model: Model, opened: Opened) -> bool:
+    """An effect with a mean and a scatter of one parameter needs both to say the same."""
+    for one in model.acting:
+        if one.label == opened.candidate.label:
+            value = one.values[one.effect.parameters[0].name]
+            return abs(model.level.size[opened.directed] - value) < AGREE * value
     return True
 
 

@@ -10,13 +10,13 @@ Without departures this is the georeferencing error itself.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from syncline_design import timing
-from syncline_design.diagnose.log import Log, StageLog
-from syncline_design.diagnose.trajectory import LoggedMotion, logged_motion
+from syncline_design.diagnose.log import Log, StageLog, Track
+from syncline_design.diagnose.trajectory import LoggedMotion, pieces
 from syncline_design.effects import registry
 from syncline_design.effects.base import Array, Departures, Effect, StageRows, Target
 from syncline_design.effects.kinematics import bearing, rotate
@@ -67,7 +67,7 @@ class Scene:
     def part(self, index: Array) -> Scene:
         """The scene on some of the rows (rising); the motions keep all of the log."""
         times = self.log.time_s[index]
-        motions = tuple(LoggedMotion(times, m.velocity, m.rate) for m in self.motions)
+        motions = tuple(replace(m, time_s=times) for m in self.motions)
         rows = tuple(cut_rows(r, index) for r in self.rows)
         return Scene(self.system, self.log.rows(index), motions, rows, self.known)
 
@@ -84,7 +84,7 @@ def cut_rows(rows: StageRows, index: Array) -> StageRows:
 
 def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
     """Put a log beside a system; measured states stand in for true ones, to first order."""
-    motions = tuple(logged_motion(log.time_s, s.velocity_mps, s.rate_radps) for s in log.stages)
+    motions = tuple(_motion(log, s) for s in log.stages)
     rows: list[StageRows] = []
     place: Array | None = None
     for index, (stage, logged, motion) in enumerate(
@@ -104,6 +104,19 @@ def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
     fields = {name: getattr(last, name) for name in StageRows.__slots__}
     rows[-1] = StageRows(**(fields | {"target_m": truth}))
     return Scene(system, log, motions, tuple(rows), tuple(known))
+
+
+def _motion(log: Log, stage: StageLog) -> LoggedMotion:
+    velocity = stage.velocity_track or Track(log.time_s, stage.velocity_mps)
+    rate = stage.rate_track or Track(log.time_s, stage.rate_radps)
+    return LoggedMotion(
+        log.time_s,
+        pieces(velocity.time_s, velocity.value),
+        pieces(rate.time_s, rate.value),
+        log.time_s,
+        euler_to_rotation(stage.euler_rad),
+        stage.follows_position,
+    )
 
 
 def levers(stage: Stage, index: int) -> tuple[Array, Array]:
@@ -215,7 +228,7 @@ def _reference_point(
         return reading - rotate(pose, lever)
     motion = view.motions[index]
     there = motion.turned(pose, ranged, own)
-    return reading - rotate(there, lever) - motion.displacement(ranged, own)
+    return reading - rotate(there, lever) - motion.displacement(ranged, own, shift_s)
 
 
 def _true_vector(view: Scene, index: int, departed: Departures) -> Array:

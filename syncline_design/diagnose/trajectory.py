@@ -16,6 +16,7 @@ import numpy as np
 from syncline_design.effects.base import Array
 from syncline_design.simulate.chain import rotation_exp
 
+FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
 GAP_FACTOR = 5.0  # rows further apart than this times the median interval are a gap
 
 
@@ -56,10 +57,9 @@ class SplinePieces:
     def _piecewise(self, at_s: Array, home_s: Array, rule: Any) -> Array:
         if len(self.splines) == 1:
             return np.asarray(rule(0, at_s))
-        piece = np.searchsorted(self.starts, home_s, side="right") - 1
-        order = np.searchsorted(home_s, self.starts)  # homes rise: every stretch is a slice
-        bounds = [*order, home_s.shape[0]]
-        parts = [rule(int(piece[a]), at_s[a:b]) for a, b in pairwise(bounds) if b > a]
+        first = np.searchsorted(home_s, self.starts[1:])  # homes rise: every stretch is a slice
+        bounds = [0, *first.tolist(), home_s.shape[0]]
+        parts = [rule(k, at_s[a:b]) for k, (a, b) in enumerate(pairwise(bounds)) if b > a]
         return np.concatenate(parts)
 
 
@@ -85,15 +85,24 @@ def pieces(time_s: Array, series: Array) -> SplinePieces:
 
 @dataclass(frozen=True, slots=True)
 class LoggedMotion:
-    """Motion of one stage: velocity [m/s] in NED and rate [rad/s] in the body, as functions."""
+    """Motion of one stage: velocity [m/s] in NED and rate [rad/s] in the body, as functions.
+
+    stamps_s, attitude (m,), (m, 3, 3): the logged poses, for shifts of many rows.
+    follows_position: the velocity was derived from the antenna's own positions, so it is late by
+    what the positions are late by.
+    """
 
     time_s: Array
     velocity: SplinePieces
     rate: SplinePieces
+    stamps_s: Array
+    attitude: Array
+    follows_position: bool = False
 
-    def displacement(self, from_s: Array, to_s: Array) -> Array:
+    def displacement(self, from_s: Array, to_s: Array, position_shift_s: Array) -> Array:
         """p(to) - p(from) [m], NED, (n, 3)."""
-        return self.velocity.integral(from_s, to_s, self.time_s)
+        own = position_shift_s if self.follows_position else np.zeros(1)
+        return self.velocity.integral(from_s - own, to_s - own, self.time_s)
 
     def turn(self, from_s: Array, to_s: Array) -> Array:
         """Rotation vector theta [rad], R(to) = R(from) exp(S(theta)), (n, 3).
@@ -110,10 +119,14 @@ class LoggedMotion:
         """R(to) from R(from) (n, 3, 3)."""
         if np.array_equal(from_s, to_s):
             return rotation
+        if float(np.max(np.abs(to_s - from_s))) > FAR_S:
+            return self._far(to_s)
         carried: Array = rotation @ rotation_exp(self.turn(from_s, to_s))
         return carried
 
-
-def logged_motion(time_s: Array, velocity_mps: Array, rate_radps: Array) -> LoggedMotion:
-    """Motion from the log's velocity (NED) and rates (body)."""
-    return LoggedMotion(time_s, pieces(time_s, velocity_mps), pieces(time_s, rate_radps))
+    def _far(self, to_s: Array) -> Array:
+        """R(to) from the logged pose next to it; over many seconds the series does not hold."""
+        middle = 0.5 * (self.stamps_s[1:] + self.stamps_s[:-1])
+        near = np.searchsorted(middle, to_s)
+        carried: Array = self.attitude[near] @ rotation_exp(self.turn(self.stamps_s[near], to_s))
+        return carried

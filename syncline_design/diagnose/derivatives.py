@@ -1,0 +1,58 @@
+"""Velocity and rates that a log does not hold, from its positions and attitudes."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+
+from syncline_design.diagnose.trajectory import GAP_FACTOR
+from syncline_design.effects.base import Array
+from syncline_design.simulate.chain import euler_to_rotation
+
+WINDOW_S = 1.0  # a parabola is fitted over this long, or five rows
+LEAST_WINDOW = 5
+
+
+def derived_velocity(time_s: Array, place_m: Array) -> Array:
+    """Slope of positions (n, 3) by a moving parabola [m/s]; cut at gaps.
+
+    Noise of a derived velocity enters every sensitivity, so the window is a second or five rows,
+    whichever is longer.  Source: Savitzky and Golay, Anal. Chem. 36 (1964), for uneven stamps.
+    """
+    step = np.diff(time_s)
+    usual = float(np.median(step))
+    half = max(LEAST_WINDOW // 2, round(0.5 * WINDOW_S / usual))
+    cuts = np.flatnonzero(step > GAP_FACTOR * usual) + 1
+    bounds = [0, *cuts.tolist(), time_s.shape[0]]
+    parts = [_slope(time_s[a:b], place_m[a:b], half) for a, b in itertools.pairwise(bounds)]
+    return np.concatenate(parts)
+
+
+def _slope(time_s: Array, place_m: Array, half: int) -> Array:
+    """Slope at every row of a parabola through the rows within `half` of it."""
+    n = time_s.shape[0]
+    if n < 2:
+        return np.zeros_like(place_m)
+    if n < 3:
+        return np.gradient(place_m, time_s, axis=0)
+    width = min(2 * half + 1, n)
+    start = np.clip(np.arange(n) - width // 2, 0, n - width)
+    index = start[:, None] + np.arange(width)
+    u = time_s[index] - time_s[:, None]
+    powers = np.stack([np.ones_like(u), u, u * u], axis=-1)
+    normal = np.swapaxes(powers, 1, 2) @ powers
+    right = np.swapaxes(powers, 1, 2) @ place_m[index]
+    slope: Array = np.linalg.solve(normal, right)[:, 1, :]
+    return slope
+
+
+def derived_rate(time_s: Array, euler_rad: Array) -> Array:
+    """Body rates (n, 3) [rad/s] from attitudes: the turn between the neighbours over its time."""
+    from scipy.spatial.transform import Rotation
+
+    pose = Rotation.from_matrix(euler_to_rotation(euler_rad))
+    turn = (pose[:-1].inv() * pose[1:]).as_rotvec() / np.diff(time_s)[:, None]
+    middle = 0.5 * (time_s[1:] + time_s[:-1])
+    rate: Array = np.stack([np.interp(time_s, middle, turn[:, k]) for k in range(3)], axis=1)
+    return rate

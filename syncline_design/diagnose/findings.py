@@ -1,0 +1,234 @@
+"""A fitted model in words and figures: what is missing, where, how sure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.diagnose.fitting import Data, Model, Opened
+from syncline_design.diagnose.gross import Gross
+from syncline_design.diagnose.identify import Comparison, compare
+from syncline_design.diagnose.noise import NoiseLevel, precision
+from syncline_design.diagnose.scales import figure
+from syncline_design.diagnose.search import SearchResult, Step
+from syncline_design.diagnose.simulation import Scene
+from syncline_design.effects.base import Effect
+
+Label = tuple[str, str, int]
+WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
+MOST_EXCLUDED = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One parameter: its value and standard uncertainty in SI; a convention is a word."""
+
+    value: float | str
+    standard_uncertainty: float | None
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class AliasFigure:
+    """An effect that this log cannot tell from the named one."""
+
+    effect: str
+    sensor: str
+    stage: str
+    cosine: float
+    nats_worse: float
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One missing effect."""
+
+    effect: Effect
+    sensor: str
+    stage: str
+    parameters: Mapping[str, Figure]
+    aliases: tuple[AliasFigure, ...]
+    excluded: tuple[AliasFigure, ...]
+    gain_nat: float
+    log10_p: float | None
+    gross: bool = False
+
+    @property
+    def sentence(self) -> str:
+        """What is wrong, with figures."""
+        shown = {
+            name: f.value
+            if isinstance(f.value, str)
+            else figure(f.value, f.standard_uncertainty, f.unit)
+            for name, f in self.parameters.items()
+        }
+        text = self.effect.sentence.format(sensor=WORDS[self.sensor], **shown)
+        return text[0].upper() + text[1:]
+
+    @property
+    def evidence(self) -> str:
+        """How sure this is, in words."""
+        if self.gross:
+            return f"undoing it makes the usual error {math.exp(self.gain_nat):.0f} times smaller"
+        chance = "less than 1e-300"
+        if self.log10_p is not None and self.log10_p > -300:
+            chance = f"1e{math.floor(self.log10_p)}"
+        return f"saves {self.gain_nat:.1f} nat; noise alone does that with a chance of {chance}"
+
+
+def findings(
+    data: Data, result: SearchResult, gross: Sequence[Gross], signatures: Sequence[object]
+) -> tuple[Finding, ...]:
+    """All findings, gross faults first, then by what they explain."""
+    steps = {s.label: s for s in result.steps}
+    found = [_deterministic(data, result.model, k, steps, signatures) for k in _single(result)]
+    found += [_stochastic(data, result.model, o, steps) for o in result.model.opened]
+    found.sort(key=lambda f: -f.gain_nat)
+    return (*(_gross(data.view, g) for g in gross), *found)
+
+
+def _single(result: SearchResult) -> list[int]:
+    """Indices of acting effects that are findings of their own (a packet's mean is not)."""
+    opened = {o.candidate.label for o in result.model.opened}
+    return [k for k, a in enumerate(result.model.acting) if a.label not in opened]
+
+
+def _deterministic(
+    data: Data, model: Model, index: int, steps: Mapping[Label, Step], signatures: Sequence[object]
+) -> Finding:
+    one = model.acting[index]
+    at = sum(len(a.effect.slopes()) for a in model.acting[:index])
+    figures: dict[str, Figure] = {}
+    for p in one.effect.parameters:
+        spread = None
+        if p in one.effect.slopes():
+            spread = float(np.sqrt(max(model.covariance[at, at], 0.0)))
+            at += 1
+        figures[p.name] = Figure(float(one.values[p.name]), spread, p.unit)
+    compared = compare(data, model, index, signatures)  # type: ignore[arg-type]
+    return _finding(data.view, one.effect, one.label, figures, compared, steps)
+
+
+def _finding(
+    view: Scene,
+    effect: Effect,
+    label: Label,
+    figures: Mapping[str, Figure],
+    compared: Comparison | None,
+    steps: Mapping[Label, Step],
+) -> Finding:
+    step = steps.get(label)
+    aliases = () if compared is None else tuple(_alias(view, a) for a in compared.aliases)
+    excluded = () if compared is None else tuple(_alias(view, a) for a in compared.excluded)
+    return Finding(
+        effect,
+        label[1],
+        view.system.stages[label[2]].name,
+        figures,
+        aliases,
+        excluded[:MOST_EXCLUDED],
+        step.gain if step else 0.0,
+        step.log_p / math.log(10.0) if step and math.isfinite(step.log_p) else None,
+    )
+
+
+def _alias(view: Scene, alias: object) -> AliasFigure:
+    from syncline_design.diagnose.identify import Alias
+
+    assert isinstance(alias, Alias)
+    name, sensor, stage = alias.candidate.label
+    return AliasFigure(name, sensor, view.system.stages[stage].name, alias.cosine, alias.loss)
+
+
+def _gross(view: Scene, fault: Gross) -> Finding:
+    effect, label = fault.acting.effect, fault.acting.label
+    figures = {p.name: Figure(fault.acting.values[p.name], None, p.unit) for p in effect.parameters}
+    stage = view.system.stages[label[2]].name
+    gain = math.log(fault.falls_by)
+    return Finding(effect, label[1], stage, figures, (), (), gain, None, gross=True)
+
+
+def _stochastic(data: Data, model: Model, opened: Opened, steps: Mapping[Label, Step]) -> Finding:
+    """Values of a stochastic effect from the fitted noise; uncertainty from the likelihood."""
+    effect, label = opened.candidate.effect, opened.candidate.label
+    stage = data.view.system.stages[label[2]]
+    units = {p.name: p.unit for p in effect.parameters}
+    sensor = (stage.name, label[1])
+    mean = next((k for k, a in enumerate(model.acting) if a.label == label), None)
+    if mean is not None:
+        at = sum(len(a.effect.slopes()) for a in model.acting[:mean])
+        name = effect.parameters[0].name
+        spread = float(np.sqrt(max(model.covariance[at, at], 0.0)))
+        figures = {name: (float(model.acting[mean].values[name]), spread)}
+    elif opened.what == "size":
+        value = model.level.size[opened.directed]
+        spread = value * _log_spread(data, model, ("size", opened.directed, 0))
+        figures = {effect.parameters[0].name: (value, spread)}
+    elif opened.what == "factor":
+        index = [w.sensor for w in data.structure.white].index(sensor)
+        value = model.level.factor[index]
+        figures = {"factor": (value, value * _log_spread(data, model, ("factor", index, 0)))}
+    else:
+        figures = _wander(data, model, sensor, opened.what)
+    shown = {name: Figure(v, s, units[name]) for name, (v, s) in figures.items()}
+    return _finding(data.view, effect, label, shown, None, steps)
+
+
+def _wander(
+    data: Data, model: Model, sensor: tuple[str, str], what: str
+) -> dict[str, tuple[float, float]]:
+    """Standard deviation [m] (root mean square over the axes it is on) and time constant [s]."""
+    index = [s.sensor for s in data.structure.slow].index(sensor)
+    axes = [2] if what == "down" else [0, 1, 2]
+    white = [w.sensor for w in data.structure.white].index(sensor)
+    scale = max(model.level.factor[white], 1.0)
+    sigma = np.sqrt(np.median(np.sum(data.structure.slow[index].loading ** 2, axis=1), axis=0))
+    parts = [scale * sigma[k] * math.sqrt(model.level.slow[index][k]) for k in axes]
+    size = float(np.sqrt(np.mean(np.square(parts))))
+    spreads = [0.5 * _log_spread(data, model, ("slow", index, k)) for k in axes]
+    time_s = model.level.time_constant_s[index][axes[0]]
+    return {
+        "std_m": (size, size * float(np.mean(spreads)) / math.sqrt(len(axes))),
+        "time_constant_s": (time_s, time_s * _log_spread(data, model, ("time", index, axes[0]))),
+    }
+
+
+def _log_spread(data: Data, model: Model, where: tuple[str, int, int]) -> float:
+    """Standard uncertainty of the logarithm of one noise figure, from the likelihood's curve."""
+    error = model.error[data.noise_rows]
+    share = len(data.noise_rows) / max(len(data.view), 1)
+    step = 0.1
+    nll = [
+        precision(
+            data.noise_structure, _scaled(model.level, where, math.exp(k * step))
+        ).negative_log_likelihood(error)
+        for k in (-1, 0, 1)
+    ]
+    curvature = (nll[0] - 2.0 * nll[1] + nll[2]) / step**2 / share
+    return 1.0 / math.sqrt(curvature) if curvature > 1e-6 else math.inf
+
+
+def _scaled(level: NoiseLevel, where: tuple[str, int, int], by: float) -> NoiseLevel:
+    from dataclasses import replace
+
+    kind, index, axis = where
+    if kind == "size":
+        sizes = tuple(s * by if k == index else s for k, s in enumerate(level.size))
+        return replace(level, size=sizes)
+    if kind == "factor":
+        factors = tuple(f * by if k == index else f for k, f in enumerate(level.factor))
+        return replace(level, factor=factors)
+    if kind == "time":
+        times = tuple(
+            tuple(t * by for t in own) if k == index else own
+            for k, own in enumerate(level.time_constant_s)
+        )
+        return replace(level, time_constant_s=times)
+    slow = tuple(
+        tuple(v * by if (k, a) == (index, axis) else v for a, v in enumerate(own))
+        for k, own in enumerate(level.slow)
+    )
+    return replace(level, slow=slow)

@@ -1,0 +1,166 @@
+"""Gross faults first: frames, units, signs, whole-second slips.
+
+They are discrete, so each is tried on the whole log by re-simulation; it is taken when the usual
+size of the error falls to a third or less and was far from noise before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.diagnose.log import Log, StageLog
+from syncline_design.diagnose.simulation import Acting, Scene, acting, scene
+from syncline_design.effects import registry
+from syncline_design.effects.base import Array, Target
+from syncline_design.effects.frame_convention import conventions
+from syncline_design.model.system import System
+from syncline_design.simulate.chain import euler_to_rotation, rotation_to_euler
+
+FALLS_TO = 1.0 / 3.0
+FAR_FROM_NOISE = 4.0  # times the expected size
+MOST = 3  # gross faults at once
+ROWS = 3000
+SECONDS = tuple(k for k in range(-18, 19) if k)
+DEGREE = np.pi / 180.0
+
+
+@dataclass(frozen=True, slots=True)
+class Gross:
+    """A gross fault found: the acting effect, and the log with it undone where it is a column's."""
+
+    acting: Acting
+    falls_by: float  # usual size of the error before over after
+
+
+def undone(log: Log, sensor: Target, stage: int, convention: str) -> Log:
+    """The log with a sensor's columns brought back to the package's conventions."""
+    old = log.stages[stage]
+    if sensor == "position" and old.antenna_m is not None:
+        new = replace(old, antenna_m=_position(old.antenna_m, convention))
+    elif sensor == "attitude":
+        new = replace(old, euler_rad=_attitude(old.euler_rad, convention))
+    else:
+        new = _ranging(old, convention)
+    stages = tuple(new if k == stage else s for k, s in enumerate(log.stages))
+    return replace(log, stages=stages)
+
+
+def _position(antenna: Array, convention: str) -> Array:
+    flipped = antenna * np.array([1.0, 1.0, -1.0])
+    return flipped[:, [1, 0, 2]] if convention == "enu" else flipped
+
+
+def _attitude(euler: Array, convention: str) -> Array:
+    roll, pitch, yaw = euler.T
+    if convention == "transposed":
+        return rotation_to_euler(np.swapaxes(euler_to_rotation(euler), 1, 2))
+    columns = {
+        "yaw_sign": (roll, pitch, -yaw),
+        "yaw_180": (roll, pitch, yaw - np.pi),
+        "enu": (roll, -pitch, 0.5 * np.pi - yaw),
+        "radians": (roll / DEGREE, pitch / DEGREE, yaw / DEGREE),
+        "degrees": (roll * DEGREE, pitch * DEGREE, yaw * DEGREE),
+    }[convention]
+    wrapped: Array = np.stack(columns, axis=-1)
+    return wrapped
+
+
+def _ranging(stage: StageLog, convention: str) -> StageLog:
+    azimuth, elevation = stage.azimuth_rad, stage.elevation_rad
+    assert azimuth is not None
+    assert elevation is not None
+    if convention == "azimuth_sign":
+        return replace(stage, azimuth_rad=-azimuth)
+    if convention == "elevation_sign":
+        return replace(stage, elevation_rad=-elevation)
+    factor = 1.0 / DEGREE if convention == "radians" else DEGREE
+    return replace(stage, azimuth_rad=azimuth * factor, elevation_rad=elevation * factor)
+
+
+def gross_faults(
+    system: System,
+    log: Log,
+    known: Sequence[Acting],
+    expected_m: float,
+    exclude: Sequence[str] = (),
+) -> tuple[tuple[Gross, ...], Log, tuple[Acting, ...]]:
+    """Gross faults of a log, the log with column faults undone, and the slips to simulate.
+
+    expected_m: usual length of the error vector that the spec's noise makes.
+    """
+    found: list[Gross] = []
+    slips: tuple[Acting, ...] = ()
+    while len(found) < MOST:
+        thin = log.rows(slice(None, None, max(1, len(log) // ROWS)))
+        size = usual_size(scene(system, thin, (*known, *slips)).error())
+        if not size > FAR_FROM_NOISE * expected_m:
+            break
+        sizes = [
+            (usual_size(trial()), k, one)
+            for k, (one, trial) in enumerate(
+                _trials(system, log, thin, (*known, *slips), [g.acting.label for g in found])
+            )
+            if one.effect.name not in exclude
+        ]
+        if not sizes:
+            break
+        best, _, one = min(sizes, key=lambda entry: entry[:2])
+        if not best < FALLS_TO * size:
+            break
+        found.append(Gross(one, size / max(best, 1e-300)))
+        if one.effect.name == "frame_convention":
+            log = undone(log, one.sensor, one.stage, str(one.values["convention"]))
+        else:
+            slips = (*slips, one)
+    return tuple(found), log, slips
+
+
+Trials = list[tuple[Acting, Callable[[], Array]]]
+
+
+def _trials(
+    system: System,
+    log: Log,
+    thin: Log,
+    known: Sequence[Acting],
+    taken: Sequence[tuple[str, str, int]],
+) -> Trials:
+    """Every gross fault with a function that re-simulates the log under it."""
+    trials: Trials = []
+    base = scene(system, thin, known)
+    for k, stage in enumerate(system.stages):
+        sensors = (
+            ("position",) if log.kind == "position" else registry()["frame_convention"].sensors
+        )
+        for sensor in sensors:
+            if getattr(stage, sensor) is None:
+                continue
+            for convention in conventions(sensor):
+                values: dict[str, float] = {"convention": convention}  # type: ignore[dict-item]
+                one = acting("frame_convention", sensor, k, values)
+                if one.label not in taken:
+                    trials.append((one, _reread(system, thin, sensor, k, convention, known)))
+    if ("integer_second_slip", "position", 0) not in taken:
+        for seconds in SECONDS:
+            one = acting("integer_second_slip", "position", 0, {"seconds": float(seconds)})
+            trials.append((one, _slipped(base, one)))
+    return trials
+
+
+def _reread(
+    system: System, thin: Log, sensor: Target, stage: int, convention: str, known: Sequence[Acting]
+) -> Callable[[], Array]:
+    return lambda: scene(system, undone(thin, sensor, stage, convention), known).error()
+
+
+def _slipped(base: Scene, one: Acting) -> Callable[[], Array]:
+    return lambda: base.error((one,))
+
+
+def usual_size(error: Array) -> float:
+    """Median length of the error vector [m]; components without a truth count as zero."""
+    length = np.sqrt(np.nansum(error**2, axis=1))
+    return float(np.median(length))

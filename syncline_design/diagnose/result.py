@@ -1,0 +1,154 @@
+"""What a diagnosis says, and how it is written down (schema syncline-design/diagnosis/v1)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from syncline_design.diagnose.findings import Finding
+from syncline_design.diagnose.gap import Gap
+from syncline_design.diagnose.regimes import Cell, Remainder
+from syncline_design.spec_effects import EffectChoice
+
+SCHEMA = "syncline-design/diagnosis/v1"
+Verdict = Literal["agrees", "explained", "unexplained"]
+Json = dict[str, Any]
+EXIT_CODES: Mapping[Verdict, int] = {"agrees": 0, "explained": 1, "unexplained": 1}
+
+
+@dataclass(frozen=True, slots=True)
+class Stairs:
+    """The held-out gap after an addition."""
+
+    label: str
+    gap: Gap
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The outcome; `data` holds what figures need, plain lists and numbers."""
+
+    verdict: Verdict
+    findings: tuple[Finding, ...]
+    remaining: Remainder
+    where_before: tuple[Cell, ...]
+    where_after: tuple[Cell, ...]
+    first_disagreement_s: float | None
+    gap: Gap | None
+    regime: tuple[str, Gap | None]
+    placebo: tuple[str, Gap | None]
+    steps: tuple[Stairs, ...]
+    unseen: tuple[str, ...]
+    log: Json
+    noise: Json
+    data: Json
+    provenance: Json
+
+    @property
+    def exit_code(self) -> int:
+        """0 agrees, 1 something is missing."""
+        return EXIT_CODES[self.verdict]
+
+    @property
+    def unexplained(self) -> bool:
+        return self.verdict == "unexplained"
+
+    def effects_entries(self) -> tuple[EffectChoice, ...]:
+        """The findings as entries of a spec's `effects:`, for `spec_writer.with_effects_text`."""
+        return tuple(_entry(finding) for finding in self.findings)
+
+    def to_json(self) -> Json:
+        """Plain data; every number is finite or null."""
+        document = {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "findings": [_finding_json(f) for f in self.findings],
+            "remaining": {
+                "unexplained": self.unexplained,
+                "p": self.remaining.p,
+                "where": [_cell_json(c) for c in self.where_after],
+            },
+            "where": [_cell_json(c) for c in self.where_before],
+            "first_disagreement_s": self.first_disagreement_s,
+            "gap": self._gap_json(),
+            "steps": [{"added": s.label, **_gap_json(s.gap)} for s in self.steps],
+            "unseen": list(self.unseen),
+            "log": self.log,
+            "noise": self.noise,
+            "data": self.data,
+            "provenance": self.provenance,
+        }
+        clean: Json = _finite(document)
+        return clean
+
+    def _gap_json(self) -> Json:
+        return {
+            **_gap_json(self.gap),
+            "regime": {"held_out": self.regime[0], **_gap_json(self.regime[1])},
+            "placebo": {"added": self.placebo[0], **_gap_json(self.placebo[1])},
+        }
+
+
+def _entry(finding: Finding) -> EffectChoice:
+    values = {name: figure.value for name, figure in finding.parameters.items()}
+    spreads = {
+        name: figure.standard_uncertainty
+        for name, figure in finding.parameters.items()
+        if figure.standard_uncertainty is not None and math.isfinite(figure.standard_uncertainty)
+    }
+    return EffectChoice(
+        effect=finding.effect.name,
+        sensor=finding.sensor,  # type: ignore[arg-type]
+        stage=finding.stage,
+        parameters=values,
+        standard_uncertainty=spreads,
+        source="diagnose",
+    )
+
+
+def _finding_json(finding: Finding) -> Json:
+    return {
+        "effect": finding.effect.name,
+        "sensor": finding.sensor,
+        "stage": finding.stage,
+        "parameters": {name: asdict(f) for name, f in finding.parameters.items()},
+        "aliases": [asdict(a) for a in finding.aliases],
+        "excluded": [asdict(a) for a in finding.excluded],
+        "sentence": finding.sentence,
+        "evidence": finding.evidence,
+        "gain_nat": finding.gain_nat,
+        "log10_p": finding.log10_p,
+        "confused_with": finding.effect.confused_with,
+        "separated_by": finding.effect.separated_by,
+        "source": finding.effect.source,
+    }
+
+
+def _cell_json(cell: Cell) -> Json:
+    return asdict(cell)
+
+
+def _gap_json(gap: Gap | None) -> Json:
+    if gap is None:
+        return {"held_out": None, "closed_fraction": None}
+    return {
+        "held_out": {
+            "before": asdict(gap.before),
+            "after": asdict(gap.after),
+            "floor": asdict(gap.floor),
+        },
+        "closed_fraction": gap.closed_fraction,
+        "nll_saved_per_sample": {"value": gap.difference, "standard_error": gap.difference_error},
+    }
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value

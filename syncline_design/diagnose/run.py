@@ -1,0 +1,188 @@
+"""The whole diagnosis, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from syncline_design import __version__
+from syncline_design.diagnose.candidates import candidates, directed_parts
+from syncline_design.diagnose.expected_noise import structure_of
+from syncline_design.diagnose.figures_data import figures_data
+from syncline_design.diagnose.findings import findings
+from syncline_design.diagnose.fitting import Data, data_of
+from syncline_design.diagnose.gap import Gap, block_folds, gap, regime_fold
+from syncline_design.diagnose.gross import gross_faults
+from syncline_design.diagnose.identify import unseen
+from syncline_design.diagnose.log import Log
+from syncline_design.diagnose.regimes import (
+    first_disagreement_s,
+    remainder,
+    strongest,
+    where_map,
+)
+from syncline_design.diagnose.result import Diagnosis, Json, Stairs, Verdict
+from syncline_design.diagnose.search import Search, SearchResult, start_search
+from syncline_design.diagnose.settings import DiagnosisSettings, Progress, silent
+from syncline_design.diagnose.simulation import scene
+from syncline_design.diagnose.system import Measured, measured
+from syncline_design.loading import LoadedSpec, load
+
+REMAINDER_SHARE = 0.2  # of the false-alarm rate: for the test of what remains
+
+
+def diagnose(
+    spec: LoadedSpec | Path | str,
+    log_paths: Sequence[Path | str] = (),
+    settings: DiagnosisSettings | None = None,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Find where a log disagrees with its spec, name what is missing, and show the gap shrink.
+
+    Raises BadInput for a spec or log that cannot be used.
+    """
+    loaded = spec if isinstance(spec, LoadedSpec) else load(spec)
+    progress("reading the log", 0.0)
+    inputs = measured(loaded, [Path(p) for p in log_paths])
+    return diagnose_measured(inputs, settings or DiagnosisSettings(), loaded, progress)
+
+
+def diagnose_measured(
+    inputs: Measured,
+    settings: DiagnosisSettings,
+    loaded: LoadedSpec | None = None,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """The diagnosis of a system and a log that are already in memory."""
+    progress("looking for gross faults", 0.05)
+    faults, log, slips = gross_faults(
+        inputs.system,
+        inputs.log,
+        inputs.known,
+        expected_size(inputs),
+        settings.exclude_effects,
+    )
+    view = scene(inputs.system, log, (*inputs.known, *slips))
+    parts = directed_parts(view, candidates(view, settings.exclude_effects))
+    data = data_of(view, structure_of(view, parts))
+    progress("searching", 0.15)
+    search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
+    result = search.run()
+    progress("testing what remains", 0.7)
+    rest = remainder(data, result.model, search.rng)
+    named = bool(result.model.labels or faults)
+    left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
+    verdict: Verdict = "unexplained" if left else ("explained" if named else "agrees")
+    progress("measuring the gap", 0.8)
+    shown = findings(data, result, faults, search.signatures)
+    cells = where_map(view, result.base.error, result.model.precision)
+    cells_after = where_map(view, result.model.error, result.model.precision)
+    folds = block_folds(data)
+    regime_name, regime = regime_fold(data)
+    return Diagnosis(
+        verdict=verdict,
+        findings=shown,
+        remaining=rest,
+        where_before=strongest(cells),
+        where_after=strongest(cells_after),
+        first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
+        gap=gap(data, result.model, folds, left),
+        regime=(regime_name, gap(data, result.model, regime, left)),
+        placebo=_placebo(data, search, result, left),
+        steps=_stairs(data, result, left),
+        unseen=_unseen(data, search, result),
+        log=log_json(inputs.log),
+        noise=_noise_json(data, result),
+        data=figures_data(data, result, cells),
+        provenance=_provenance(settings, loaded),
+    )
+
+
+def expected_size(inputs: Measured) -> float:
+    """Usual length of the error vector [m] that the spec's noise makes."""
+    view = scene(inputs.system, inputs.log.rows(slice(0, None, max(1, len(inputs.log) // 500))))
+    structure = structure_of(view)
+    total = sum(np.einsum("nii->n", w.covariance) for w in structure.white)
+    return float(np.sqrt(np.median(total)))
+
+
+def _stairs(data: Data, result: SearchResult, left: bool) -> tuple[Stairs, ...]:
+    folds = block_folds(data)
+    stairs = []
+    for step in result.steps:
+        found = gap(data, step.model, folds, left)
+        if found is not None:
+            name, sensor, _ = step.label
+            stairs.append(Stairs(f"{name} ({sensor})", found))
+    return tuple(stairs)
+
+
+def _placebo(
+    data: Data, search: Search, result: SearchResult, left: bool
+) -> tuple[str, Gap | None]:
+    """The gap with one more effect, drawn from those that were not chosen."""
+    free = [s for s in search.free_signatures(result.model) if not s.at]
+    if not free or not result.model.labels:
+        return "", None
+    chosen = free[int(search.rng.integers(len(free)))]
+    name, sensor, _ = chosen.candidate.label
+    columns = np.nan_to_num(chosen.columns)
+    found = gap(data, result.model, block_folds(data), left, columns)
+    return f"{name} ({sensor})", found
+
+
+def _unseen(data: Data, search: Search, result: SearchResult) -> tuple[str, ...]:
+    hidden = unseen(data, result.model, search.free_signatures(result.model))
+    return tuple(f"{a.effect.name} ({a.sensor})" for a in hidden)
+
+
+def log_json(log: Log) -> Json:
+    """What was read and what was left out."""
+    return {
+        "kind": log.kind,
+        "rows": log.rows_read,
+        "used": len(log),
+        "rejected": dict(log.rejected),
+        "notes": list(log.notes),
+        "duration_s": log.duration_s,
+        "interval_s": log.interval_s,
+    }
+
+
+def _noise_json(data: Data, result: SearchResult) -> Json:
+    level = result.model.level
+    return {
+        "white_factor": {
+            "/".join(w.sensor): f for w, f in zip(data.structure.white, level.factor, strict=True)
+        },
+        "slow": {
+            "/".join(s.sensor): {"variance_over_spec": list(v), "time_constant_s": list(t)[:1]}
+            for s, v, t in zip(data.structure.slow, level.slow, level.time_constant_s, strict=True)
+        },
+        "rows_fitted": len(data.noise_rows),
+        "remainder": asdict(result_remainder(result)),
+    }
+
+
+def result_remainder(result: SearchResult) -> Any:
+    """The negative log likelihoods before and after [nat]."""
+    from syncline_design.diagnose.figures_data import Likelihoods
+
+    return Likelihoods(result.base.nll, result.model.nll)
+
+
+def _provenance(settings: DiagnosisSettings, loaded: LoadedSpec | None) -> Json:
+    return {
+        "version": __version__,
+        "seed": settings.seed,
+        "false_alarm_rate": settings.false_alarm_rate,
+        "max_effects": settings.max_effects,
+        "exclude_effects": list(settings.exclude_effects),
+        "spec": loaded.spec.name if loaded else None,
+        "spec_sha256": loaded.spec_sha256 if loaded else None,
+        "catalogs_sha256": loaded.catalogs_sha256 if loaded else None,
+    }

@@ -1,0 +1,93 @@
+"""A diagnosis as text that a field engineer reads."""
+
+from __future__ import annotations
+
+from syncline_design.diagnose.findings import AliasFigure, Finding
+from syncline_design.diagnose.gap import Gap
+from syncline_design.diagnose.regimes import Cell
+from syncline_design.diagnose.result import Diagnosis
+from syncline_design.diagnose.scales import figure
+
+OPENING = {
+    "agrees": "AGREES: nothing is missing; what differs is the noise that the spec expects.",
+    "explained": "EXPLAINED: what is missing was found, and what remains is noise.",
+    "unexplained": "UNEXPLAINED: something remains that no effect of the dictionary explains.",
+}
+
+
+def summary_text(diagnosis: Diagnosis) -> str:
+    """Verdict, findings, gap, what remains and what this log could not show."""
+    lines = [OPENING[diagnosis.verdict], ""]
+    for number, finding in enumerate(diagnosis.findings, 1):
+        lines += _finding_lines(number, finding)
+    lines += _gap_lines(diagnosis)
+    if diagnosis.unexplained:
+        lines += ["", "Where it remains:", *(_cell_line(c) for c in diagnosis.where_after)]
+        lines.append(f"  chance that noise does this: {diagnosis.remaining.p:.1g}")
+    elif diagnosis.findings and diagnosis.where_before:
+        lines += ["", "Where it was seen:", *(_cell_line(c) for c in diagnosis.where_before[:4])]
+    if diagnosis.unseen:
+        lines += ["", f"This log could not show: {', '.join(diagnosis.unseen)}."]
+    lines += ["", *_log_lines(diagnosis)]
+    return "\n".join(lines) + "\n"
+
+
+def _finding_lines(number: int, finding: Finding) -> list[str]:
+    where = f"{finding.sensor}, {finding.stage}"
+    lines = [
+        f"{number}. {finding.sentence}.",
+        f"   {finding.effect.name} ({where}); {finding.evidence}",
+    ]
+    if finding.aliases:
+        names = "; ".join(_name(a) for a in finding.aliases)
+        lines.append(f"   this log cannot tell it from: {names}")
+        lines.append(f"   to separate them: {finding.effect.separated_by}")
+    elif finding.excluded:
+        names = ", ".join(_name(a) for a in finding.excluded[:3])
+        lines.append(f"   excluded: {names}")
+    return lines
+
+
+def _name(alias: AliasFigure) -> str:
+    return f"{alias.effect} ({alias.sensor})"
+
+
+def _gap_lines(diagnosis: Diagnosis) -> list[str]:
+    gap = diagnosis.gap
+    if gap is None or not diagnosis.findings:
+        return []
+    lines = ["", f"On rows that the fit has not seen: {_gap_text(gap)}"]
+    name, regime = diagnosis.regime
+    if regime is not None:
+        lines.append(f"On a regime that the fit has not seen ({name}): {_gap_text(regime)}")
+    label, placebo = diagnosis.placebo
+    if placebo is not None:
+        change = placebo.difference - gap.difference
+        lines.append(f"Adding {label} as well, which was not chosen: {change:+.4f} nat per sample")
+    return lines
+
+
+def _gap_text(gap: Gap) -> str:
+    closed = ""
+    if gap.closed_fraction is not None:
+        closed = f"; {100.0 * gap.closed_fraction:.0f} % of the gap is closed"
+    return (
+        f"RMS {figure(gap.before.rms_m, None, 'm')} before, {figure(gap.after.rms_m, None, 'm')} "
+        f"after, {figure(gap.floor.rms_m, None, 'm')} at best{closed}"
+    )
+
+
+def _cell_line(cell: Cell) -> str:
+    mean = figure(cell.mean_m, None, "m")
+    return (
+        f"  {cell.covariate} {cell.low:.4g} to {cell.high:.4g} {cell.unit}, {cell.axis}: "
+        f"{mean} on average, {abs(cell.score):.0f} standard errors"
+    )
+
+
+def _log_lines(diagnosis: Diagnosis) -> list[str]:
+    log = diagnosis.log
+    lines = [f"Log: {log['used']} of {log['rows']} rows used, {log['kind']}."]
+    lines += [f"  left out: {count} ({reason})" for reason, count in log["rejected"].items()]
+    lines += [f"  {note}" for note in log["notes"]]
+    return lines
