@@ -54,7 +54,7 @@ def test_a_typo_is_refused_at_its_place_and_nothing_is_written(tmp_path: Path) -
     assert done.returncode == 2
     assert done.stdout == ""
     line = text.splitlines().index("    platform: uav_fixed_wing") + 1
-    assert done.stderr.startswith(f"{spec}:{line}:5: stages[0].platfrom: unknown key")
+    assert f"{spec}:{line}:5: stages[0].platfrom: unknown key" in done.stderr
     assert "did you mean platform?" in done.stderr
     assert "Traceback" not in done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["typo.yaml"]
