@@ -375,3 +375,108 @@ def with_hostile_text(text: str) -> dict[str, Any]:
         "fixes": [{"text": text}],
     }
     return verdict
+
+
+def reproduction() -> dict[str, Any]:
+    taus = [10.0 ** (-5 + 0.5 * i) for i in range(9)]
+    one = {
+        "label": "Car",
+        "sensor_error_m": 0.1,
+        "sync_rate_mps": 45.1,
+        "tau_crit_s": 0.1 / 45.1,
+        "error_m": [0.1 + 45.1 * tau for tau in taus],
+    }
+    cell = {
+        "table": "tau_crit_georeferencing",
+        "row": "ublox_f9p_pvt",
+        "column": "usv",
+        "printed": 520.0,
+        "printed_text": "520 ms",
+        "computed": 519.6152422706632,
+        "unit": "ms",
+        "status": "agrees",
+        "note": "",
+    }
+    return {
+        "schema": "syncline-design/reproduction/v1",
+        "version": "0.1.0",
+        "ok": True,
+        "counts": {"tau_crit": {"printed": 2, "agrees": 1, "erratum": 1, "differs": 0}},
+        "cells": [
+            cell,
+            {**cell, "column": "car", "status": "erratum", "computed": 80.0, "note": "rounded"},
+        ],
+        "inputs": [{**cell, "table": "platforms", "row": "usv", "column": "v_max"}],
+        "errata": [{"id": "x", "where": "table 2", "reason": "printed twice", "cells": []}],
+        "figures": [
+            {"number": 1, "title": "A Syncline", "note": "", "tau_s": taus, "curves": [one],
+             "simulated": []},
+            {"number": 2, "title": "Several", "note": "chosen", "tau_s": taus,
+             "curves": [one, {**one, "label": "A payload with a name far too long for a legend"}],
+             "simulated": []},
+            {"number": 3, "title": "Simulated", "note": "", "tau_s": taus, "curves": [one],
+             "simulated": [{"tau_s": 1e-3, "worst_case_m": 0.14, "ratio_to_syncline": 0.965}]},
+        ],
+    }  # fmt: skip
+
+
+def simulation() -> dict[str, Any]:
+    part = monte_carlo_section(0.094)
+    grid = [{**row, "reason": "lever arms swing", "bound_m": 1.0, "gap": 0.0}
+            for row in part.pop("grid")]  # fmt: skip
+    part["probability_within_target"]["target_m"] = 0.3
+    part["worst_case"]["certificate"] = {"gap": 0.001, "text": "nothing gives more than the bound"}
+    return {
+        "schema": "syncline-design/simulation/v1",
+        "spec": {"name": "UAV", "file": "specs/uav.yaml"},
+        "monte_carlo": part,
+        "grid": grid,
+        "trajectory": None,
+        "versions": {"numpy": "2.0"},
+    }
+
+
+def diagnosis() -> dict[str, Any]:
+    time = [0.5 * i for i in range(200)]
+    signature = [0.4 * math.sin(0.05 * t) for t in time]
+    axis = {"before": signature, "after": [0.0] * len(time), "signature": signature}
+    scores = {"rms_m": 0.283, "reduced_chi2": 33.1, "nll_per_sample": 12.1, "coverage_95": 0.31}
+    good = {"rms_m": 0.021, "reduced_chi2": 1.02, "nll_per_sample": -4.1, "coverage_95": 0.949}
+    return {
+        "schema": "syncline-design/diagnosis/v1",
+        "verdict": "explained",
+        "spec": {"name": "Car", "file": "car.yaml"},
+        "findings": [
+            {
+                "effect": "latency",
+                "sensor": "position",
+                "stage": "car",
+                "sentence": "GNSS positions are 87.1 ms older than their stamps.",
+                "parameters": {
+                    "latency_s": {"value": 0.0871, "standard_uncertainty": 0.0003, "unit": "s"}
+                },
+                "aliases": ["lever_arm (position)"],
+                "evidence": {"delta_nll": 812.0},
+                "separated_by": "vary the speed",
+            }
+        ],
+        "remaining": {"unexplained": False, "where": []},
+        "where": ["speed above 8 m/s"],
+        "gap": {
+            "held_out": {"before": scores, "after": good, "floor": good},
+            "closed_fraction": 0.981,
+        },
+        "steps": [scores, {"effect": "latency", **good}],
+        "log": {"rows": 3000, "used": 2987, "rejected": {"missing values": 13}},
+        "plots": {
+            "residuals": {"time_s": time, "axes": {"north": axis, "east": axis, "down": axis}},
+            "where_map": [
+                {"covariate": "speed", "unit": "m/s",
+                 "cells": [{"low": 0, "high": 2, "score": 1.0}, {"low": 2, "high": 4, "score": 9}]}
+            ],
+            "coverage": [{"nominal": 0.5, "before": 0.1, "after": 0.5}],
+        },
+        "verdict_before": "meets",
+        "verdict_after": "fails",
+        "provenance": {"seed": 0},
+    }  # fmt: skip

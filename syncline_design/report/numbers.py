@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from syncline_design.units import Dimension, format_quantity
+from syncline_design.units import UNITS, Dimension, format_quantity
 
 MISSING: Final = "\N{EM DASH}"
 _TYPOGRAPHIC = (
@@ -110,3 +110,36 @@ def in_unit(value: Any, unit: str, digits: int = 4) -> str:
             return number(value, digits)
         case _:
             return money(value, unit)
+
+
+_DIMENSIONS: Final = {
+    "m": Dimension.LENGTH,
+    "s": Dimension.TIME,
+    "rad": Dimension.ANGLE,
+    "m/s": Dimension.SPEED,
+    "rad/s": Dimension.ANGULAR_RATE,
+    "m/s^2": Dimension.ACCELERATION,
+}
+
+
+def with_uncertainty(value: float, uncertainty: float | None, unit: str) -> str:
+    """An SI estimate and its standard uncertainty in one unit: `87.1 ms ± 0.3 ms`.
+
+    The uncertainty keeps two figures, the estimate ends where the uncertainty does (GUM 7.2.6).
+    """
+    dimension = _DIMENSIONS.get(unit, Dimension.DIMENSIONLESS)
+    if uncertainty is None or uncertainty <= 0.0:
+        text = _shown(value, dimension, 4)
+        return text if dimension is not Dimension.DIMENSIONLESS else f"{text} {unit}".strip()
+    size = max(abs(value), uncertainty)
+    shown = unit
+    factor = 1.0
+    if dimension is not Dimension.DIMENSIONLESS:
+        shown = format_quantity(size, dimension).rpartition(" ")[2]
+        factor = float(UNITS[shown][1])
+    decimals = max(0, 1 - math.floor(math.log10(uncertainty / factor)))
+    body = f"{value / factor:.{decimals}f} \N{PLUS-MINUS SIGN} {uncertainty / factor:.{decimals}f}"
+    text = f"{body} {shown}".strip()
+    for plain, printed in _TYPOGRAPHIC:
+        text = text.replace(plain, printed)
+    return text.replace(" ", "\N{NO-BREAK SPACE}")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from syncline_design.report import numbers, page, verdict_tables, verdict_words
 from syncline_design.report.findings import spec_file, spec_name
@@ -32,14 +33,20 @@ def render_verdicts(verdicts: Sequence[Json]) -> str:
                 "file": spec_file(verdict),
                 "outcome": verdict_words.outcome(verdict),
                 "sentence": verdict_words.design_sentence(verdict),
-                "requirements": verdict_tables.requirements(verdict)
-                if items(verdict, "requirements")
-                else None,
+                "requirements": _requirements(verdict, index),
                 "problems": items(verdict, "problems"),
             }
-            for verdict in clean
+            for index, verdict in enumerate(clean, start=1)
         ],
     )
+
+
+def _requirements(verdict: Json, index: int) -> Table | None:
+    """A spec's requirements under a caption of its own, for readers that jump between tables."""
+    if not items(verdict, "requirements"):
+        return None
+    caption = f"Requirements of spec {index}, {spec_name(verdict)}"
+    return replace(verdict_tables.requirements(verdict), caption=caption)
 
 
 def _overview(verdicts: Sequence[Json]) -> Table:

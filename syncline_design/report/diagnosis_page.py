@@ -1,0 +1,268 @@
+"""The page of `diagnose`: what is missing, how sure, what it explains, what remains."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+
+from syncline_design.report import figures_diagnosis as drawings
+from syncline_design.report import numbers, page
+from syncline_design.report.svg import InlineFigure
+from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.text import harmless, sentence_list
+from syncline_design.report.verdict_words import Json, Outcome, items, named, part
+from syncline_design.units import split_suffix
+
+_OUTCOMES: Final[dict[str, Outcome]] = {
+    "agrees": Outcome("good", "\u2713", "Log and simulation agree"),
+    "explained": Outcome("warn", "!", "Something was missing, and it has a name"),
+    "unexplained": Outcome("bad", "?", "Something remains unexplained"),
+}
+_CONTENTS: Final = (
+    ("findings", "Findings"),
+    ("gap", "Gap"),
+    ("residuals", "Residuals"),
+    ("where", "Where"),
+    ("design", "Design"),
+    ("log", "Log"),
+    ("provenance", "Provenance"),
+)
+
+
+def render_diagnosis(data: Json) -> str:
+    """The HTML page of one diagnosis (schema syncline-design/diagnosis/v1)."""
+    data = harmless(data)
+    drawn = _figures(data)
+    sections: dict[str, Any] = {
+        "findings": [_finding(entry) for entry in items(data, "findings")],
+        "gap": [t for t in (_gap(data), _steps(data)) if t is not None],
+        "residuals": "residuals" in drawn,
+        "where": _where(data),
+        "design": [
+            (label, _text(data[key]))
+            for key, label in (("verdict_before", "Before"), ("verdict_after", "After"))
+            if data.get(key)
+        ],
+        "log": _log_facts(data),
+        "provenance": _provenance(data),
+    }
+    return page.render_page(
+        "diagnosis.html.j2",
+        kind="Diagnosis",
+        name=str(part(data, "spec").get("name") or "Measured log against simulation"),
+        outcome=_OUTCOMES.get(str(data.get("verdict")), _OUTCOMES["unexplained"]),
+        sentence=_sentence(data),
+        facts=_facts(data),
+        contents=[(key, label) for key, label in _CONTENTS if sections[key]],
+        sections=sections,
+        figures={key: None if key not in drawn else page.trusted_svg(drawn[key].svg)
+                 for key in ("residuals", "gap", "where")},
+        coverage=_coverage(data),
+        rejected=_rejected(data),
+        remaining=_remaining(data),
+    )  # fmt: skip
+
+
+def parameter_text(entry: Json) -> str:
+    """`87.1 ms ± 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
+    value, unit = numbers.finite(entry.get("value")), str(entry.get("unit") or "")
+    if value is None:
+        return _text(entry.get("value"))
+    return numbers.with_uncertainty(value, numbers.finite(entry.get("standard_uncertainty")), unit)
+
+
+def _text(value: object) -> str:
+    """Any JSON value as words: lists joined, mappings as `key value`."""
+    if value is None:
+        return ""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{key.replace('_', ' ')} {_text(entry)}" for key, entry in value.items())
+    if isinstance(value, list | tuple):
+        return sentence_list([_text(entry) for entry in value])
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return numbers.number(value) if isinstance(value, int | float) else str(value)
+
+
+def _finding(entry: Json) -> dict[str, Any]:
+    parameters = [
+        (split_suffix(name)[0].replace("_", " "), parameter_text(value))
+        for name, value in named(entry, "parameters")
+    ]
+    return {
+        "title": str(entry.get("effect")).replace("_", " "),
+        "code": str(entry.get("effect")),
+        "place": " ".join(str(entry.get(key) or "") for key in ("stage", "sensor")).strip(),
+        "sentence": str(entry.get("sentence") or ""),
+        "parameters": parameters,
+        "aliases": _text(entry.get("aliases")),
+        "separated_by": _text(entry.get("separated_by")),
+        "evidence": _text(entry.get("evidence")),
+    }
+
+
+def _sentence(data: Json) -> str:
+    found = items(data, "findings")
+    if not found:
+        remaining = part(data, "remaining").get("unexplained")
+        return (
+            "No effect of the dictionary explains what differs."
+            if remaining
+            else "Nothing beyond the spec's own noise was found."
+        )
+    return " ".join(str(e.get("sentence") or f"{e.get('effect')} ({e.get('sensor')}).")
+                    for e in found)  # fmt: skip
+
+
+def _facts(data: Json) -> list[tuple[str, str]]:
+    held_out, log = part(part(data, "gap"), "held_out"), part(data, "log")
+    facts = []
+    closed = part(data, "gap").get("closed_fraction")
+    if numbers.finite(closed) is not None:
+        facts.append(("Gap closed on held-out data", numbers.percent(closed)))
+    for key, label in (("before", "RMS before"), ("after", "RMS after"), ("floor", "Floor")):
+        rms = part(held_out, key).get("rms_m")
+        if numbers.finite(rms) is not None:
+            facts.append((label, numbers.length(rms, 3)))
+    if log.get("rows") is not None:
+        facts.append(("Rows used", f"{numbers.count(log.get('used'))} of "
+                                   f"{numbers.count(log.get('rows'))}"))  # fmt: skip
+    return facts
+
+
+def _score_cells(entry: Json) -> list[Cell]:
+    return [
+        Cell(numbers.length(entry.get("rms_m")), numbers.finite(entry.get("rms_m"))),
+        Cell(numbers.number(entry.get("reduced_chi2")), numbers.finite(entry.get("reduced_chi2"))),
+        Cell(numbers.number(entry.get("nll_per_sample")),
+             numbers.finite(entry.get("nll_per_sample"))),
+        Cell(numbers.percent(entry.get("coverage_95")), numbers.finite(entry.get("coverage_95"))),
+    ]  # fmt: skip
+
+
+_SCORES: Final = ("RMS #", "Reduced \u03c7\u00b2 #", "NLL per sample #", "95 % coverage #")
+
+
+def _gap(data: Json) -> Table | None:
+    held_out = part(part(data, "gap"), "held_out")
+    rows = [
+        (Cell(label), *_score_cells(part(held_out, key)))
+        for key, label in (("before", "before"), ("after", "after"), ("floor", "floor"))
+        if part(held_out, key)
+    ]
+    return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
+
+
+def _step_label(entry: Json, index: int) -> str:
+    effect = entry.get("effect") or entry.get("added") or entry.get("label")
+    if effect is None:
+        return "spec as it is" if index == 0 else f"step {index}"
+    return f"+ {_text(effect)}" if index else _text(effect)
+
+
+def _step_scores(entry: Json) -> Json:
+    return part(entry, "held_out") or part(entry, "after") or entry
+
+
+def _steps(data: Json) -> Table | None:
+    steps = items(part(data, "gap"), "steps") or items(data, "steps")
+    rows = [
+        (Cell(_step_label(entry, index)), *_score_cells(_step_scores(entry)))
+        for index, entry in enumerate(steps)
+    ]
+    return table("Gap after each addition", ("Step", *_SCORES), rows) if rows else None
+
+
+def _where(data: Json) -> list[str]:
+    found = data.get("where") or part(data, "remaining").get("where") or ()
+    return [_text(entry) for entry in found] if isinstance(found, Sequence) else [_text(found)]
+
+
+def _remaining(data: Json) -> str:
+    remaining = part(data, "remaining")
+    if not remaining.get("unexplained"):
+        return ""
+    where = _text(remaining.get("where"))
+    return "Unexplained and still there" + (f": {where}." if where else ".")
+
+
+def _log_facts(data: Json) -> list[tuple[str, str]]:
+    log = part(data, "log")
+    simple = [
+        (str(key).replace("_", " "), _text(value))
+        for key, value in log.items()
+        if key not in ("rejected", "rows", "used") and value not in (None, "", [], {})
+    ]
+    files = _text(data.get("log_files"))
+    counted = [("rows", numbers.count(log.get("rows"))), ("used", numbers.count(log.get("used")))]
+    return [*([("files", files)] if files else []), *(counted if log else []), *simple]
+
+
+def _rejected(data: Json) -> Table | None:
+    rows = [
+        (str(reason), Cell(numbers.count(count), numbers.finite(count)))
+        for reason, count in part(part(data, "log"), "rejected").items()
+    ]
+    return table("Rows left out", ("Reason", "Rows #"), rows) if rows else None
+
+
+def _coverage(data: Json) -> Table | None:
+    rows = [
+        tuple(Cell(numbers.percent(entry.get(key)), numbers.finite(entry.get(key)))
+              for key in ("nominal", "before", "after"))
+        for entry in items(part(data, "plots"), "coverage")
+    ]  # fmt: skip
+    caption = "Share of residuals inside the spec's own intervals"
+    return table(caption, ("Nominal #", "Before #", "After #"), rows) if rows else None
+
+
+def _provenance(data: Json) -> list[tuple[str, str]]:
+    file = part(data, "spec").get("file")
+    found = {**part(data, "versions"), **part(data, "provenance")}
+    known = [(str(key).replace("_", " "), str(value)) for key, value in found.items()]
+    return [*([("Spec file", str(file))] if file else []), *known]
+
+
+def _floats(values: object) -> tuple[float, ...]:
+    found = values if isinstance(values, list | tuple) else ()
+    return tuple(float("nan") if numbers.finite(v) is None else float(v) for v in found)
+
+
+def _figures(data: Json) -> dict[str, InlineFigure]:
+    drawn: dict[str, InlineFigure] = {}
+    plots = part(data, "plots")
+    residuals = part(plots, "residuals")
+    time = _floats(residuals.get("time_s"))
+    axes = [
+        drawings.ResidualAxis(name, _floats(entry.get("before")), _floats(entry.get("after")),
+                              _floats(entry.get("signature")))
+        for name, entry in named(residuals, "axes")
+        if len(_floats(entry.get("before"))) == len(time) > 1
+    ]  # fmt: skip
+    if axes:
+        drawn["residuals"] = drawings.residuals(time, axes)
+    steps = [
+        drawings.Step(_step_label(entry, index), rms, None)
+        for index, entry in enumerate(items(part(data, "gap"), "steps") or items(data, "steps"))
+        if (rms := numbers.finite(_step_scores(entry).get("rms_m"))) is not None
+    ]
+    if steps:
+        floor = part(part(part(data, "gap"), "held_out"), "floor").get("rms_m")
+        drawn["gap"] = drawings.gap_staircase(steps, numbers.finite(floor))
+    maps = [_where_cells(entry) for entry in items(plots, "where_map")]
+    shown = [entry for entry in maps if entry.cells]
+    if shown:
+        drawn["where"] = drawings.where_map(shown[:6])
+    return drawn
+
+
+def _where_cells(entry: Json) -> drawings.WhereCells:
+    cells = []
+    for cell in items(entry, "cells"):
+        values = [numbers.finite(cell.get(key)) for key in ("low", "high", "score")]
+        known = [value for value in values if value is not None]
+        if len(known) == 3:
+            cells.append((known[0], known[1], known[2]))
+    return drawings.WhereCells(
+        str(entry.get("covariate")), str(entry.get("unit") or ""), tuple(cells)
+    )

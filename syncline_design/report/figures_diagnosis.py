@@ -1,0 +1,165 @@
+"""Figures of a diagnosis: residuals before and after, where they live, the gap step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from syncline_design.report import axes as scales
+from syncline_design.report import numbers
+from syncline_design.report.figures import WIDTH
+from syncline_design.report.palette import INK, MUTED, SERIES, SURFACE
+from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.text import shortened
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, slots=True)
+class ResidualAxis:
+    """Residuals of one axis [m] over the common time; signature: what the named effects explain."""
+
+    name: str
+    before_m: tuple[float, ...]
+    after_m: tuple[float, ...]
+    signature_m: tuple[float, ...]
+
+
+def residuals(
+    time_s: Sequence[float], shown: Sequence[ResidualAxis], name: str = "fig-residuals"
+) -> InlineFigure:
+    """Residuals per axis before and after, with the named effects' own signature."""
+
+    def build(figure: Figure) -> None:
+        rows = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
+        for axes, axis in zip(rows, shown, strict=True):
+            axes.spines[["top", "right"]].set_visible(False)
+            axes.plot(time_s, axis.before_m, ".", markersize=2.2, color=MUTED, label="before")
+            if axis.signature_m:
+                axes.plot(time_s, axis.signature_m, color=SERIES[1], linewidth=1.4,
+                          label="named effect")  # fmt: skip
+            if axis.after_m:
+                axes.plot(time_s, axis.after_m, ".", markersize=2.2, color=SERIES[0], label="after")
+            axes.set_ylabel(axis.name)
+            low, high = axes.get_ylim()
+            _length_ticks(axes, low, high)
+            scales.grid(axes)
+        rows[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.32), ncols=3, markerscale=4)
+        rows[-1].set_xlabel("time [s]")
+
+    spoken = "; ".join(
+        f"{axis.name}: {_rms_words(axis.before_m)} before"
+        + (f", {_rms_words(axis.after_m)} after" if axis.after_m else "")
+        for axis in shown
+    )
+    size = (WIDTH, 60.0 + 100.0 * len(shown))
+    return draw(name, "Residuals before and after", spoken, size, build)
+
+
+def _rms_words(values: Sequence[float]) -> str:
+    if not values:
+        return "nothing"
+    rms = (sum(value * value for value in values) / len(values)) ** 0.5
+    return f"{numbers.length(rms, 3)} RMS"
+
+
+def _length_ticks(axes: object, low: float, high: float) -> None:
+    from matplotlib.axes import Axes
+    from matplotlib.ticker import MaxNLocator
+
+    assert isinstance(axes, Axes)
+    places = [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]
+    scales.set_ticks(axes, "y", places, lambda v: "0" if v == 0 else scales.short_length(v))
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """The gap on held-out data after one addition."""
+
+    label: str
+    rms_m: float
+    nll: float | None
+
+
+def gap_staircase(
+    steps: Sequence[Step], floor_m: float | None, name: str = "fig-gap"
+) -> InlineFigure:
+    """RMS on held-out data as effects are added, down to the floor of the spec's own noise."""
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        for row, step in enumerate(steps):
+            axes.barh(row, step.rms_m, height=0.6, color=SERIES[0] if row else MUTED, zorder=3)
+            axes.annotate(
+                numbers.length(step.rms_m, 3), (step.rms_m, row), xytext=(5, 0),
+                textcoords="offset points", va="center", color=INK, zorder=5,
+                bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.5},
+            )  # fmt: skip
+        top = max(step.rms_m for step in steps)
+        axes.set_xlim(0, 1.25 * max(top, floor_m or 0.0) or 1.0)
+        if floor_m:
+            axes.axvline(floor_m, color=SERIES[2], linewidth=1.6, linestyle=(0, (5, 3)), zorder=4)
+            axes.annotate(
+                f"floor {numbers.length(floor_m, 3)}", (floor_m, 1.0),
+                xycoords=("data", "axes fraction"), xytext=(4, -2), textcoords="offset points",
+                va="top", color=SERIES[2],
+            )  # fmt: skip
+        axes.set_ylim(len(steps) - 0.4, -0.9)
+        labels = [shortened(step.label, 30) for step in steps]
+        scales.set_ticks(axes, "y", range(len(labels)), lambda row: labels[int(row)])
+        scales.hide_ticks(axes, "y")
+        scales.set_ticks(axes, "x", _linear(axes.get_xlim()[1]),
+                         lambda v: "0" if v == 0 else scales.short_length(v))  # fmt: skip
+        scales.grid(axes, "x")
+        axes.set_xlabel("RMS of the residual on held-out data")
+
+    spoken = "; ".join(f"{step.label}: {numbers.length(step.rms_m)}" for step in steps)
+    if floor_m:
+        spoken += f"; floor {numbers.length(floor_m)}"
+    size = (WIDTH, 76.0 + 26.0 * len(steps))
+    return draw(name, "Gap on held-out data, step by step", spoken, size, build)
+
+
+def _linear(high: float) -> list[float]:
+    from matplotlib.ticker import MaxNLocator
+
+    return [float(t) for t in MaxNLocator(5).tick_values(0.0, high) if 0.0 <= t <= high]
+
+
+@dataclass(frozen=True, slots=True)
+class WhereCells:
+    """Disagreement over the cells of one covariate: (low, high, score)."""
+
+    covariate: str
+    unit: str
+    cells: tuple[tuple[float, float, float], ...]
+
+
+def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigure:
+    """Score of the disagreement over cells of speed, turn rate, range and so on."""
+
+    def build(figure: Figure) -> None:
+        rows = figure.subplots(len(maps), 1, squeeze=False)[:, 0]
+        top = max((score for m in maps for *_, score in m.cells), default=1.0) or 1.0
+        for axes, entry in zip(rows, maps, strict=True):
+            axes.spines[["top", "right"]].set_visible(False)
+            edges = [entry.cells[0][0], *(high for _, high, _ in entry.cells)]
+            scores = [score for *_, score in entry.cells]
+            axes.stairs(scores, edges, fill=True, color=SERIES[0], alpha=0.5)
+            axes.stairs(scores, edges, color=SERIES[0], linewidth=1.2)
+            axes.axhline(1.0, color=MUTED, linewidth=1, linestyle=(0, (3, 2)))
+            axes.set_ylim(0, 1.08 * max(top, 1.0))
+            unit = f" [{entry.unit}]" if entry.unit else ""
+            axes.set_xlabel(entry.covariate + unit)
+            axes.set_ylabel("score")
+            scales.grid(axes, "y")
+
+    spoken = "; ".join(
+        f"{entry.covariate}: scores {min(s for *_, s in entry.cells):.3g} to "
+        f"{max(s for *_, s in entry.cells):.3g}"
+        for entry in maps
+    )
+    size = (WIDTH, 20.0 + 105.0 * len(maps))
+    return draw(name, "Where simulation and log disagree", spoken, size, build)

@@ -1,0 +1,166 @@
+"""The pages of reproduce, simulate and diagnose: complete, escaped, and fit for missing parts."""
+
+from __future__ import annotations
+
+import copy
+import math
+from typing import Any
+
+import mpmath
+import pytest
+
+import report_samples as samples
+from html_page import Page
+from syncline_design.report import numbers
+from syncline_design.report.pages import (
+    render_diagnosis,
+    render_reproduction,
+    render_simulation,
+)
+from syncline_design.report.simulation_page import simulation_csv
+from syncline_design.report.text import visible
+
+CASES = (
+    (samples.reproduction, render_reproduction),
+    (samples.simulation, render_simulation),
+    (samples.diagnosis, render_diagnosis),
+)
+
+
+def with_text(value: Any, text: str) -> Any:
+    """Every string of the data that is free text replaced by a hostile one."""
+    fixed = {"schema", "status", "verdict", "unit", "table", "row", "column"}
+    if isinstance(value, dict):
+        return {k: v if k in fixed else with_text(v, text) for k, v in value.items()}
+    if isinstance(value, list):
+        return [with_text(entry, text) for entry in value]
+    return text if isinstance(value, str) else value
+
+
+@pytest.mark.parametrize(("make", "render"), CASES)
+def test_page_is_well_formed_and_fetches_nothing(make: Any, render: Any) -> None:
+    page = Page(render(make()))
+    assert page.unbalanced == []
+    assert len(page.scripts) == 1
+    ids = [found["id"] for _, found in page.tags if "id" in found]
+    assert len(ids) == len(set(ids))
+    assert all(target.startswith("#") for target in page.attribute("a", "href"))
+    assert page.attribute("img", "src") == []
+
+
+@pytest.mark.parametrize(("make", "render"), CASES)
+def test_same_input_same_bytes(make: Any, render: Any) -> None:
+    assert render(make()) == render(make())
+
+
+@pytest.mark.parametrize(("make", "render"), CASES)
+def test_hostile_text_stays_text(make: Any, render: Any) -> None:
+    text = "".join(samples.HOSTILE)
+    page = Page(render(with_text(make(), text)))
+    assert len(page.scripts) == 1
+    assert page.attribute("img", "src") == []
+    assert page.unbalanced == []
+    assert visible(text) in " ".join(page.texts)
+
+
+@pytest.mark.parametrize(("make", "render"), CASES)
+def test_any_part_may_be_null(make: Any, render: Any) -> None:
+    for key in make():
+        data = copy.deepcopy(make())
+        data[key] = None
+        assert Page(render(data)).unbalanced == []
+
+
+def test_reproduction_shows_printed_beside_computed() -> None:
+    page = Page(render_reproduction(samples.reproduction()))
+    for words in (
+        "519.615 ms", "printed 520 ms", "1 of 2 agree, 1 documented errata", "printed twice",
+        "10 per metre", "96.5\u00a0%", "B \u00b7 A payload with a name",
+    ):  # fmt: skip
+        assert words in page.text
+    assert page.attribute("article", "id") == ["figure-1", "figure-2", "figure-3"]
+
+
+def test_a_failed_reproduction_says_so() -> None:
+    data = samples.reproduction()
+    data["ok"] = False
+    data["cells"][0]["status"] = "differs"
+    assert "Some printed figures differ" in Page(render_reproduction(data)).text
+
+
+def test_simulation_tells_ratio_reason_and_certificate() -> None:
+    page = Page(render_simulation(samples.simulation()))
+    ratios = [row["ratio"] for row in samples.simulation()["grid"]]
+    assert f"{100 * min(ratios):.2f}\u00a0%" in page.text
+    for words in ("lever arms swing", "nothing gives more than the bound", "30.9\u00a0mm"):
+        assert words in page.text
+
+
+def test_simulation_csv_is_the_grid() -> None:
+    lines = simulation_csv(samples.simulation()).splitlines()
+    assert len(lines) == 1 + len(samples.simulation()["grid"])
+    assert float(lines[1].split(",")[0]) == samples.simulation()["grid"][0]["tau_s"]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "GNSS positions are 87.1 ms older than their stamps.",
+        "87.10 \u00b1 0.30 ms".replace(" ", "\u00a0"),
+        "This log cannot tell it apart from lever_arm (position)",
+        "vary the speed",
+        "98.1\u00a0%",
+        "2\u00a0987 of 3\u00a0000",
+        "missing values",
+        "283\u00a0mm",
+        "speed above 8 m/s",
+    ],
+)
+def test_diagnosis_says(words: str) -> None:
+    assert words in Page(render_diagnosis(samples.diagnosis())).text
+
+
+@pytest.mark.parametrize(
+    ("verdict", "words"),
+    [("agrees", "agree"), ("explained", "has a name"), ("unexplained", "remains unexplained")],
+)
+def test_diagnosis_verdicts(verdict: str, words: str) -> None:
+    assert words in Page(render_diagnosis(samples.diagnosis() | {"verdict": verdict})).text
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "unit", "text"),
+    [
+        (0.0871, 0.0003, "s", "87.10 \u00b1 0.30 ms"),
+        (-0.37, 0.0123, "m", "\u2212370 \u00b1 12 mm"),
+        (0.35312, 0.0021, "m", "353.1 \u00b1 2.1 mm"),
+        (math.radians(0.25), math.radians(0.011), "rad", "250 \u00b1 11 mdeg"),
+        (1e-5, 2e-4, "s", "10 \u00b1 200 \u00b5s"),
+        (3.0, None, "", "3"),
+        (18.0, 0.0, "s", "18 s"),
+        (4.7e-5, 2.0e-6, "", "0.0000470 \u00b1 0.0000020"),
+    ],
+)
+def test_estimates_end_where_their_uncertainty_does(
+    value: float, uncertainty: float | None, unit: str, text: str
+) -> None:
+    assert numbers.with_uncertainty(value, uncertainty, unit) == text.replace(" ", "\u00a0")
+
+
+@pytest.mark.parametrize("exponent", range(-9, 4))
+def test_shown_length_is_the_value_to_four_figures(exponent: int) -> None:
+    value = 1.23456 * 10.0**exponent
+    text = numbers.length(value)
+    figure, unit = text.split("\u00a0")
+    factor = {"nm": "1e-9", "\u00b5m": "1e-6", "mm": "1e-3", "m": "1", "km": "1e3"}[unit]
+    shown = mpmath.mpf(figure) * mpmath.mpf(factor)
+    assert abs(shown - mpmath.mpf(value)) <= mpmath.mpf(value) * mpmath.mpf("5e-4")
+    assert 1 <= float(figure) < 1000 or unit in ("nm", "km")
+
+
+def test_missing_figures_read_as_missing() -> None:
+    for show in (numbers.length, numbers.time, numbers.percent, numbers.number, numbers.count):
+        for value in (None, math.nan, math.inf, "text", True):
+            assert show(value) == numbers.MISSING
+    assert numbers.time_limit(None) == "unlimited"
+    assert numbers.money(38_400.0, "EUR") == "38\u00a0400\u00a0EUR"
