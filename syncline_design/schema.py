@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from typing import Any, Literal
 
+from syncline_design.key_glossary import KEYS
 from syncline_design.spec import LIMIT_DIMENSIONS
 from syncline_design.units import Dimension
 from syncline_design.values import quantity_schema
@@ -78,13 +79,25 @@ def _draft_07(node: Any, quantities: dict[str, Any]) -> Any:
     result: dict[str, Any] = {}
     for key, value in node.items():
         if key == "properties":
-            result[key] = {name: _draft_07(item, quantities) for name, item in value.items()}
+            result[key] = {
+                name: _described(name, _draft_07(item, quantities)) for name, item in value.items()
+            }
         elif key == "anyOf":
             choices = [_draft_07(c, quantities) for c in value if c != {"type": "null"}]
             result.update(choices[0] if len(choices) == 1 else {"anyOf": choices})
         elif not (key == "default" and value is None) and not (key == "title" and _is_field(node)):
             result[key] = _draft_07(value, quantities)
     return result
+
+
+def _described(name: str, node: dict[str, Any]) -> dict[str, Any]:
+    """A property with the line that an editor shows; draft-07 ignores what stands beside $ref."""
+    description = KEYS[name]
+    if "$ref" in node:
+        reference = {"$ref": node["$ref"]}
+        rest = {key: value for key, value in node.items() if key != "$ref"}
+        return {"description": description, "allOf": [reference], **rest}
+    return {**node, "description": description}
 
 
 def _is_field(node: dict[str, Any]) -> bool:

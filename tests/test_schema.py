@@ -10,6 +10,7 @@ from typing import Any
 import jsonschema
 import pytest
 
+from syncline_design.key_glossary import KEYS
 from syncline_design.loading import BadInput, load
 from syncline_design.scaffold import SCHEMA_NAME, SPEC_NAME, init_project
 from syncline_design.schema import json_schema, schema_text
@@ -51,6 +52,18 @@ def test_the_schema_is_valid_draft_07(name: Any) -> None:
     text = json.dumps(schema)
     for newer in ("$defs", "prefixItems", "unevaluatedProperties", "dependentRequired"):
         assert newer not in text
+
+
+def test_every_key_has_its_line_for_the_editor() -> None:
+    used: set[str] = set()
+    for name in ("spec", "catalog"):
+        schema = json_schema(name)  # type: ignore[arg-type]
+        for part in (schema, *schema["definitions"].values()):
+            for key, node in part.get("properties", {}).items():
+                if part is not schema["definitions"].get("Requirement") or "description" in node:
+                    assert node["description"] == KEYS[key]
+                used.add(key)
+    assert used == set(KEYS)
 
 
 @pytest.mark.parametrize("path", SPECS, ids=lambda p: p.stem)
