@@ -80,6 +80,7 @@ __all__ = [
     "sole_design",
     "sync_ratio",
     "system_of",
+    "with_everything",
     "with_limits",
 ]
 
@@ -135,13 +136,18 @@ def selection_of(problem: Problem, design: Design) -> Selection:
     return Selection(tuple(roles), tuple(clocks))
 
 
+def with_everything(problem: Problem) -> Problem:
+    """The problem with no sync limit: options that break their own tau_crit are back in."""
+    return with_limits(problem, replace(problem.limits, sync=math.inf))
+
+
 def sole_design(problem: Problem) -> tuple[Problem, Design] | None:
     """The one design of a spec that leaves nothing open, sync requirement or not.
 
     Comes with the problem in which its indices hold: an option that breaks its own tau_crit is
     part of it, so that the design can be verified and found to fail.
     """
-    everything = with_limits(problem, replace(problem.limits, sync=math.inf))
+    everything = with_everything(problem)
     if everything.combinations != 1:
         return None
     return everything, Design((0,) * len(everything.roles), (0,) * len(everything.vehicles))

@@ -1,0 +1,192 @@
+"""Choices as plain-text tables and CSV; numbers only, the words come from the catalogs."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Sequence
+from fractions import Fraction
+
+from syncline_design.choose.evaluate import chosen_clocks, chosen_options, evaluate
+from syncline_design.choose.outcome import FrontPoint
+from syncline_design.choose.prices import Step
+from syncline_design.choose.slack import Slack
+from syncline_design.design_space import Design, Problem, ResourceName
+from syncline_design.units import Dimension, format_quantity
+
+DIMENSIONS: dict[ResourceName, Dimension] = {
+    "cost": Dimension.MONEY,
+    "mass": Dimension.MASS,
+    "power": Dimension.POWER,
+}
+UNITS = {
+    "m": Dimension.LENGTH,
+    "s": Dimension.TIME,
+    "m/s": Dimension.SPEED,
+    "rad/s": Dimension.ANGULAR_RATE,
+}
+FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
+
+
+def amount_text(amount: Fraction | None, resource: ResourceName, currency: str) -> str:
+    """`59 862.35 EUR`, `1.2 kg`; `unknown` where a catalog entry does not say."""
+    if amount is None:
+        return "unknown"
+    return format_quantity(float(amount), DIMENSIONS[resource], 5, currency)
+
+
+def length_text(value_m: float) -> str:
+    """`29.45 mm`: a length with four figures."""
+    return format_quantity(value_m, Dimension.LENGTH)
+
+
+def role_headers(problem: Problem) -> list[str]:
+    """`uav position` and so on, one per role."""
+    return [f"{table.stage_name} {table.role}" for table in problem.roles]
+
+
+def role_cells(problem: Problem, design: Design) -> list[str]:
+    """`ublox_f9p_rtk by pps, gpio` per role."""
+    return [
+        f"{option.sensor} by {option.primitive}, {option.method}"
+        for option in chosen_options(problem, design)
+    ]
+
+
+def front_table(
+    problem: Problem, points: Sequence[FrontPoint], resource: ResourceName, currency: str
+) -> list[str]:
+    """The Pareto front, one line per point."""
+    rows = [
+        [
+            amount_text(point.amount, resource, currency),
+            length_text(point.error_m),
+            *role_cells(problem, point.design),
+        ]
+        for point in points
+    ]
+    return table([resource, "error", *role_headers(problem)], rows)
+
+
+def designs_table(problem: Problem, designs: Iterable[Design], currency: str) -> list[str]:
+    """Designs one per line, best first, with what they cost and reach."""
+    rows = []
+    for place, design in enumerate(designs, 1):
+        found = evaluate(problem, design)
+        rows.append(
+            [
+                str(place),
+                amount_text(found.cost, "cost", currency),
+                amount_text(found.mass, "mass", currency),
+                amount_text(found.power, "power", currency),
+                length_text(found.error_m),
+                *role_cells(problem, design),
+            ]
+        )
+    return table(["", "cost", "mass", "power", "error", *role_headers(problem)], rows)
+
+
+def staircase_lines(
+    steps: Sequence[Step], currency: str, resource: ResourceName = "cost"
+) -> list[str]:
+    """The price of accuracy in words, loosest target first."""
+    out = []
+    for step in steps:
+        price = amount_text(step.amount, resource, currency)
+        line = f"{price} buys any target from {length_text(step.tightest_m)}"
+        if step.looser_than_m is not None:
+            line += f" up to {length_text(step.looser_than_m)}"
+        if step.extra is not None:
+            line += f" ({amount_text(step.extra, resource, currency)} more)"
+        out.append(line)
+    return out
+
+
+def slack_table(rows: Sequence[Slack]) -> list[str]:
+    """The slack ledger, one line per term."""
+    return table(
+        ["term", "now", "verdict fails at", "because of", "payload changes at"],
+        [
+            [
+                f"{row.stage} {row.term}",
+                _figure(row.value, row.unit),
+                _figure(row.fails_at, row.unit),
+                row.limited_by or "",
+                _figure(row.payload_changes_at, row.unit),
+            ]
+            for row in rows
+        ],
+    )
+
+
+def _figure(value: float | None, unit: str) -> str:
+    return "never" if value is None else format_quantity(value, UNITS[unit])
+
+
+def table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
+    """Columns aligned to the left, two spaces apart."""
+    cells = [list(headers), *[list(row) for row in rows]]
+    widths = [max(len(row[k]) for row in cells) for k in range(len(headers))]
+    lines = ["  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in cells]
+    return [line.rstrip() for line in lines]
+
+
+def front_csv(problem: Problem, points: Sequence[FrontPoint], resource: ResourceName) -> str:
+    """The front as CSV: amount, error in m, then sensor, primitive, method of every role."""
+    headers = [resource, "error_m", *_design_headers(problem)]
+    rows = [
+        [_plain(point.amount), repr(point.error_m), *_design_cells(problem, point.design)]
+        for point in points
+    ]
+    return _csv(headers, rows)
+
+
+def designs_csv(problem: Problem, designs: Iterable[Design]) -> str:
+    """Designs as CSV: cost, mass, power, error in m, then their choices."""
+    headers = ["cost", "mass_kg", "power_w", "error_m", *_design_headers(problem)]
+    rows = []
+    for design in designs:
+        found = evaluate(problem, design)
+        sums = [_plain(found.cost), _plain(found.mass), _plain(found.power)]
+        rows.append([*sums, repr(found.error_m), *_design_cells(problem, design)])
+    return _csv(headers, rows)
+
+
+def _plain(amount: Fraction | None) -> str:
+    if amount is None:
+        return ""
+    return str(amount.numerator) if amount.denominator == 1 else repr(float(amount))
+
+
+def _design_headers(problem: Problem) -> Iterator[str]:
+    for header in role_headers(problem):
+        for part in ("sensor", "primitive", "timestamping"):
+            yield f"{header.replace(' ', '_')}_{part}"
+    for vehicle in problem.vehicles:
+        yield f"{vehicle.name}_clock"
+
+
+def _design_cells(problem: Problem, design: Design) -> Iterator[str]:
+    for option in chosen_options(problem, design):
+        yield from option.names
+    for clock in chosen_clocks(problem, design):
+        yield clock.id or ""
+
+
+def _csv(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Rows as CSV; text that a spreadsheet would run as a formula is quoted by an apostrophe."""
+    out = io.StringIO()
+    writer = csv.writer(out, lineterminator="\n")
+    writer.writerow([_inert(cell) for cell in headers])
+    writer.writerows([_inert(cell) for cell in row] for row in rows)
+    return out.getvalue()
+
+
+def _inert(cell: str) -> str:
+    if not cell.startswith(FORMULA_STARTS):
+        return cell
+    try:
+        float(cell)
+    except ValueError:
+        return "'" + cell
+    return cell
