@@ -278,17 +278,7 @@ def ledger(
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        start = 0.0
-        for row, term in enumerate(terms):
-            colour = {"sensor": SERIES[0], "sync": SERIES[1]}.get(term.kind, SERIES[3])
-            axes.barh(
-                row, term.value_m, left=start, height=0.62, color=colour, edgecolor=SURFACE,
-                linewidth=0.8, hatch=_HATCH.get(term.kind, ""), zorder=3,
-            )  # fmt: skip
-            start += term.value_m
-            _beside(axes, start, row, numbers.length(term.value_m, 3))
-        axes.barh(len(terms), total, height=0.62, color=INK, zorder=3)
-        _beside(axes, total, len(terms), numbers.length(total, 4))
+        _waterfall(axes, terms)
         axes.set_ylim(len(terms) + 0.6, -0.9)
         axes.set_xlim(0, 1.22 * max(total, target_m or 0.0) or 1.0)
         if target_m:
@@ -305,6 +295,21 @@ def ledger(
         spoken += f"; target {numbers.length(target_m)}"
     size = (WIDTH, 66.0 + 22.0 * (len(terms) + 1))
     return draw(name, "Terms that add up to the total error", spoken, size, build)
+
+
+def _waterfall(axes: Axes, terms: Sequence[LedgerTerm]) -> None:
+    """Each term's bar starts where the one before ends; the last bar is their sum."""
+    start = 0.0
+    for row, term in enumerate(terms):
+        colour = {"sensor": SERIES[0], "sync": SERIES[1]}.get(term.kind, SERIES[3])
+        axes.barh(
+            row, term.value_m, left=start, height=0.62, color=colour, edgecolor=SURFACE,
+            linewidth=0.8, hatch=_HATCH.get(term.kind, ""), zorder=3,
+        )  # fmt: skip
+        start += term.value_m
+        _beside(axes, start, row, numbers.length(term.value_m, 3))
+    axes.barh(len(terms), start, height=0.62, color=INK, zorder=3)
+    _beside(axes, start, len(terms), numbers.length(start, 4))
 
 
 def _beside(axes: Axes, x: float, row: float, text: str) -> None:

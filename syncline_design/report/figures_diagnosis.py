@@ -14,6 +14,7 @@ from syncline_design.report.svg import InlineFigure, add_axes, draw
 from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
@@ -65,11 +66,9 @@ def _rms_words(values: Sequence[float]) -> str:
     return f"{numbers.length(rms, 3)} RMS"
 
 
-def _length_ticks(axes: object, low: float, high: float) -> None:
-    from matplotlib.axes import Axes
+def _length_ticks(axes: Axes, low: float, high: float) -> None:
     from matplotlib.ticker import MaxNLocator
 
-    assert isinstance(axes, Axes)
     places = [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]
     scales.set_ticks(axes, "y", places, lambda v: "0" if v == 0 else scales.short_length(v))
 
@@ -92,20 +91,10 @@ def gap_staircase(
         axes = add_axes(figure)
         for row, step in enumerate(steps):
             axes.barh(row, step.rms_m, height=0.6, color=SERIES[0] if row else MUTED, zorder=3)
-            axes.annotate(
-                numbers.length(step.rms_m, 3), (step.rms_m, row), xytext=(5, 0),
-                textcoords="offset points", va="center", color=INK, zorder=5,
-                bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.5},
-            )  # fmt: skip
-        top = max(step.rms_m for step in steps)
-        axes.set_xlim(0, 1.25 * max(top, floor_m or 0.0) or 1.0)
+            _beside(axes, step.rms_m, row)
+        axes.set_xlim(0, 1.25 * max([floor_m or 0.0, *(step.rms_m for step in steps)]) or 1.0)
         if floor_m:
-            axes.axvline(floor_m, color=SERIES[2], linewidth=1.6, linestyle=(0, (5, 3)), zorder=4)
-            axes.annotate(
-                f"floor {numbers.length(floor_m, 3)}", (floor_m, 1.0),
-                xycoords=("data", "axes fraction"), xytext=(4, -2), textcoords="offset points",
-                va="top", color=SERIES[2],
-            )  # fmt: skip
+            _mark_floor(axes, floor_m)
         axes.set_ylim(len(steps) - 0.4, -0.9)
         labels = [shortened(step.label, 30) for step in steps]
         scales.set_ticks(axes, "y", range(len(labels)), lambda row: labels[int(row)])
@@ -120,6 +109,22 @@ def gap_staircase(
         spoken += f"; floor {numbers.length(floor_m)}"
     size = (WIDTH, 76.0 + 26.0 * len(steps))
     return draw(name, "Gap on held-out data, step by step", spoken, size, build)
+
+
+def _beside(axes: Axes, rms_m: float, row: int) -> None:
+    axes.annotate(
+        numbers.length(rms_m, 3), (rms_m, row), xytext=(5, 0), textcoords="offset points",
+        va="center", color=INK, zorder=5,
+        bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.5},
+    )  # fmt: skip
+
+
+def _mark_floor(axes: Axes, floor_m: float) -> None:
+    axes.axvline(floor_m, color=SERIES[2], linewidth=1.6, linestyle=(0, (5, 3)), zorder=4)
+    axes.annotate(
+        f"floor {numbers.length(floor_m, 3)}", (floor_m, 1.0), xycoords=("data", "axes fraction"),
+        xytext=(4, -2), textcoords="offset points", va="top", color=SERIES[2],
+    )  # fmt: skip
 
 
 def _linear(high: float) -> list[float]:

@@ -114,21 +114,11 @@ def simulated_against_syncline(
 
     def build(figure: Figure) -> None:
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[3, 1])
-        inverse = [1.0 / p.tau_s for p in shown]
         for axes in (upper, lower):
             axes.spines[["top", "right"]].set_visible(False)
             axes.set_xscale("log")
-        upper.set_yscale("log")
-        upper.plot(inverse, [1.0 / p.syncline_m for p in shown], color=LINE, linewidth=2.2,
-                   label="Syncline")  # fmt: skip
-        upper.plot(inverse, [1.0 / p.worst_m for p in shown], color=SERIES[1], linestyle="none",
-                   marker="o", markersize=5, markeredgecolor=SURFACE, label="simulated worst case",
-                   )  # fmt: skip
-        upper.legend(loc="lower right")
-        upper.set_ylabel("accuracy 1/error [1/m]")
-        low, high = upper.get_ylim()
-        scales.set_ticks(upper, "y", scales.log_ticks(low, high), lambda v: f"{v:g}")
-        scales.inverse_axis(upper, "x", "timestamp error \u03c4", scales.short_time)
+        _accuracies(upper, shown)
+        inverse = [1.0 / p.tau_s for p in shown]
         lower.axhline(1.0, color=MUTED, linewidth=1)
         lower.plot(inverse, ratios, color=SERIES[1], marker="o", markersize=3.5, linewidth=1)
         lower.set_ylabel("ratio")
@@ -147,6 +137,22 @@ def simulated_against_syncline(
         )
     heading = title or "Simulated worst case against the Syncline"
     return draw(name, heading, spoken, (WIDTH, 360.0), build)
+
+
+def _accuracies(axes: Axes, shown: Sequence[GridPoint]) -> None:
+    """Syncline and simulated worst cases, as accuracy over synchronisation accuracy."""
+    inverse = [1.0 / p.tau_s for p in shown]
+    axes.set_yscale("log")
+    axes.plot(inverse, [1.0 / p.syncline_m for p in shown], color=LINE, linewidth=2.2,
+              label="Syncline")  # fmt: skip
+    axes.plot(inverse, [1.0 / p.worst_m for p in shown], color=SERIES[1], linestyle="none",
+              marker="o", markersize=5, markeredgecolor=SURFACE,
+              label="simulated worst case")  # fmt: skip
+    axes.legend(loc="lower right")
+    axes.set_ylabel("accuracy 1/error [1/m]")
+    low, high = axes.get_ylim()
+    scales.set_ticks(axes, "y", scales.log_ticks(low, high), lambda v: f"{v:g}")
+    scales.inverse_axis(axes, "x", "timestamp error \u03c4", scales.short_time)
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,23 +175,9 @@ def pareto_front(
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        costs = [p.cost for p in points]
-        errors = [p.error_m for p in points]
-        span = max(costs) - min(costs) or max(costs) or 1.0
-        right = max([max(costs) + 0.15 * span, *([1.04 * cost_limit] if cost_limit else [])])
-        axes.set_yscale("log")
-        axes.step([*costs, right], [*errors, errors[-1]], where="post", color=LINE, linewidth=2)
-        axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)
-        for point in points:
-            if point.chosen:
-                axes.plot([point.cost], [point.error_m], "D", color=GOOD, markersize=10,
-                          markeredgecolor=SURFACE, markeredgewidth=1.4, zorder=5)  # fmt: skip
-                axes.annotate("chosen", (point.cost, point.error_m), xytext=(9, 7),
-                              textcoords="offset points", color=GOOD, fontweight="bold",
-                              )  # fmt: skip
-        axes.set_xlim(max(0.0, min(costs) - 0.12 * span), right)
-        bounds = [*errors, *([target_m] if target_m else [])]
-        axes.set_ylim(min(bounds) / 1.5, max(bounds) * 1.6)
+        _staircase(axes, points, cost_limit)
+        errors = [*(p.error_m for p in points), *([target_m] if target_m else [])]
+        axes.set_ylim(min(errors) / 1.5, max(errors) * 1.6)
         _limits(axes, target_m, cost_limit, currency)
         low, high = axes.get_ylim()
         scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
@@ -194,6 +186,28 @@ def pareto_front(
         axes.set_ylabel("worst-case error (Syncline)")
         scales.grid(axes)
 
+    title = "Pareto front of cost against error"
+    return draw(name, title, _front_words(points, currency), (WIDTH, 290.0), build)
+
+
+def _staircase(axes: Axes, points: Sequence[FrontPoint], cost_limit: float | None) -> None:
+    costs = [p.cost for p in points]
+    errors = [p.error_m for p in points]
+    span = max(costs) - min(costs) or max(costs) or 1.0
+    right = max([max(costs) + 0.15 * span, *([1.04 * cost_limit] if cost_limit else [])])
+    axes.set_yscale("log")
+    axes.step([*costs, right], [*errors, errors[-1]], where="post", color=LINE, linewidth=2)
+    axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)
+    for point in points:
+        if point.chosen:
+            axes.plot([point.cost], [point.error_m], "D", color=GOOD, markersize=10,
+                      markeredgecolor=SURFACE, markeredgewidth=1.4, zorder=5)  # fmt: skip
+            axes.annotate("chosen", (point.cost, point.error_m), xytext=(9, 7),
+                          textcoords="offset points", color=GOOD, fontweight="bold")  # fmt: skip
+    axes.set_xlim(max(0.0, min(costs) - 0.12 * span), right)
+
+
+def _front_words(points: Sequence[FrontPoint], currency: str) -> str:
     spoken = (
         f"{len(points)} designs from {numbers.money(points[0].cost, currency)} with an error of "
         f"{numbers.length(points[0].error_m)} to {numbers.money(points[-1].cost, currency)} with "
@@ -204,7 +218,7 @@ def pareto_front(
             spoken += (
                 f" Chosen: {numbers.money(point.cost, currency)}, {numbers.length(point.error_m)}."
             )
-    return draw(name, "Pareto front of cost against error", spoken, (WIDTH, 290.0), build)
+    return spoken
 
 
 def _limits(axes: Axes, target_m: float | None, cost_limit: float | None, currency: str) -> None:

@@ -155,6 +155,8 @@ def _write_stream(path: Path, text: str) -> None:
 
 def _explained(final: Path, error: OSError) -> OutputError:
     reason = error.strerror or str(error)
+    if _is_stream(final):
+        return OutputError(f"{final}: cannot write: {reason}")
     kept = "the file that was there is unchanged" if final.exists() else "nothing was written"
     return OutputError(f"{final}: cannot write: {reason}; {kept}")
 
