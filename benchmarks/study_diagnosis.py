@@ -36,19 +36,23 @@ KEPT = ROOT / "out" / "study_diagnosis.jsonl"
 Row = dict[str, Any]
 
 
-def digest(*folders: str) -> str:
+def digest(*patterns: str) -> str:
     """Digest of the code that the answers depend on."""
     whole = hashlib.sha256()
-    for folder in folders:
-        for file in sorted((ROOT / folder).glob("*.py")):
+    for pattern in patterns:
+        for file in sorted(ROOT.glob(pattern)):
             whole.update(file.read_bytes())
     return whole.hexdigest()[:12]
 
 
 def digests() -> dict[str, str]:
-    """Of the world alone, and of everything: the world, the diagnosis and the effects."""
-    packages = ("syncline_design/diagnose", "syncline_design/effects")
-    return {"world": digest("tests/world"), "code": digest("tests/world", *packages)}
+    """Of what makes the logs, and of everything an answer and its score depend on."""
+    logs = ("tests/world/*.py", "benchmarks/study_cases.py", "benchmarks/study_ideal.py")
+    rest = ("syncline_design/diagnose/*.py", "syncline_design/effects/*.py")
+    return {
+        "world": digest(*logs),
+        "code": digest(*logs, *rest, "benchmarks/study_scoring.py"),
+    }
 
 
 def ideal_of(case: Case, log: WorldLog, known: float | None) -> float | None:

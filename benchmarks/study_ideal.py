@@ -20,6 +20,7 @@ from tests.world.worldlog import WorldLog
 
 SAME_CLASS = 0.99  # share of a signature's length that another effect reproduces
 DRAWS = 2000
+INVISIBLE = 3.5  # standard deviations
 
 
 def candidates(log: WorldLog) -> list[Hidden]:
@@ -59,6 +60,29 @@ def _signatures(log: WorldLog, effects: list[Hidden]) -> list[Array]:
         sizes.append(len(keys))
     white = whitened(log.run.stamps_s, covariance, wander, np.concatenate(columns, axis=2))
     return np.split(white.reshape(-1, sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
+
+
+def told_apart(log: WorldLog, truth: Hidden, other: tuple[str, str, str | None]) -> bool:
+    """Whether this log could tell another effect from the true one.
+
+    It could when the other leaves more than INVISIBLE standard deviations of the truth's whitened
+    signal unexplained, and does not reproduce SAME_CLASS of its length.
+    """
+    first = log.run.carriers[0].name
+    matching = [
+        e
+        for e in candidates(log)
+        if (e.effect, e.sensor) == other[:2] and e.stage == (other[2] or e.stage or first)
+    ]
+    if not matching:
+        return True
+    own, beside = _signatures(log, [truth, matching[0]])
+    theta = np.array([truth.number(name) for _, name in fitted_keys((truth,))])
+    signal = own @ theta
+    basis = np.linalg.qr(beside)[0]
+    left = float(np.linalg.norm(signal - basis @ (basis.T @ signal)))
+    length = float(np.linalg.norm(signal))
+    return left > INVISIBLE and left > np.sqrt(1.0 - SAME_CLASS**2) * length
 
 
 def ideal_naming(log: WorldLog, truth: Hidden, seed: int = 0) -> float:

@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from benchmarks.study_ideal import told_apart
 from tests.world import DISCRETE, STOCHASTIC, Hidden
 from tests.world.bound import fitted_keys
 from tests.world.worldlog import WorldLog
 
 Row = dict[str, Any]
 NO_SLOPE = STOCHASTIC | DISCRETE
+FEW = 3  # aliases that a noise effect may carry
 
 
 def names_of(finding: Row) -> set[tuple[str, str]]:
@@ -42,6 +44,19 @@ def exact(effect: Hidden, finding: Row) -> bool:
     )
 
 
+def stands_for(log: WorldLog, effect: Hidden, finding: Row) -> bool:
+    """The finding names the effect, or a class that holds it and that the log cannot open.
+
+    An alias counts only if the world itself says that the two cannot be told apart here.
+    """
+    if exact(effect, finding):
+        return True
+    if not same(effect, finding) or effect.effect in NO_SLOPE:
+        return same(effect, finding) and len(finding["aliases"]) <= FEW
+    other = (finding["effect"], finding["sensor"], finding.get("stage"))
+    return not told_apart(log, effect, other)
+
+
 def parameters(log: WorldLog, effect: Hidden, finding: Row, bounds: dict[Any, float]) -> list[Row]:
     rows = []
     for index, name in fitted_keys((effect,)):
@@ -65,8 +80,9 @@ def parameters(log: WorldLog, effect: Hidden, finding: Row, bounds: dict[Any, fl
 def score(log: WorldLog, document: Row) -> Row:
     """What was named, what was not, and how well the parameters came out."""
     findings, truth = document["findings"], log.truth
-    named = [any(same(effect, finding) for finding in findings) for effect in truth]
-    wrong = [f for f in findings if not any(same(effect, f) for effect in truth)]
+    right_ones = [[stands_for(log, effect, f) for f in findings] for effect in truth]
+    named = [any(row) for row in right_ones]
+    wrong = [f for k, f in enumerate(findings) if not any(row[k] for row in right_ones)]
     bounds = log.cramer_rao() if len(truth) == 1 and truth[0].effect not in NO_SLOPE else {}
     fitted = [
         row
