@@ -16,6 +16,26 @@ STEP_TIMES = 24  # places along the log where a step is looked for at first
 EDGE = 0.04  # share of the log at either end where a step is not looked for
 
 
+# Where two effects fit equally well, the one that is met more often is named and the other listed
+# as its alias.  The order is ours, by judgement.
+COMMONEST = (
+    "latency",
+    "lever_arm",
+    "boresight",
+    "range_bias",
+    "heading_bias",
+    "datum_offset",
+    "range_scale",
+    "mounting",
+    "azimuth_bias",
+    "elevation_bias",
+    "sound_speed",
+    "turnaround_delay",
+    "timestamp_jitter",
+    "noise_understated",
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """An effect at one place of the system."""
@@ -62,6 +82,13 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
                 if effect.applies(stage, sensor):
                     found.append(Candidate(effect, sensor, k))
     return tuple(found)
+
+
+def commonness(candidate: Candidate) -> tuple[int, int]:
+    """Place among the commonest; sensors in the order position, attitude, ranging, target."""
+    name = candidate.effect.name
+    place = COMMONEST.index(name) if name in COMMONEST else len(COMMONEST)
+    return place, ("position", "attitude", "ranging", "target").index(candidate.sensor)
 
 
 def zero_values(effect: Effect, at: dict[str, float] | None = None) -> dict[str, float]:

@@ -13,7 +13,9 @@ from syncline_design.diagnose.result import Json
 from syncline_design.diagnose.search import SearchResult
 from syncline_design.effects.base import Array
 
-MOST_POINTS = 600
+MOST_POINTS = 800
+NOMINAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
+NED = ("north", "east", "down")
 DIGITS = 6
 
 
@@ -25,36 +27,60 @@ class Likelihoods:
     nll_after: float
 
 
-def figures_data(data: Data, result: SearchResult, cells: tuple[Cell, ...]) -> Json:
+def plots(data: Data, result: SearchResult, cells: tuple[Cell, ...]) -> Json:
     """Residuals before and after with the named effects' signature, the map, coverage."""
     before, after = data.error(()), result.model.error
     index = np.unique(np.linspace(0, len(data.view) - 1, MOST_POINTS).astype(int))
     sigma = np.sqrt(marginal_variance(data.structure, result.model.level))
-    return {
-        "time_s": _listed(data.view.log.time_s[index]),
-        "axes": ["north", "east", "down"],
-        "before_m": [_listed(before[index, k]) for k in range(3)],
-        "after_m": [_listed(after[index, k]) for k in range(3)],
-        "signature_m": [_listed((before - after)[index, k]) for k in range(3)],
-        "expected_std_m": [_listed(sigma[index, k]) for k in range(3)],
-        "map": [asdict(cell) for cell in cells],
-        "coverage": _coverage(data, after / sigma),
+    axes = {
+        axis: {
+            "before": _listed(before[index, k]),
+            "after": _listed(after[index, k]),
+            "signature": _listed((before - after)[index, k]),
+            "expected_std": _listed(sigma[index, k]),
+        }
+        for k, axis in enumerate(NED)
     }
+    return {
+        "residuals": {"time_s": _listed(data.view.log.time_s[index]), "axes": axes},
+        "where_map": _map(cells),
+        "coverage": _coverage(data, before / sigma, after / sigma),
+    }
+
+
+def _map(cells: tuple[Cell, ...]) -> list[Json]:
+    """Per covariate its regimes, each with the axis that disagrees most."""
+    found: dict[str, dict[tuple[float, float], Cell]] = {}
+    for cell in cells:
+        own = found.setdefault(cell.covariate, {})
+        key = cell.low, cell.high
+        if key not in own or abs(cell.score) > abs(own[key].score):
+            own[key] = cell
+    return [
+        {
+            "covariate": name,
+            "unit": next(iter(own.values())).unit,
+            "cells": [
+                {k: v for k, v in asdict(c).items() if k not in ("covariate", "unit")}
+                for c in own.values()
+            ],
+        }
+        for name, own in found.items()
+    ]
 
 
 def _listed(values: Array) -> list[float]:
     return [float(f"{v:.{DIGITS}g}") for v in values]
 
 
-def _coverage(data: Data, scaled: Array) -> Json:
-    """Share of components inside k expected standard deviations, against the normal share."""
+def _coverage(data: Data, before: Array, after: Array) -> list[Json]:
+    """Share of components inside the expected interval, against the nominal share."""
     from scipy.stats import norm
 
     visible = np.isfinite(data.view.log.truth_m)
-    levels = np.linspace(0.1, 3.0, 30)
-    size = np.abs(scaled[visible])
-    return {
-        "k": _listed(levels),
-        "measured": [float(np.mean(size < k)) for k in levels],
-        "normal": [float(2.0 * norm.cdf(k) - 1.0) for k in levels],
-    }
+    rows = []
+    for nominal in NOMINAL:
+        k = float(norm.isf(0.5 * (1.0 - nominal)))
+        shares = [float(np.mean(np.abs(scaled[visible]) < k)) for scaled in (before, after)]
+        rows.append({"nominal": nominal, "before": shares[0], "after": shares[1]})
+    return rows

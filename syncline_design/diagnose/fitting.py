@@ -28,7 +28,8 @@ from syncline_design.effects.base import Array
 
 NOISE_ROWS = 800  # rows on which the noise is fitted; stretches spread over the whole log
 STRETCH = 80
-LONG, SHORT = 30, 10  # iterations of a noise fit from scratch, and from a good start
+FIRST_TIMES_S = (None, 3.0, 30.0)
+LONG, SHORT = 25, 10  # iterations of a noise fit from scratch, and from a good start
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,15 +132,33 @@ def fit(
     for _ in range(passes):
         if now:
             now, error, _ = adjusted(data, now, precision(data.structure, level), error)
-        level, _ = fit_noise(
-            data.noise_structure, error[data.noise_rows], bounds, level, sizes, iterations
-        )
+        starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
+        fits = [
+            fit_noise(data.noise_structure, error[data.noise_rows], bounds, s, sizes, iterations)
+            for s in starts
+        ]
+        level, _ = min(fits, key=lambda found: found[1])
     if now:
         now, error, _ = adjusted(data, now, precision(data.structure, level), error)
     factored = precision(data.structure, level)
     _, _, covariance = adjusted(data, now, factored, error, steps=0)
     nll = factored.negative_log_likelihood(error)
     return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
+
+
+def slow_guess(level: NoiseLevel, time_s: float | None) -> NoiseLevel:
+    """The level with half of the variance slow, of one time constant; None leaves it as it is.
+
+    The likelihood has several peaks in the time constant, so a fit from scratch starts at each.
+    """
+    if time_s is None:
+        return level
+    return replace(
+        level,
+        factor=tuple(0.75 for _ in level.factor),
+        slow=tuple(tuple(0.4 for _ in own) for own in level.slow),
+        time_constant_s=tuple(tuple(time_s for _ in own) for own in level.time_constant_s),
+    )
 
 
 def adjusted(
@@ -195,14 +214,20 @@ def _moved(acting: Sequence[Acting], change: Array) -> tuple[Acting, ...]:
 
 def solve_scaled(normal: Array, right: Array) -> Array:
     """Solve normal x = right with columns scaled alike; directions the log cannot see stay put."""
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scale = _scale(normal)
     scaled = normal / scale[:, None] / scale
     solution: Array = np.linalg.lstsq(scaled, right / scale, rcond=1e-10)[0] / scale
     return solution
 
 
+def _scale(normal: Array) -> Array:
+    scale: Array = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    scale[scale == 0.0] = 1.0
+    return scale
+
+
 def inverse_scaled(normal: Array) -> Array:
     """Inverse of the normal matrix, columns scaled alike first."""
-    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    scale = _scale(normal)
     inverse: Array = np.linalg.pinv(normal / scale[:, None] / scale, rcond=1e-12)
     return inverse / scale[:, None] / scale

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from syncline_design.diagnose.candidates import Candidate, Signature, slopes
-from syncline_design.diagnose.fitting import Data, Model, inner, inverse_scaled
+from syncline_design.diagnose.candidates import Candidate, Signature, slopes, zero_values
+from syncline_design.diagnose.fitting import Data, Model, fit, inner, inverse_scaled
+from syncline_design.diagnose.noise import precision
 from syncline_design.diagnose.simulation import Acting
 from syncline_design.effects.base import Array
 
+Label = tuple[str, str, int]
 SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
+CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
+MOST_REFITTED = 5
 RIVAL_NATS = 4.5  # a rival that fits worse by less than this is not excluded by the data
 
 
@@ -52,7 +56,8 @@ def compare(data: Data, model: Model, index: int, others: Sequence[Signature]) -
     score = inner(weighted, (model.error + added[:, :, 0])[:, :, None])[:, 0]
     normal, score = _without(normal, score, base.shape[2])
     length = float(normal[0, 0])
-    best: dict[tuple[str, str, int], Alias] = {}
+    best: dict[Label, Alias] = {}
+    found: dict[Label, Signature] = {}
     at = 1
     for s in free:
         group = slice(at, at + s.columns.shape[2])
@@ -64,9 +69,36 @@ def compare(data: Data, model: Model, index: int, others: Sequence[Signature]) -
         alias = Alias(s.candidate, min(cosine, 1.0), _gain_of_named(score, normal) - gain)
         if s.candidate.label not in best or best[s.candidate.label].loss > alias.loss:
             best[s.candidate.label] = alias
+            found[s.candidate.label] = s
     ranked = sorted(best.values(), key=lambda a: (-a.cosine, a.candidate.label))
-    same = tuple(a for a in ranked if a.cosine > SAME or a.loss < RIVAL_NATS)
-    return Comparison(same, tuple(a for a in ranked if a not in same))
+    near = [a for a in ranked if a.cosine > SAME or a.loss < RIVAL_NATS]
+    refitted = [_refitted(data, model, index, a, found) for a in near[:MOST_REFITTED]]
+    same = tuple(a for a in refitted if a.loss < (CLASS_NATS if a.cosine > SAME else RIVAL_NATS))
+    kept = {a.candidate.label for a in same}
+    return Comparison(same, tuple(a for a in ranked if a.candidate.label not in kept))
+
+
+def _refitted(
+    data: Data, model: Model, index: int, alias: Alias, found: Mapping[Label, Signature]
+) -> Alias:
+    """The loss by re-simulation: a large latency and a large filter lag differ after all."""
+    rest = tuple(a for k, a in enumerate(model.acting) if k != index)
+    signature = found[alias.candidate.label]
+    start = alias.candidate.acting(zero_values(alias.candidate.effect, signature.at))
+    rival = fit(data, (*rest, start), model.opened, start=model.level)
+    loss = rival.nll - model.nll
+    if alias.candidate.effect.kind == "stochastic":
+        loss = _with_scatter(data, rival, alias.candidate) - model.nll
+    return Alias(alias.candidate, alias.cosine, loss)
+
+
+def _with_scatter(data: Data, rival: Model, candidate: Candidate) -> float:
+    """NLL once the scatter that belongs to the fitted mean is there too."""
+    index = [d.key for d in data.structure.directed].index(candidate.key)
+    value = abs(rival.acting[-1].values[candidate.effect.parameters[0].name])
+    sizes = tuple(value if k == index else s for k, s in enumerate(rival.level.size))
+    known = precision(data.structure, replace(rival.level, size=sizes))
+    return known.negative_log_likelihood(rival.error)
 
 
 def _gain_of_named(score: Array, normal: Array) -> float:

@@ -28,7 +28,7 @@ class Stairs:
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """The outcome; `data` holds what figures need, plain lists and numbers."""
+    """The outcome; `plots` holds what figures need, plain lists and numbers."""
 
     verdict: Verdict
     findings: tuple[Finding, ...]
@@ -43,7 +43,9 @@ class Diagnosis:
     unseen: tuple[str, ...]
     log: Json
     noise: Json
-    data: Json
+    plots: Json
+    spec: Json | None
+    log_files: tuple[str, ...]
     provenance: Json
 
     @property
@@ -77,7 +79,9 @@ class Diagnosis:
             "unseen": list(self.unseen),
             "log": self.log,
             "noise": self.noise,
-            "data": self.data,
+            "plots": self.plots,
+            "spec": self.spec,
+            "log_files": list(self.log_files),
             "provenance": self.provenance,
         }
         clean: Json = _finite(document)

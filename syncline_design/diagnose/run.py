@@ -12,7 +12,7 @@ import numpy as np
 from syncline_design import __version__
 from syncline_design.diagnose.candidates import candidates, directed_parts
 from syncline_design.diagnose.expected_noise import structure_of
-from syncline_design.diagnose.figures_data import figures_data
+from syncline_design.diagnose.figures_data import plots
 from syncline_design.diagnose.findings import findings
 from syncline_design.diagnose.fitting import Data, data_of
 from syncline_design.diagnose.gap import Gap, block_folds, gap, regime_fold
@@ -97,7 +97,9 @@ def diagnose_measured(
         unseen=_unseen(data, search, result),
         log=log_json(inputs.log),
         noise=_noise_json(data, result),
-        data=figures_data(data, result, cells),
+        plots=plots(data, result, cells),
+        spec=None if loaded is None else {"name": loaded.spec.name, "file": str(loaded.path)},
+        log_files=tuple(inputs.files),
         provenance=_provenance(settings, loaded),
     )
 
@@ -182,7 +184,6 @@ def _provenance(settings: DiagnosisSettings, loaded: LoadedSpec | None) -> Json:
         "false_alarm_rate": settings.false_alarm_rate,
         "max_effects": settings.max_effects,
         "exclude_effects": list(settings.exclude_effects),
-        "spec": loaded.spec.name if loaded else None,
         "spec_sha256": loaded.spec_sha256 if loaded else None,
         "catalogs_sha256": loaded.catalogs_sha256 if loaded else None,
     }

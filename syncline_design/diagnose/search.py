@@ -16,9 +16,11 @@ import numpy as np
 from scipy.stats import chi2
 
 from syncline_design.diagnose.candidates import (
+    STEP_TIMES,
     Candidate,
     Signature,
     candidates,
+    commonness,
     signature,
     signatures,
     slopes,
@@ -45,7 +47,10 @@ WITHIN_NATS, WITHIN_SHARE = 12.0, 0.35  # how far behind the best a candidate ma
 DRAWS = 3000  # clean scores drawn for the distribution of the largest
 MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
 SCATTER_SHARE = 0.2  # for effects that only scatter; the rest is the remainder test's
-RIDGE = 1e-9
+RIDGE = 1e-8
+AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
+SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
+LOST = 1e-7  # share of a signature's information below which the model's own effects hold it all
 AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
@@ -61,8 +66,13 @@ class Trial:
 
     @property
     def log_p(self) -> float:
-        """log of the chance that noise alone saves as much in this one candidate."""
-        return log_p_of(2.0 * self.gain, self.freedom)
+        """log of the chance that noise alone saves as much in this one candidate.
+
+        A step is charged for the places at which it was looked for.
+        """
+        located = any(p.located for p in self.candidate.effect.parameters)
+        charge = math.log(STEP_TIMES) if located else 0.0
+        return min(log_p_of(2.0 * self.gain, self.freedom) + charge, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,9 +132,10 @@ class Search:
     def best(self, model: Model, scores: Gram) -> Trial | None:
         """The candidate that best explains what is left, its noise fitted anew."""
         trials = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
-        trials += self.scatter_trials(model)
+        most = max((t.gain for t in trials), default=0.0)
+        trials += self.scatter_trials(model, SCATTER_WITHIN * most)
         kept = [t for t in trials if plausible(t.model)]
-        return min(kept, key=lambda t: (t.log_p, -t.gain, t.candidate.label), default=None)
+        return preferred(kept)
 
     def screened(self, model: Model, scores: Gram) -> list[tuple[Signature, NoiseLevel]]:
         """Signatures that gain most under any noise of the ladder, one per candidate."""
@@ -133,7 +144,7 @@ class Search:
         for level in ladder(self.data, model):
             seen = scores if level is model.level else gram(self.data, model, free, level)
             for s, gain in zip(free, seen.gains(), strict=True):
-                total = gain - seen.nll - 2.0 * s.columns.shape[2]
+                total = gain - seen.nll - 2.0 * s.columns.shape[2] - 4.0 * len(s.at)
                 known = best.get(s.candidate.label)
                 if gain > SCREENED_OUT and (known is None or known[0] < total):
                     best[s.candidate.label] = (total, s, level)
@@ -157,10 +168,10 @@ class Search:
         freedom = found.columns.shape[2] + len(found.at) + (len(opened) - len(model.opened))
         return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
 
-    def scatter_trials(self, model: Model) -> list[Trial]:
-        """Candidates that only change the covariance."""
+    def scatter_trials(self, model: Model, least: float) -> list[Trial]:
+        """Candidates that only change the covariance, if a rough guess gains `least` [nat]."""
         trials = []
-        for one, level in scatter_candidates(self.data, self.candidates, model):
+        for one, level in scatter_candidates(self.data, self.candidates, model, least):
             fitted = fit(self.data, model.acting, (*model.opened, one), start=level)
             gain = model.nll - fitted.nll
             if gain > 2.0:
@@ -234,7 +245,10 @@ def gram(data: Data, model: Model, found: Sequence[Signature], level: NoiseLevel
         inverse = inverse_scaled(normal[:width, :width])
         cross = normal[:width, width:]
         score = score[width:] - cross.T @ inverse @ score[:width]
+        whole = np.diag(normal)[width:]
         normal = normal[width:, width:] - cross.T @ inverse @ cross
+        lost = np.diag(normal) < LOST * whole  # the model's own effects can do all of it
+        score[lost], normal[lost], normal[:, lost] = 0.0, 0.0, 0.0
     nll = known.negative_log_likelihood(model.error)
     return Gram(score, normal, tuple(groups), nll)
 
@@ -245,7 +259,8 @@ def clean_threshold(scores: Gram, rate: float, rng: np.random.Generator) -> floa
     g is normal with covariance M when the model is right, so the least p over all (correlated)
     candidates is drawn without simulating a log.
     """
-    scale = np.sqrt(np.maximum(np.diag(scores.normal), 1e-300))
+    scale = np.sqrt(np.diag(scores.normal))
+    scale[scale == 0.0] = 1.0
     correlation = scores.normal / scale[:, None] / scale
     values, vectors = np.linalg.eigh(correlation)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -291,6 +306,15 @@ def ladder(data: Data, model: Model) -> list[NoiseLevel]:
         factor=tuple(max(f, 0.3) for f in model.level.factor),
     )
     return [model.level, kept]
+
+
+def preferred(trials: Sequence[Trial]) -> Trial | None:
+    """The least likely by chance; among those that are as good, the commonest in practice."""
+    if not trials:
+        return None
+    least = min(t.log_p for t in trials)
+    close = [t for t in trials if t.log_p <= least + AS_GOOD_NATS]
+    return min(close, key=lambda t: (commonness(t.candidate), t.log_p, t.candidate.label))
 
 
 def log_p_of(statistic: float, freedom: int) -> float:
@@ -351,13 +375,14 @@ def refitted(data: Data, acting: tuple[Acting, ...], like: Model) -> Model:
 
 
 def scatter_candidates(
-    data: Data, found: Sequence[Candidate], model: Model
+    data: Data, found: Sequence[Candidate], model: Model, least: float
 ) -> list[tuple[Opened, NoiseLevel]]:
     """Stochastic effects worth a fit, each with a noise level to start from.
 
     Worth a fit is what lowers the NLL when some of it is simply put in.
     """
     result = []
+    least = max(1.0, least * len(data.noise_rows) / len(data.view))
     error = model.error[data.noise_rows]
     base = precision(data.noise_structure, model.level).negative_log_likelihood(error)
     for candidate in found:
@@ -365,7 +390,7 @@ def scatter_candidates(
             continue
         for opened, level in _put_in(data, candidate, model):
             found_nll = precision(data.noise_structure, level).negative_log_likelihood(error)
-            if found_nll < base - 1.0:
+            if found_nll < base - least:
                 result.append((opened, level))
                 break
     return result

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from syncline_design.diagnose.gross import undone
 from syncline_design.diagnose.log import Log
 from syncline_design.diagnose.reading import read_log
 from syncline_design.diagnose.simulation import Acting
@@ -24,6 +25,7 @@ class Measured:
     system: System
     log: Log
     known: tuple[Acting, ...]
+    files: tuple[str, ...] = ()
 
 
 def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
@@ -32,7 +34,8 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
     names = [stage.name for stage in system.stages]
     mapping = loaded.spec.log.columns if loaded.spec.log else {}
     ranges = system.stages[-1].ranging is not None
-    log = read_log(paths or own_files(loaded), names, mapping, ranges)
+    files = list(paths) or own_files(loaded)
+    log = read_log(files, names, mapping, ranges)
     system = System(
         system.stages[: len(log.stages)],
         system.coverage_factor,
@@ -40,7 +43,12 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
         system.effects,
     )
     _demand_fit(loaded, system, log)
-    return Measured(system, log, known_effects(system))
+    known = known_effects(system)
+    for one in known:
+        if one.effect.name == "frame_convention":
+            log = undone(log, one.sensor, one.stage, str(one.values["convention"]))
+    kept = tuple(one for one in known if one.effect.name != "frame_convention")
+    return Measured(system, log, kept, tuple(path.name for path in files))
 
 
 def own_files(loaded: LoadedSpec) -> list[Path]:
