@@ -120,11 +120,13 @@ def inside_folder(
         return problem_at(document, path, "an absolute path", wanted, name, "write it relative")
     try:
         target = (folder / name).resolve()
+        there = target.exists()
     except (OSError, RuntimeError, ValueError) as error:
-        return problem_at(document, path, f"a path that cannot be followed: {error}", wanted, name)
+        reason = getattr(error, "strerror", None) or str(error)
+        return problem_at(document, path, f"a path that cannot be followed: {reason}", wanted, name)
     if not target.is_relative_to(root):
         return problem_at(document, path, "a path that leaves the spec's folder", wanted, name)
-    if not target.exists():
+    if not there:
         near = [p.name for p in sorted(root.glob("*.yaml"))]
         return problem_at(document, path, "no such file", wanted, name, did_you_mean(name, near))
     return target

@@ -18,6 +18,7 @@ from syncline_design.resolution import (
 from syncline_design.spec import (
     ROLE_NAMES,
     InlineTimestamping,
+    Query,
     Role,
     RoleChoice,
     Spec,
@@ -130,6 +131,7 @@ def _role_misfits(
     if not sensors:
         message = "no sensor of the catalogs matches this query"
         yield problem_at(document, (*at, "candidates"), message, f"at least one {name} sensor")
+        return
     for position, (identity, sensor) in enumerate(sensors):
         if sensor.modality != name:
             path = (*at, "sensor") if role.sensor is not None else (*at, "candidates", position)
@@ -248,8 +250,8 @@ def currency_problems(document: Document, spec: Spec, catalog: Catalog) -> list[
     """Amounts in a currency that the spec gives no rate for."""
     problems = []
     for path, what, amount in _amounts(spec, catalog):
-        code = amount.currency
-        if code not in (None, spec.currency) and code not in spec.exchange_rates:
+        if not spec.can_convert(amount):
+            code = amount.currency
             hint = f"add exchange_rates: {{{code}: RATE {spec.currency}}}"
             problems.append(
                 problem_at(document, path, f"{what} in {code}", spec.currency, amount.text, hint)
@@ -261,6 +263,13 @@ def _amounts(spec: Spec, catalog: Catalog) -> Iterable[tuple[KeyPath, str, Quant
     for index, requirement in enumerate(spec.requirements):
         if requirement.kind == "cost" and isinstance(requirement.limit, Quantity):
             yield ("requirements", index, "limit"), "a limit", requirement.limit
+    for index, stage in enumerate(spec.stages):
+        for name in ROLE_NAMES:
+            role = stage.role(name)
+            query = role.candidates if role is not None else None
+            if isinstance(query, Query) and query.max_cost is not None:
+                at: KeyPath = ("stages", index, name, "candidates", "max_cost")
+                yield at, "a limit", query.max_cost
     for path, label, entry in parts_in_use(spec, catalog):
         if entry.cost is not None:
             yield path, f"the cost of {label} is", entry.cost

@@ -68,11 +68,11 @@ def matches(query: Query, entry: SensorEntry, role: Role, spec: Spec) -> bool:
         return False
     if query.type is not None and query.type != entry.type:
         return False
-    if query.max_cost is None:
-        return True
-    return entry.cost is not None and spec.in_currency(entry.cost) <= spec.in_currency(
-        query.max_cost
-    )
+    if query.max_cost is None or entry.cost is None:
+        return query.max_cost is None
+    if not spec.can_convert(query.max_cost) or not spec.can_convert(entry.cost):
+        return True  # loading says that a rate is missing
+    return spec.in_currency(entry.cost) <= spec.in_currency(query.max_cost)
 
 
 def timestamping_of(

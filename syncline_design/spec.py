@@ -350,6 +350,10 @@ class Spec(Record):
             raise refusals(errors)
         return self
 
+    def can_convert(self, amount: Quantity) -> bool:
+        """Whether an amount is in the spec's currency or one with a rate."""
+        return amount.currency in (None, self.currency) or amount.currency in self.exchange_rates
+
     def in_currency(self, amount: Quantity) -> Fraction:
         """An amount of money in the spec's currency, exactly; loading has checked the rates."""
         if amount.currency in (None, self.currency):

@@ -22,6 +22,7 @@ from typing import Any
 import pytest
 
 from syncline_design.loading import BadInput, LoadedSpec, load, load_text
+from syncline_design.spec_writer import yaml_text
 from syncline_design.yaml_reader import Problem, read
 
 CORPUS = Path(__file__).parent / "corpus"
@@ -291,4 +292,54 @@ def test_fuzzed_specs_load_or_are_refused(seed: int) -> None:
             outcomes["refused"] += 1
             problems += error.problems
     assert all(p.line >= 1 and p.column >= 1 and p.message for p in problems)
+    assert min(outcomes.values()) > 0
+
+
+VALUES: tuple[Any, ...] = (
+    None, True, 0, -1, 3, 1e-3, 10**17, "", "x", "uav", "gpio", "sbg_ellipse", "ublox_f9p_rtk",
+    "uav_fixed_wing", "5 m", "-5 m", "0 m", "5 s", "2 deg", "7 kg", "9 W", "20 USD", "30 NOK",
+    "40 EUR", "1 deg +/- 5 %", "a\x01b", "x" * 5000, "../x.yaml", (), ((),), ("x",), ("5 m",) * 3,
+    ("gpio", "gpio"), {}, {"use": "x"}, {"candidates": ()}, {"candidates": ("gpio", "arrival")},
+    {"candidates": {"max_cost": "20 USD"}}, {"candidates": {"max_cost": "20 EUR"}},
+    {"candidates": {"type": "lidar"}}, {"sensor": {"modality": "ranging", "primitives": ()}},
+    {"error": {"distribution": "constant", "value": "1 ms"}},
+    {"error": {"distribution": "empirical", "file": "x"}}, {"distribution": "empirical"},
+    {"modality": "attitude", "sigma_attitude": "1 deg", "primitives": (), "cost": "3 NOK"},
+    {"lever_arm": ("1 m", "0 m", "0 m")}, {"manoeuvre": "x"}, {"file": "x"}, {"USD": "0.9 EUR"},
+)  # fmt: skip
+KEYS = (
+    "catalogs", "exchange_rates", "currency", "clock", "vehicle", "timestamping", "candidates",
+    "sensor", "quantile", "waiver", "effects", "log", "monte_carlo", "objective", "lever_arm",
+    "primitive", "trajectory", "ranging", "position", "attitude", "unheard_of",
+)  # fmt: skip
+
+
+def changed(data: Any, rng: random.Random) -> Any:
+    """Plain data with one node, somewhere, put in place of another."""
+    if isinstance(data, dict) and data and rng.random() < 0.85:
+        key = rng.choice(KEYS) if rng.random() < 0.2 else rng.choice(list(data))
+        if rng.random() < 0.05:
+            return {k: v for k, v in data.items() if k != key}
+        return {**data, key: changed(data.get(key, rng.choice(VALUES)), rng)}
+    if isinstance(data, tuple) and data and rng.random() < 0.85:
+        at = rng.randrange(len(data))
+        return (*data[:at], changed(data[at], rng), *data[at + rng.choice((0, 1, 1)) :])
+    return rng.choice(VALUES)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_specs_with_nodes_changed_load_or_are_refused(seed: int) -> None:
+    """1200 changes of the tree itself: valid YAML throughout, so that they reach every check."""
+    rng = random.Random(f"nodes-{seed}")
+    sources = [read(p).data for p in sorted(SPECS.glob("*.yaml"))]
+    outcomes = {"loaded": 0, "refused": 0}
+    for _ in range(300):
+        data = rng.choice(sources)
+        for _ in range(rng.randint(1, 3)):
+            data = changed(data, rng)
+        try:
+            load_text(yaml_text(data if isinstance(data, dict) else {"x": data}), SPECS / "f.yaml")
+            outcomes["loaded"] += 1
+        except BadInput:
+            outcomes["refused"] += 1
     assert min(outcomes.values()) > 0
