@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import islice
 from typing import Any
 
+from syncline_design.choose.outcome import FrontPoint
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import design_json
 from syncline_design.design_space import Design, Problem
@@ -21,31 +23,56 @@ def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked, known: Kno
     """The `choice` key of a verdict; the front is of cost against error where costs are known."""
     from syncline_design.choose.decide import best
     from syncline_design.choose.front import front
+    from syncline_design.choose.prices import staircase
 
     assert picked.verified is not None
     chosen = picked.verified.design
     others = (d for d in best(problem, NEXT_BEST + 1) if d != chosen)
     points = front(problem) if _priced(problem) else ()
     return {
-        "proof": {
-            "method": picked.choice.proof.method,
-            "optimal": picked.choice.proof.optimal,
-            "rechecked": picked.choice.proof.rechecked,
-            "agrees_with": list(picked.choice.proof.agrees_with),
-        },
-        "front": [
-            {
-                "cost": float(point.amount),
-                "error_m": point.error_m,
-                "design": full_design(loaded, problem, point.design, known),
-            }
-            for point in points
-        ],
-        "next_best": [
-            _with_error(loaded, problem, design, known) for design in islice(others, NEXT_BEST)
-        ],
+        "proof": proof_json(picked),
+        "front": front_json(loaded, problem, points, known),
+        "staircase": [step.to_json() for step in staircase(points)],
+        "next_best": designs_json(loaded, problem, islice(others, NEXT_BEST), known),
         "excluded": excluded_json(problem),
     }
+
+
+def proof_json(picked: Picked) -> Json:
+    """How the choice was proven."""
+    proof = picked.choice.proof
+    return {
+        "method": proof.method,
+        "optimal": proof.optimal,
+        "rechecked": proof.rechecked,
+        "agrees_with": list(proof.agrees_with),
+        "passed_over": picked.passed_over,
+    }
+
+
+def front_json(
+    loaded: LoadedSpec,
+    problem: Problem,
+    points: Iterable[FrontPoint],
+    known: Known,
+    resource: str = "cost",
+) -> list[Json]:
+    """The points of a front with their designs, by rising amount of the resource."""
+    return [
+        {
+            resource: float(point.amount),
+            "error_m": point.error_m,
+            "design": full_design(loaded, problem, point.design, known),
+        }
+        for point in points
+    ]
+
+
+def designs_json(
+    loaded: LoadedSpec, problem: Problem, designs: Iterable[Design], known: Known
+) -> list[Json]:
+    """Designs with what they cost and reach, in the order given."""
+    return [_with_error(loaded, problem, design, known) for design in designs]
 
 
 def full_design(loaded: LoadedSpec, problem: Problem, design: Design, known: Known) -> Json:
@@ -57,8 +84,11 @@ def full_design(loaded: LoadedSpec, problem: Problem, design: Design, known: Kno
 def _with_error(loaded: LoadedSpec, problem: Problem, design: Design, known: Known) -> Json:
     figures = budget(system_of(loaded, problem, design), known.extra_tau_s, known.systematic)
     shown = design_json(loaded, problem, design, figures)
-    model = loaded.spec.sync_model
-    return {"cost": shown["cost"], "error_m": figures.total(model), "design": shown}
+    error = figures.total(loaded.spec.sync_model)
+    return {key: shown[key] for key in ("cost", "mass", "power")} | {
+        "error_m": error,
+        "design": shown,
+    }
 
 
 def _priced(problem: Problem) -> bool:

@@ -176,11 +176,54 @@ def check(
     return max(exit_code(verdict) for verdict in verdicts)
 
 
-def _method(name: str) -> str:
+def _method(name: str) -> Any:
     known = ("auto", "front", "milp", "enumerate")
     if name not in known:
         _refuse(f"syncline-design: --method {name}: expected one of {', '.join(known)}")
     return name
+
+
+@app.command()
+@guarded
+def optimize(
+    spec: SpecArgument,
+    output: OutputOption = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    method: MethodOption = "auto",
+    time_limit: TimeLimitOption = None,
+    best: Annotated[int, typer.Option(min=1, help="How many truly different designs.")] = 1,
+    pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
+    resource: Annotated[
+        Literal["cost", "mass", "power"], typer.Option(help="What the front sets against error.")
+    ] = "cost",
+    write_design: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")
+    ] = None,
+) -> int:
+    """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
+    from syncline_design.loading import load
+    from syncline_design.optimisation import OptimizeSettings, optimisation_text, optimize
+    from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
+
+    targets = _targets(output, OPTIMIZE_FORMATS)
+    loaded = load(spec)
+    settings = OptimizeSettings(
+        best, pareto, resource, _method(method), time_limit_s=time_limit, seed=seed
+    )
+    found = optimize(loaded, settings)
+    if write_design is not None and found.exit_code == 0:
+        _write_design(found, write_design)
+    _emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
+    return found.exit_code
+
+
+def _write_design(found: Any, path: Path) -> None:
+    from syncline_design.optimisation import pinned_text
+    from syncline_design.spec_writer import write_spec
+
+    write_spec(pinned_text(found.loaded, found.problem, found.designs[0]), path)
+    print(f"design written to {path}", file=sys.stderr)
 
 
 @app.command()

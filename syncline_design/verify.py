@@ -11,6 +11,7 @@ from typing import Any
 from syncline_design import __version__
 from syncline_design.cautions import cautions
 from syncline_design.choice_data import choice_json, excluded_json
+from syncline_design.choose.outcome import Method
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
@@ -54,7 +55,7 @@ class CheckSettings:
     """
 
     seed: int = 0
-    method: str = "auto"
+    method: Method = "auto"
     time_limit_s: float | None = None
     monte_carlo: bool = True
     today: date | None = None

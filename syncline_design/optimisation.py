@@ -1,0 +1,226 @@
+"""`optimize`: the choice itself with its front, runners-up, prices and what they hinge on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+from syncline_design.choice_data import designs_json, excluded_json, front_json, proof_json
+from syncline_design.choose import presentation
+from syncline_design.choose.decide import best
+from syncline_design.choose.explain import Explanation, explain
+from syncline_design.choose.front import front
+from syncline_design.choose.outcome import FrontPoint, Method
+from syncline_design.choose.prices import Step, staircase
+from syncline_design.choose.slack import Slack, slack_ledger
+from syncline_design.choose.tolerance import (
+    Measurement,
+    ToleranceVerdict,
+    measure_next,
+    tolerance_verdict,
+)
+from syncline_design.design_space import Design, Problem, ResourceName
+from syncline_design.known_effects import Known, known_of
+from syncline_design.loading import LoadedSpec
+from syncline_design.open_choice import Picked, pick
+from syncline_design.problem import build_problem, selection_of
+from syncline_design.spec_writer import PinnedRole, pinned_spec_text
+from syncline_design.units import Dimension, format_quantity
+from syncline_design.verify import CheckSettings, verify
+
+SCHEMA = "syncline-design/optimization/v1"
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class OptimizeSettings:
+    """count: how many designs; pareto: the front too, of `resource` against error."""
+
+    count: int = 1
+    pareto: bool = False
+    resource: ResourceName = "cost"
+    method: Method = "auto"
+    time_limit_s: float | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Hinges:
+    """What the chosen design hinges on: slack of every figure, tolerances, what to measure."""
+
+    slack: tuple[Slack, ...]
+    tolerance: ToleranceVerdict
+    measure_next: tuple[Measurement, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Optimisation:
+    """The best designs, or why there is none."""
+
+    loaded: LoadedSpec
+    problem: Problem
+    known: Known
+    settings: OptimizeSettings
+    picked: Picked
+    designs: tuple[Design, ...]
+    front: tuple[FrontPoint, ...]
+    prices: tuple[Step, ...]
+    hinges: Hinges | None
+    explanation: Explanation | None
+
+    @property
+    def exit_code(self) -> int:
+        """0: a design; 1: none; 3: the search for one that passes simulation was cut short."""
+        found = self.picked.verified
+        if found is None:
+            return 1
+        if found.word == "meets":
+            return 0
+        return 1 if self.picked.exhausted else 3
+
+
+def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
+    """The best designs of a spec; pinned roles stay as they are."""
+    known = known_of(loaded)
+
+    def build(spec: LoadedSpec) -> Problem:
+        return build_problem(spec, known.extra_tau_s, known.systematic)
+
+    problem = build(loaded)
+    simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
+    checking = CheckSettings(seed=settings.seed, monte_carlo=simulated)
+    picked = pick(
+        problem,
+        settings.method,
+        settings.time_limit_s,
+        lambda design: verify(loaded, problem, design, checking),
+    )
+    points = front(problem, settings.resource) if settings.pareto else ()
+    designs: tuple[Design, ...] = ()
+    hinges = explanation = None
+    if picked.verified is None:
+        explanation = explain(loaded, problem, build)
+    else:
+        chosen = picked.verified.design
+        others = (d for d in best(problem, settings.count + 1) if d != chosen)
+        designs = (chosen, *islice(others, settings.count - 1))
+        hinges = Hinges(
+            slack_ledger(loaded, problem, chosen, build),
+            tolerance_verdict(loaded, problem, chosen, build),
+            measure_next(loaded, problem, chosen, build),
+        )
+    return Optimisation(
+        loaded, problem, known, settings, picked, designs, points, staircase(points), hinges,
+        explanation,
+    )  # fmt: skip
+
+
+def optimisation_json(found: Optimisation) -> Json:
+    """Everything as plain data; `designs` best first, `front` with --pareto."""
+    loaded, problem, known = found.loaded, found.problem, found.known
+    data: Json = {
+        "schema": SCHEMA,
+        "verdict": "infeasible" if found.exit_code == 1 else "meets",
+        "spec": {"name": loaded.spec.name, "file": str(loaded.path)},
+        "proof": proof_json(found.picked),
+        "combinations": str(problem.combinations),
+        "designs": designs_json(loaded, problem, found.designs, known),
+        "excluded": excluded_json(problem),
+    }
+    if found.exit_code == 3:
+        data["verdict"] = "indeterminate"
+    if found.settings.pareto:
+        data["front"] = front_json(loaded, problem, found.front, known, found.settings.resource)
+        data["staircase"] = [step.to_json() for step in found.prices]
+    if found.hinges is not None:
+        data["slack"] = [row.to_json() for row in found.hinges.slack]
+        data["tolerances"] = found.hinges.tolerance.to_json()
+        data["measure_next"] = [one.to_json() for one in found.hinges.measure_next]
+    if found.explanation is not None:
+        data["infeasibility"] = found.explanation.to_json() | {"text": found.explanation.lines()}
+    return data
+
+
+def optimisation_text(found: Optimisation) -> str:
+    """The same for a terminal."""
+    problem, currency = found.problem, found.loaded.spec.currency
+    blocks = [[f"{found.loaded.spec.name} ({found.loaded.path})"]]
+    if found.explanation is not None:
+        blocks.append(found.explanation.lines())
+    if found.designs:
+        blocks.append([_proof_line(found)])
+        blocks.append(presentation.designs_table(problem, found.designs, currency))
+    if found.front:
+        title = f"Exact front of {found.settings.resource} against error, all else met:"
+        table = presentation.front_table(problem, found.front, found.settings.resource, currency)
+        prices = presentation.staircase_lines(found.prices, currency, found.settings.resource)
+        blocks += [[title, *table], ["What accuracy costs:", *(f"  {line}" for line in prices)]]
+    if found.hinges is not None:
+        blocks.append(
+            ["How far each term may grow:", *presentation.slack_table(found.hinges.slack)]
+        )
+        blocks.append([found.hinges.tolerance.text, *_measure_lines(found.hinges)])
+    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def _proof_line(found: Optimisation) -> str:
+    proof = found.picked.choice.proof
+    others = f", confirmed by {' and '.join(proof.agrees_with)}" if proof.agrees_with else ""
+    passed = found.picked.passed_over
+    skipped = f"; {passed} better ones fail the Monte Carlo requirements" if passed else ""
+    return (
+        f"Best of {problem_size(found.problem)} combinations by {found.loaded.spec.objective}: "
+        f"proven by {proof.method}{others}, rechecked exactly{skipped}"
+    )
+
+
+def problem_size(problem: Problem) -> str:
+    """How many combinations there are: plain up to a million, then as a power."""
+    count = problem.combinations
+    return f"{count}" if count < 1_000_000 else f"{count:.2e}"
+
+
+def _measure_lines(hinges: Hinges) -> list[str]:
+    if not hinges.measure_next:
+        return ["No single datasheet figure, 20 % up or down, changes the choice."]
+    lines = ["What to measure next (a single figure that changes the choice):"]
+    for one in hinges.measure_next:
+        spread = " (20 % assumed)" if one.assumed else ""
+        now, then = (_figure_text(one.figure, value) for value in (one.value, one.at))
+        lines.append(f"  {one.figure} from {now} to {then}{spread}: {one.becomes}")
+    return lines
+
+
+def _figure_text(figure: str, value: float) -> str:
+    """A sensor's figure with its unit: angles for attitude and bearing, lengths otherwise."""
+    angular = "sigma_attitude" in figure or "sigma_bearing" in figure
+    return format_quantity(value, Dimension.ANGLE if angular else Dimension.LENGTH)
+
+
+def optimisation_csv(found: Optimisation) -> str:
+    """The front with --pareto, else the designs."""
+    if found.settings.pareto:
+        return presentation.front_csv(found.problem, found.front, found.settings.resource)
+    return presentation.designs_csv(found.problem, found.designs)
+
+
+def pinned_text(loaded: LoadedSpec, problem: Problem, design: Design) -> str:
+    """The spec with a design pinned, for `--write-design`."""
+    selected = selection_of(problem, design)
+    index = {stage.name: i for i, stage in enumerate(loaded.spec.stages)}
+    roles = [
+        PinnedRole(index[r.stage], r.role, r.sensor, r.primitive, _method(loaded, r.method))
+        for r in selected.roles
+    ]
+    clocks = {
+        i: identity
+        for i, stage in enumerate(loaded.spec.stages)
+        if stage.clock is not None and (identity := selected.clock(stage.vehicle_name)) is not None
+    }
+    return pinned_spec_text(loaded, roles, clocks)
+
+
+def _method(loaded: LoadedSpec, name: str) -> str | None:
+    """A method's id; None where the error is given in place and stays."""
+    return name if name in loaded.catalog.timestamping else None

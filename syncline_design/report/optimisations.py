@@ -1,0 +1,24 @@
+"""The outputs of `optimize` in every format."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from syncline_design.optimisation import Optimisation, optimisation_csv, optimisation_json
+
+OPTIMIZE_FORMATS: Final = ("json", "html", "csv")
+
+
+def render_optimize(name: str, found: Optimisation) -> str:
+    """The text of one format; html is the design report, which holds front, prices, runners-up."""
+    if name == "csv":
+        return optimisation_csv(found)
+    if name == "json":
+        from syncline_design.report.json_out import json_text
+
+        return json_text(optimisation_json(found))
+    from syncline_design.report.verdict_page import render_verdict
+    from syncline_design.verify import CheckSettings, check_loaded
+
+    settings = CheckSettings(found.settings.seed, found.settings.method)
+    return render_verdict(check_loaded(found.loaded, settings))
