@@ -43,11 +43,12 @@ def encoded_case(study: Study, index: int, settings: CaseSettings) -> str:
     return canonical(check_case(study, index, settings))
 
 
-def _work(connection: Connection, study: Study, settings: CaseSettings) -> None:
-    """Body of a worker: indices in, records out, until the connection closes."""
+def _work(connection: Connection) -> None:
+    """Body of a worker: the study in, then indices in and records out, until the line closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent answers Ctrl-C
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         connection.send(None)  # up and running
+        study, settings = connection.recv()
         while True:
             index = connection.recv()
             connection.send((index, encoded_case(study, index, settings)))
@@ -75,8 +76,7 @@ class Pool:
         try:
             while len(self._workers) < min(self._count, len(queue)):
                 self._workers.append(self._start())
-            self._hand_out(queue)
-            while any(worker.cases for worker in self._workers):
+            while queue or any(worker.cases for worker in self._workers):
                 yield from self._collect(queue)
                 self._hand_out(queue)
         finally:
@@ -84,9 +84,9 @@ class Pool:
 
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
-        process = self._context.Process(
-            target=_work, args=(theirs, self._study, self._settings), daemon=True
-        )
+        # The study goes over the connection later: as an argument, a process that dies while it
+        # starts would leave the parent writing to nobody for ever.
+        process = self._context.Process(target=_work, args=(theirs,), daemon=True)
         try:
             process.start()
         except OSError as error:
@@ -99,13 +99,13 @@ class Pool:
         # One each in turn, so that the last cases are spread over all workers.
         for depth in range(1, IN_HAND + 1):
             for worker in self._workers:
-                if queue and len(worker.cases) < depth:
-                    self._send(worker, queue)
+                if queue and worker.started and len(worker.cases) < depth:
+                    worker.cases.append(queue.popleft())
+                    self._send(worker, worker.cases[-1])
 
-    def _send(self, worker: _Worker, queue: deque[int]) -> None:
+    def _send(self, worker: _Worker, message: Any) -> None:
         with contextlib.suppress(OSError):  # its end is noticed when its connection is read
-            worker.connection.send(queue[0])
-        worker.cases.append(queue.popleft())
+            worker.connection.send(message)
 
     def _collect(self, queue: deque[int]) -> Iterator[Result]:
         ready = wait([worker.connection for worker in self._workers])
@@ -117,8 +117,10 @@ class Pool:
             except (EOFError, OSError):
                 yield from self._replace(place, queue)
                 continue
-            worker.started = True
-            if message is not None:
+            if message is None:
+                worker.started = True
+                self._send(worker, (self._study, self._settings))
+            else:
                 worker.cases.remove(message[0])
                 yield message
 
@@ -130,7 +132,10 @@ class Pool:
         if not worker.started:
             self._false_starts += 1
             if self._false_starts >= MAX_DEATHS * self._count:
-                raise PoolError("worker processes end before they begin; see the messages above")
+                raise PoolError(
+                    "worker processes end before they begin; the messages above say why (a script "
+                    "that calls run_study does so under `if __name__ == '__main__':`)"
+                )
         elif worker.cases:
             guilty = worker.cases[0]
             self._deaths[guilty] = self._deaths.get(guilty, 0) + 1

@@ -1,0 +1,141 @@
+"""A study's result table: one row per case, the same columns for CSV, Parquet and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import design_sentence, items
+from syncline_design.study.factors import Factor, figure_of
+from syncline_design.study.result import CaseResult, StudyResult
+from syncline_design.study.summary import picks_of
+from syncline_design.units import Dimension
+
+Json = dict[str, Any]
+_SI_UNITS = {
+    Dimension.LENGTH: "m", Dimension.TIME: "s", Dimension.ANGLE: "rad", Dimension.SPEED: "m/s",
+    Dimension.ANGULAR_RATE: "rad/s", Dimension.MASS: "kg", Dimension.POWER: "W",
+    Dimension.RATIO: "1", Dimension.DIMENSIONLESS: "1", Dimension.FREQUENCY: "Hz",
+    Dimension.ACCELERATION: "m/s^2",
+}  # fmt: skip
+FIGURES = {
+    "cost": ("design", "cost"),
+    "mass_kg": ("design", "mass"),
+    "power_w": ("design", "power"),
+    "error_m": ("syncline", "total_m"),
+    "sensor_error_m": ("syncline", "sensor_error_m"),
+    "sync_error_m": ("syncline", "sync_error_m"),
+    "tau_s": ("syncline", "tau_s"),
+    "tau_crit_s": ("syncline", "tau_crit_s"),
+}
+
+
+def si_unit(factor: Factor) -> str | None:
+    """The SI unit that all values of a factor share; None when they are no such figures."""
+    figures = [figure_of(value) for value in factor.values]
+    kinds = {figure[1] if figure is not None else "" for figure in figures}
+    if len(kinds) != 1 or "" in kinds:
+        return None
+    kind = kinds.pop()
+    return next((unit for d, unit in _SI_UNITS.items() if d.value == kind), kind)
+
+
+def columns(result: StudyResult) -> list[str]:
+    """The columns of the table: case, factors, verdict, figures, payload, reasons."""
+    names = ["case", "base"]
+    for factor in result.study.factors:
+        unit = si_unit(factor)
+        names += [factor.key] if unit is None else [factor.key, f"{factor.key} [{unit}]"]
+    names += ["verdict", *FIGURES, "currency"]
+    for role in _roles(result):
+        names += [role, f"{role} timestamping"]
+    return [*names, "failing", "not_simulated", "reason"]
+
+
+def text_columns(result: StudyResult) -> set[str]:
+    """Columns that hold text; the others hold figures."""
+    numeric = {f"{f.key} [{si_unit(f)}]" for f in result.study.factors}
+    return {c for c in columns(result) if c not in FIGURES and c not in numeric} - {"case"}
+
+
+def _roles(result: StudyResult) -> list[str]:
+    roles: dict[str, None] = {}
+    for base in result.study.bases:
+        for index, stage in enumerate(base.document.data["stages"]):
+            named = ("position", "attitude", "ranging")
+            for role in named:
+                if role in stage and not (index and role == "position"):
+                    roles[f"{stage['name']}.{role}"] = None
+    return list(roles)
+
+
+def rows(result: StudyResult) -> Iterator[Json]:
+    """A row per case, in the order of the study."""
+    units = {factor.key: si_unit(factor) for factor in result.study.factors}
+    for case in result.cases():
+        yield row(case, units)
+
+
+def row(case: CaseResult, units: Mapping[str, str | None]) -> Json:
+    """One case as a row; what it lacks is None."""
+    found: Json = {"case": case.number, "base": case.file, "verdict": case.verdict}
+    labels = case.labels
+    for key, value in case.settings:
+        found[key] = labels[key]
+        figure = figure_of(value) if units[key] is not None else None
+        if figure is not None:
+            found[f"{key} [{units[key]}]"] = figure[0]
+    for name, path in FIGURES.items():
+        found[name] = case.figure(*path)
+    found["currency"] = case.currency if found["cost"] is not None else None
+    for pick in picks_of(case):
+        found[pick.role] = pick.sensor
+        found[f"{pick.role} timestamping"] = pick.timestamping
+    failing = [str(r["id"]) for r in items(case.record, "requirements") if r["status"] == "fail"]
+    found["failing"] = " ".join(failing)
+    found["not_simulated"] = " ".join(case.record.get("not_simulated") or ())
+    found["reason"] = reason(case)
+    return found
+
+
+def reason(case: CaseResult) -> str:
+    """Why a case has no design, and what would give it one; empty where it has."""
+    record = case.record
+    if record.get("reason"):
+        return str(record["reason"])
+    problems = items(record, "problems")
+    if problems:
+        return "; ".join(f"{p.get('path')}: {p.get('message')}" for p in problems)
+    if case.verdict != "infeasible":
+        return ""
+    fixes = [str(entry.get("text")) for entry in items(record.get("infeasibility"), "fixes")]
+    would = f" Either would do: {'; '.join(fixes)}." if fixes else ""
+    return design_sentence({**record, "design": None}) + would
+
+
+def study_csv(result: StudyResult) -> str:
+    """The table as CSV; text that a spreadsheet would run is disarmed."""
+    from syncline_design.report.csv_out import csv_text
+
+    return csv_text(columns(result), rows(result))
+
+
+def study_parquet(result: StudyResult) -> bytes:
+    """The table as Parquet, figures as float64; unit in the column's name."""
+    import io
+
+    import polars as pl
+
+    text = text_columns(result)
+    names = columns(result)
+    schema: dict[str, Any] = {n: pl.String if n in text else pl.Float64 for n in names}
+    schema["case"] = pl.Int64
+    filled = ({n: _value(r.get(n)) for n in names} for r in rows(result))
+    stream = io.BytesIO()
+    pl.DataFrame(filled, schema=schema, orient="row").write_parquet(stream, statistics=False)
+    return stream.getvalue()
+
+
+def _value(value: Any) -> Any:
+    return visible(value) if isinstance(value, str) else value

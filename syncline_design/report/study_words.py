@@ -1,0 +1,183 @@
+"""A study in words: outcome, summary text for the console, Markdown for a pull request."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from syncline_design.report import numbers
+from syncline_design.report.markdown import markdown_table
+from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.text import markdown_safe, sentence_list, visible
+from syncline_design.report.verdict_words import OUTCOMES, Outcome
+from syncline_design.study.progress import Progress
+from syncline_design.study.result import StudyResult
+from syncline_design.study.summary import (
+    HeatMap,
+    Summary,
+    boundaries,
+    heat_map,
+    summarise,
+    varied,
+    winners,
+)
+
+MOST_ROWS = 200
+_VERDICT_WORDS = {
+    "meets": "meet their requirements",
+    "fails": "do not meet them",
+    "infeasible": "are infeasible",
+    "refused": "cannot be as combined",
+    "indeterminate": "got no verdict",
+}
+_WHEN = {
+    "all": "every case has to meet its requirements",
+    "any": "one case has to meet its requirements",
+    "decided": "every case has to get an answer",
+}
+
+
+def outcome(result: StudyResult) -> Outcome:
+    """The study's outcome as colour, symbol and word."""
+    shown = OUTCOMES[result.verdict]
+    return Outcome(shown.tone, shown.mark, f"{count_sentence(result)}")
+
+
+def count_sentence(result: StudyResult) -> str:
+    """`13 of 25 cases meet their requirements, 12 are infeasible`."""
+    counts = result.counts
+    parts = [f"{counts['meets']} of {len(result)} cases {_VERDICT_WORDS['meets']}"]
+    parts += [f"{n} {_VERDICT_WORDS[w]}" for w, n in counts.items() if n and w != "meets"]
+    return sentence_list(parts)
+
+
+def rule_sentence(result: StudyResult) -> str:
+    """What decides the study's exit code, and what was left out."""
+    text = f"The study passes when {_WHEN[result.study.meets_when]}."
+    if result.not_simulated:
+        many = "are" if len(result.not_simulated) > 1 else "is"
+        names = sentence_list(list(result.not_simulated))
+        text += f" Without Monte Carlo, as the study asks: {names} {many} left out of every case."
+    return text
+
+
+def study_text(result: StudyResult) -> str:
+    """The summary for the console."""
+    summary = summarise(result)
+    shown = outcome(result)
+    lines = [f"{shown.mark} {visible(result.study.name)}: {shown.word}."]
+    lines += [rule_sentence(result), ""]
+    heat = heat_map(summary)
+    if heat is not None:
+        lines += [plain_table(heat_table(heat, _currency(result))), ""]
+    lines += [plain_table(winners_table(summary)), ""]
+    ends = boundary_table(summary)
+    if ends.rows:
+        lines += [plain_table(ends), ""]
+    retried = f", {result.retried} done again after a worker died" if result.retried else ""
+    lines.append(
+        f"{result.computed} cases computed, {result.reused} already there{retried}; "
+        f"kept in {result.store.folder}"
+    )
+    return "\n".join(lines) + "\n"
+
+
+def study_markdown(result: StudyResult) -> str:
+    """The summary for a pull request."""
+    summary = summarise(result)
+    shown = outcome(result)
+    lines = [f"## {shown.mark} {markdown_safe(result.study.name)}: {shown.word}", ""]
+    lines += [markdown_safe(rule_sentence(result)), ""]
+    heat = heat_map(summary)
+    tables = [] if heat is None else [heat_table(heat, _currency(result))]
+    for found in (*tables, winners_table(summary), boundary_table(summary)):
+        if found.rows:
+            lines += [f"**{markdown_safe(found.caption)}**", "", markdown_table(found)]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _currency(result: StudyResult) -> str:
+    return result.study.bases[0].currency
+
+
+def heat_table(heat: HeatMap, currency: str) -> Table:
+    """Least cost over two factors as a table."""
+    heads = [f"{heat.y.key} \\ {heat.x.key}", *(f"{text} #" for text in heat.x_labels)]
+    rows = [
+        [Cell(name), *(_cost_cell(cost, pick, currency) for cost, pick in zip(*cells, strict=True))]
+        for name, *cells in zip(heat.y_labels, heat.cost, heat.picks, strict=True)
+    ]
+    return table("Least cost of a payload that meets the requirements", heads, rows)
+
+
+def _cost_cell(cost: float | None, payload: str, currency: str) -> Cell:
+    if cost is None:
+        return Cell("none", tone="bad", mark="\u2717")
+    return Cell(numbers.money(cost, currency), cost, sub=payload)
+
+
+def winners_table(summary: Summary) -> Table:
+    """Which sensor and method is chosen where."""
+    several = [factor.key for _, factor in varied(summary)]
+    rows = [
+        [
+            Cell(w.pick.role), Cell(w.pick.name), Cell(w.pick.timestamping),
+            Cell(f"{w.cases} of {w.of}", float(w.cases)), *map(Cell, w.where),
+        ]
+        for w in winners(summary)
+    ]  # fmt: skip
+    heads = ["Role", "Sensor", "Timestamping", "Chosen in #", *(f"At {key}" for key in several)]
+    return table("Which sensor and method wins where, of the cases that meet", heads, rows)
+
+
+def boundary_table(summary: Summary) -> Table:
+    """Where feasibility ends along each factor."""
+    found = boundaries(summary)
+    rows = [
+        [
+            Cell(b.factor), Cell(b.met), Cell(b.missed), Cell(b.why),
+            Cell("; ".join(f"{key} = {value}" for key, value in b.fixed)),
+        ]
+        for b in found[:MOST_ROWS]
+    ]  # fmt: skip
+    more = len(found) - MOST_ROWS
+    note = f"{more} further rows are left out." if more > 0 else ""
+    heads = ["Along", "Last value that meets", "Next value", "There", "With"]
+    return table("Where feasibility ends", heads, rows, note)
+
+
+def plain_table(shown: Table) -> str:
+    """A table for the console, columns lined up."""
+    cells = [[head.text for head in shown.heads]]
+    cells += [[f"{c.mark} {c.text}".strip() for c in row] for row in shown.rows]
+    lines = [[visible(text).replace("\u00a0", " ") for text in row] for row in cells]
+    widths = [max(len(text) for text in column) for column in zip(*lines, strict=True)]
+    sides = ["rjust" if head.numeric else "ljust" for head in shown.heads]
+    drawn = ["  ".join(_aligned(row, widths, sides)).rstrip() for row in lines]
+    return "\n".join([shown.caption, *(f"  {line}" for line in drawn)])
+
+
+def _aligned(row: list[str], widths: list[int], sides: list[str]) -> Iterable[str]:
+    for text, width, side in zip(row, widths, sides, strict=True):
+        yield text.rjust(width) if side == "rjust" else text.ljust(width)
+
+
+def progress_text(progress: Progress) -> str:
+    """`180 of 500 cases, 40 already there, 00:12 left`."""
+    parts = [f"{progress.done} of {progress.total} cases"]
+    if progress.reused:
+        parts.append(f"{progress.reused} already there")
+    if progress.retried:
+        parts.append(f"{progress.retried} done again")
+    left = progress.remaining_s
+    if progress.done < progress.total:
+        parts.append("estimating" if left is None else f"{_clock(left)} left")
+    else:
+        parts.append(f"took {_clock(progress.elapsed_s)}")
+    return ", ".join(parts)
+
+
+def _clock(seconds: float) -> str:
+    whole = round(seconds)
+    hours, rest = divmod(whole, 3600)
+    minutes, left = divmod(rest, 60)
+    return f"{hours}:{minutes:02d}:{left:02d}" if hours else f"{minutes:02d}:{left:02d}"
