@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from syncline_design.effects.base import Array
 
-KEPT_VALUES = 4_000_000  # 32 MB; beyond, memory must not grow with the number of samples
+KEPT_VALUES = 1_000_000  # 8 MB; beyond, memory must not grow with the number of samples
 _BITS = 12  # bins per octave: 2^12, so a bin is 0.024 % wide, and values spread within it
 _LEAST_EXPONENT = -64  # below 5e-20 m counts as that
 _OCTAVES = 96
@@ -21,32 +22,43 @@ Counts = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True)
 class Values:
-    """Every error [m], ascending; NaN last."""
+    """Every error [m], in the order of drawing."""
 
-    sorted_m: Array
+    errors_m: Array
 
     @property
     def count(self) -> int:
-        return int(self.sorted_m.shape[0])
+        return int(self.errors_m.shape[0])
 
-    def order_statistic(self, rank: int) -> float:
-        """The rank-th smallest error [m], 1 the smallest; 0 below the first, inf above the last."""
-        if not 1 <= rank <= self.count:
-            return 0.0 if rank < 1 else math.inf
-        return float(self.sorted_m[rank - 1])
+    def order_statistics(self, ranks: Sequence[int]) -> tuple[float, ...]:
+        """The rank-th smallest errors [m], 1 the smallest; 0 below the first, inf above the last.
+
+        NaN counts as larger than any number.
+        """
+        inside = sorted({rank - 1 for rank in ranks if 1 <= rank <= self.count})
+        parted = np.partition(self.errors_m, inside) if inside else self.errors_m
+        return tuple(
+            float(parted[rank - 1]) if 1 <= rank <= self.count else _beyond(rank) for rank in ranks
+        )
 
     def within(self, limit_m: float) -> int:
         """How many errors are at most limit_m (NaN is not)."""
-        return int(np.searchsorted(self.sorted_m, limit_m, side="right"))
+        return int(np.count_nonzero(self.errors_m <= limit_m))
 
     def histogram(self, bins: int) -> tuple[Array, Array]:
         """(edges [m] (bins + 1,), density [1/m] (bins,)) over the finite errors."""
-        finite = self.sorted_m[: int(np.searchsorted(self.sorted_m, math.inf))]
-        top = float(finite[-1]) if finite.size and finite[-1] > 0.0 else 1.0
+        finite = self.errors_m
+        if not np.all(np.isfinite(finite)):
+            finite = finite[np.isfinite(finite)]
+        top = float(finite.max(initial=0.0)) or 1.0
         edges = np.linspace(0.0, top, bins + 1)
-        below = np.searchsorted(finite, edges, side="right")
-        below[0] = 0
-        return edges, np.diff(below) / (self.count * np.diff(edges))
+        index = np.minimum((finite * (bins / top)).astype(np.intp), bins - 1)
+        counts = np.bincount(index, minlength=bins)
+        return edges, counts / (self.count * np.diff(edges))
+
+
+def _beyond(rank: int) -> float:
+    return 0.0 if rank < 1 else math.inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,11 +71,14 @@ class Binned:
     def count(self) -> int:
         return int(self.counts.sum())
 
-    def order_statistic(self, rank: int) -> float:
-        """The rank-th smallest error [m], spread evenly within its bin."""
+    def order_statistics(self, ranks: Sequence[int]) -> tuple[float, ...]:
+        """The rank-th smallest errors [m], spread evenly within their bins; see `Values`."""
         total = np.cumsum(self.counts)
+        return tuple(self._order_statistic(rank, total) for rank in ranks)
+
+    def _order_statistic(self, rank: int, total: Counts) -> float:
         if not 1 <= rank <= int(total[-1]):
-            return 0.0 if rank < 1 else math.inf
+            return _beyond(rank)
         index = int(np.searchsorted(total, rank))
         if index == _BINS - 1:
             return math.inf

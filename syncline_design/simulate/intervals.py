@@ -16,8 +16,8 @@ def incomplete_beta(a: float, b: float, x: float) -> float:
     """Regularised incomplete beta function I_x(a, b), a, b > 0, 0 <= x <= 1.
 
     Continued fraction (NIST DLMF 8.17.22) by Lentz's method, on the side where it converges fast
-    (DLMF 8.17.4).  Absolute error below 1e-6 up to a + b = 1e8, 5e-9 up to 2e6, 1e-9 up to 2e5, most of
-    it from the logarithms of the gamma function (tested against mpmath).
+    (DLMF 8.17.4).  Absolute error below 1e-6 up to a + b = 1e8, 5e-9 up to 2e6, 1e-9 up to 2e5,
+    most of it from the logarithms of the gamma function (tested against mpmath).
     """
     if x <= 0.0 or x >= 1.0:
         return float(x >= 1.0)

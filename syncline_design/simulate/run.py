@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-import dataclasses
-import threading
 from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
-from syncline_design.effects.base import Array
 from syncline_design.model.budget import budget
 from syncline_design.model.system import System
 from syncline_design.simulate import distribution
 from syncline_design.simulate.distribution import Binned, Values
 from syncline_design.simulate.intervals import proportion_interval, quantile_ranks
-from syncline_design.simulate.kernel import norm
 from syncline_design.simulate.results import (
     MonteCarlo,
     ProportionEstimate,
@@ -23,12 +19,13 @@ from syncline_design.simulate.results import (
     SimulationResult,
     histogram,
 )
-from syncline_design.simulate.sampling import JOB, error_distribution, run_jobs
+from syncline_design.simulate.sampling import JOB, error_distribution
 from syncline_design.simulate.settings import (
     DEFAULT_MANOEUVRE,
     SimulationSettings,
     demand_simulable,
 )
+from syncline_design.simulate.worker import tally
 from syncline_design.simulate.worst_case import WorstCase, worst_cases
 
 DEFAULT_SETTINGS = SimulationSettings()
@@ -81,9 +78,7 @@ def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) ->
 def _monte_carlo(
     settings: SimulationSettings, found: Values | Binned, worst: WorstCase
 ) -> MonteCarlo:
-    estimates = tuple(
-        quantile_estimate(found, quantile, settings.confidence) for quantile in settings.quantiles
-    )
+    estimates = quantile_estimates(found, settings.quantiles, settings.confidence)
     within = None
     if settings.limit_m is not None:
         count = found.within(settings.limit_m)
@@ -104,13 +99,17 @@ def _monte_carlo(
     )
 
 
-def quantile_estimate(
-    found: Values | Binned, quantile: float, confidence: float
-) -> QuantileEstimate:
-    """A quantile between two order statistics that enclose it with `confidence`."""
-    ranks = quantile_ranks(quantile, found.count, confidence)
-    low, value, high = (found.order_statistic(rank) for rank in ranks)
-    return QuantileEstimate(quantile, value, low, high)
+def quantile_estimates(
+    found: Values | Binned, quantiles: tuple[float, ...], confidence: float
+) -> tuple[QuantileEstimate, ...]:
+    """Quantiles, each between two order statistics that enclose it with `confidence`."""
+    ranks = [quantile_ranks(quantile, found.count, confidence) for quantile in quantiles]
+    values = iter(found.order_statistics([rank for ends in ranks for rank in ends]))
+    estimates = []
+    for quantile in quantiles:
+        low, value, high = next(values), next(values), next(values)
+        estimates.append(QuantileEstimate(quantile, value, low, high))
+    return tuple(estimates)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,19 +152,20 @@ def decide(
     look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
     counts, within, drawn = distribution.no_counts(), 0, 0
     if first is not None and isinstance(first.distribution, Values):
-        distribution.add_counts(counts, first.distribution.sorted_m)
+        distribution.add_counts(counts, first.distribution.errors_m)
         within, drawn = first.distribution.within(limit_m), first.samples
     for look, size in enumerate(sizes, 1):
         if drawn < size:
             # a shorter first run may have ended inside a job: that job is drawn again
             if drawn % JOB:
                 counts, within, drawn = distribution.no_counts(), 0, 0
-            within += _tally(system, settings, (drawn, size), limit_m, counts)
-            drawn = size
+            found, more = tally(system, settings, drawn, size, limit_m)
+            counts, within, drawn = counts + found, within + more, size
         low, high = proportion_interval(within, size, look_confidence)
         undecided = low < quantile <= high
         if not undecided or look == len(sizes):
             break
+    (estimate,) = quantile_estimates(Binned(counts), (quantile,), look_confidence)
     status: Literal["pass", "fail", "indeterminate"] = "indeterminate"
     if not undecided:
         status = "pass" if low >= quantile else "fail"
@@ -176,7 +176,7 @@ def decide(
         looks=look,
         confidence=settings.confidence,
         look_confidence=look_confidence,
-        estimate=quantile_estimate(Binned(counts), quantile, look_confidence),
+        estimate=estimate,
         within=ProportionEstimate(limit_m, within / size, low, high),
     )
 
@@ -187,24 +187,3 @@ def look_sizes(samples: int, cap_samples: int) -> list[int]:
     while sizes[-1] < cap_samples:
         sizes.append(min(sizes[-1] * LOOK_GROWTH, cap_samples))
     return sizes
-
-
-def _tally(
-    system: System,
-    settings: SimulationSettings,
-    span: tuple[int, int],
-    limit_m: float,
-    counts: distribution.Counts,
-) -> int:
-    """Count the samples of a span into bins (in place); how many are at most limit_m."""
-    lock = threading.Lock()
-    found: list[int] = []
-
-    def count(_: int, errors: Array) -> None:
-        lengths = norm(errors)
-        with lock:
-            distribution.add_counts(counts, lengths)
-            found.append(int(np.count_nonzero(lengths <= limit_m)))
-
-    run_jobs(system, dataclasses.replace(settings, samples=span[1]), *span, count)
-    return sum(found)

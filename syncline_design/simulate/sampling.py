@@ -7,6 +7,7 @@ samples of a shorter one.
 
 from __future__ import annotations
 
+import math
 import os
 import threading
 from collections.abc import Callable
@@ -15,7 +16,7 @@ import numpy as np
 
 from syncline_design.effects.base import Array
 from syncline_design.model.system import System
-from syncline_design.simulate import distribution, known_effects
+from syncline_design.simulate import known_effects
 from syncline_design.simulate.distribution import KEPT_VALUES, Binned, Values
 from syncline_design.simulate.draws import RandomSource, generator, stage_draw, timing_draws
 from syncline_design.simulate.kernel import norm
@@ -67,17 +68,10 @@ def error_distribution(system: System, settings: SimulationSettings) -> Values |
             kept[start : start + errors.shape[1]] = norm(errors)
 
         run_jobs(system, settings, 0, settings.samples, keep)
-        kept.sort()
         return Values(kept)
-    counts = distribution.no_counts()
-    lock = threading.Lock()
+    from syncline_design.simulate.worker import tally
 
-    def count(_: int, errors: Array) -> None:
-        lengths = norm(errors)
-        with lock:
-            distribution.add_counts(counts, lengths)
-
-    run_jobs(system, settings, 0, settings.samples, count)
+    counts, _ = tally(system, settings, 0, settings.samples, math.inf)
     return Binned(counts)
 
 
@@ -89,6 +83,7 @@ def run_jobs(
     `first` must begin a job.  consume(start, errors (3, n)): the samples from `start` on.  Threads
     share the work: NumPy frees the interpreter in every operation on a job's arrays.
     """
+    keep_freed_memory()
     jobs = iter(range(first // JOB, -(-last // JOB)))
     failures: list[BaseException] = []
     lock = threading.Lock()
@@ -114,6 +109,16 @@ def run_jobs(
         thread.join()
     if failures:
         raise failures[0]
+
+
+def keep_freed_memory() -> None:
+    """Make the C library hold on to freed memory instead of returning it after every array.
+
+    glibc raises its thresholds for mmap and for trimming the heap when a large block is freed
+    (mallopt(3), M_MMAP_THRESHOLD); without this, page faults cost as much as the arithmetic.  The
+    block is never touched, so it costs no memory; elsewhere it does nothing.
+    """
+    np.empty(3_900_000)
 
 
 def workers(settings: SimulationSettings) -> int:

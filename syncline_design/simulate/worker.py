@@ -1,0 +1,108 @@
+"""Long runs on several processes: the parent hands out shares, each child counts its own.
+
+A child runs `main` of this module by the same interpreter; it reads one pickled Share from standard input
+and writes its counts to standard output.  Counts are whole numbers and add up to the same sums
+whatever the number of children.
+"""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.effects.base import Array
+from syncline_design.model.system import System
+from syncline_design.simulate.distribution import Counts, add_counts, no_counts
+from syncline_design.simulate.kernel import norm
+from syncline_design.simulate.sampling import JOB, job_errors, keep_freed_memory, run_jobs, workers
+from syncline_design.simulate.settings import SimulationSettings
+
+WORTH_PROCESSES = 3_000_000  # samples from which starting processes pays
+
+
+@dataclass(frozen=True, slots=True)
+class Share:
+    """Every `parts`-th job, beginning with number `part`, of the samples first .. last - 1."""
+
+    system: System
+    settings: SimulationSettings
+    first: int
+    last: int
+    limit_m: float
+    part: int
+    parts: int
+
+
+def tally(
+    system: System, settings: SimulationSettings, first: int, last: int, limit_m: float
+) -> tuple[Counts, int]:
+    """(counts of |error| by bins, how many are at most limit_m) of the samples first .. last - 1.
+
+    `first` must begin a job.
+    """
+    parts = workers(settings)
+    if parts > 1 and last - first >= WORTH_PROCESSES:
+        return _tally_on_processes(
+            [Share(system, settings, first, last, limit_m, part, parts) for part in range(parts)]
+        )
+    counts, within = no_counts(), [0]
+    lock = threading.Lock()
+
+    def count(_: int, errors: Array) -> None:
+        lengths = norm(errors)
+        with lock:
+            add_counts(counts, lengths)
+            within[0] += int(np.count_nonzero(lengths <= limit_m))
+
+    run_jobs(system, settings, first, last, count)
+    return counts, within[0]
+
+
+def _tally_on_processes(shares: list[Share]) -> tuple[Counts, int]:
+    command = [sys.executable, "-c", f"from {__name__} import main; main()"]
+    pipe = subprocess.PIPE
+    children = [subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) for _ in shares]
+    try:
+        for child, share in zip(children, shares, strict=True):
+            assert child.stdin is not None
+            child.stdin.write(pickle.dumps(share))
+            child.stdin.close()
+            child.stdin = None
+        answers = [child.communicate() for child in children]
+    finally:
+        for child in children:
+            child.kill()
+            child.wait()
+    for child, (_, complaint) in zip(children, answers, strict=True):
+        if child.returncode != 0:
+            raise RuntimeError(f"a simulation process failed: {complaint.decode(errors='replace')}")
+    counts, within = no_counts(), 0
+    for answer, _ in answers:
+        numbers = np.frombuffer(answer, dtype=np.int64)
+        counts += numbers[1:]
+        within += int(numbers[0])
+    return counts, within
+
+
+def count_share(share: Share) -> tuple[Counts, int]:
+    """(counts, within) of one share, in this process and thread."""
+    keep_freed_memory()
+    counts, within = no_counts(), 0
+    jobs = range(share.first // JOB, -(-share.last // JOB))
+    for job in jobs[share.part :: share.parts]:
+        errors = job_errors(share.system, share.settings, job)
+        lengths = norm(errors[:, : share.last - job * JOB])
+        add_counts(counts, lengths)
+        within += int(np.count_nonzero(lengths <= share.limit_m))
+    return counts, within
+
+
+def main() -> None:
+    """Answer one share: the count within the limit, then the bins' counts, as int64."""
+    counts, within = count_share(pickle.load(sys.stdin.buffer))
+    sys.stdout.buffer.write(np.concatenate([[within], counts]).astype(np.int64).tobytes())
