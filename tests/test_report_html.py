@@ -93,6 +93,11 @@ def test_answer_comes_first(page: Page) -> None:
         "200\u00a0000",
         "30.9\u00a0mm to 31.1\u00a0mm",
         "99.998\u00a0%",
+        "210\u00a0mm to below 420\u00a0mm",
+        "3\u00a0500\u00a0EUR",
+        "262\u00a0mm",
+        "the design sometimes passes; sbg_apogee.sigma_attitude decides it.",
+        "kongsberg_mru5",
     ],
 )
 def test_page_says(page: Page, words: str) -> None:

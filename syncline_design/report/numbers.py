@@ -122,6 +122,14 @@ _DIMENSIONS: Final = {
 }
 
 
+def si_quantity(value: Any, unit: str, digits: int = 4) -> str:
+    """A figure in an SI unit by that unit's ladder; other units are appended as they are."""
+    dimension = _DIMENSIONS.get(unit)
+    if dimension is not None:
+        return _shown(value, dimension, digits)
+    return in_unit(value, unit, digits) if unit in ("", "kg", "W") else f"{number(value)} {unit}"
+
+
 def with_uncertainty(value: float, uncertainty: float | None, unit: str) -> str:
     """An SI estimate and its standard uncertainty in one unit: `87.1 ms ± 0.3 ms`.
 

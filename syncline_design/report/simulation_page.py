@@ -7,12 +7,8 @@ from typing import Any
 from syncline_design.report import numbers, page, verdict_tables
 from syncline_design.report.tables import Cell, Table, table
 from syncline_design.report.text import harmless
-from syncline_design.report.verdict_page import (
-    drawing,
-    grid_points,
-    simulation_facts,
-    simulation_figures,
-)
+from syncline_design.report.verdict_figures import grid_points, simulation_figures
+from syncline_design.report.verdict_page import drawing, simulation_facts
 from syncline_design.report.verdict_words import Json, Outcome, items, part
 
 

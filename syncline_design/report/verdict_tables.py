@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from syncline_design.report import numbers
-from syncline_design.report.tables import Cell, Table, Tone, table
+from syncline_design.report.tables import Cell, Table, table
 from syncline_design.report.verdict_words import (
     PRIMITIVES,
     Json,
@@ -191,60 +190,6 @@ def quantiles(verdict: Json) -> Table:
         ))  # fmt: skip
     heads = ("Quantile", "Error #", "95 % confidence interval")
     return table("Quantiles of the simulated error", heads, rows)
-
-
-def is_chosen(verdict: Json, entry: Json) -> bool:
-    """Whether a point of the front is the chosen design: same price, same error."""
-    cost = numbers.finite(part(verdict, "design").get("cost"))
-    total = numbers.finite(part(verdict, "syncline").get("total_m"))
-    error = numbers.finite(entry.get("error_m"))
-    if cost is None or total is None or error is None or entry.get("cost") != cost:
-        return False
-    return math.isclose(error, total, rel_tol=1e-6)
-
-
-def priced(verdict: Json, key: str, caption: str, error_head: str) -> Table | None:
-    """A list of designs with price and error: the front, the staircase, the next best."""
-    currency = currency_of(verdict)
-    rows = []
-    for entry in items(part(verdict, "choice"), key):
-        error = entry.get("error_m", entry.get("limit_m"))
-        shown: tuple[str, Tone] = ("\u25c6", "good") if is_chosen(verdict, entry) else ("", "")
-        rows.append((
-            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
-            Cell(numbers.length(error), numbers.finite(error)),
-            Cell(design_text(entry.get("design")), tone=shown[1], mark=shown[0]),
-        ))  # fmt: skip
-    return table(caption, ("Cost #", error_head, "Design"), rows) if rows else None
-
-
-def design_text(design: object) -> str:
-    """A design as words: text as it is; a design record as its sensors."""
-    if not isinstance(design, Mapping):
-        return str(design or "")
-    names = []
-    for stage in items(design, "stages"):
-        for _, entry in named(stage, "roles"):
-            method = entry.get("timestamping")
-            sensor = str(entry.get("name") or entry.get("sensor"))
-            names.append(f"{sensor} ({method})" if method else sensor)
-    return ", ".join(names)
-
-
-def excluded(verdict: Json) -> Table | None:
-    """Options ruled out before the choice, with the reason."""
-    rows = [
-        (
-            f"{entry.get('stage')} \u00b7 {entry.get('role')}",
-            Cell(str(entry.get("sensor")), code=True),
-            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive"))),
-            Cell(str(entry.get("method")), code=True),
-            str(entry.get("reason")),
-        )
-        for entry in items(part(verdict, "choice"), "excluded")
-    ]
-    heads = ("Role", "Sensor", "Primitive", "Timestamping", "Reason")
-    return table("Options ruled out", heads, rows) if rows else None
 
 
 def assumptions(verdict: Json) -> Table | None:

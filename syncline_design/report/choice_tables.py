@@ -1,0 +1,148 @@
+"""Tables of the choice: front, price staircase, runners-up, slack, what to measure, exclusions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from syncline_design.report import numbers
+from syncline_design.report.tables import Cell, Table, Tone, table
+from syncline_design.report.text import sentence_list
+from syncline_design.report.verdict_tables import currency_of
+from syncline_design.report.verdict_words import KINDS, PRIMITIVES, Json, items, named, part
+
+
+def choice_tables(verdict: Json) -> list[Table]:
+    """Every table of the choice that has rows."""
+    found = (
+        priced(verdict, "front", "Pareto front: cost against error"),
+        staircase(verdict),
+        priced(verdict, "next_best", "What else almost won"),
+        slack(verdict),
+        measure_next(verdict),
+        excluded(verdict),
+    )
+    return [entry for entry in found if entry is not None]
+
+
+def staircase(verdict: Json) -> Table | None:
+    """What each accuracy costs: a row per step of the exact front."""
+    currency = currency_of(verdict)
+    rows = []
+    for entry in items(part(verdict, "choice"), "staircase"):
+        tight, loose = entry.get("tightest_m"), entry.get("looser_than_m")
+        below = f" to below {numbers.length(loose)}" if loose is not None else " and looser"
+        rows.append((
+            Cell(numbers.length(tight) + below, numbers.finite(tight)),
+            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
+            Cell(numbers.money(entry.get("extra"), currency), numbers.finite(entry.get("extra"))),
+        ))  # fmt: skip
+    heads = ("Accuracy targets", "Price #", "More than the step before #")
+    return table("Price staircase of accuracy", heads, rows) if rows else None
+
+
+def slack(verdict: Json) -> Table | None:
+    """How far each term may grow before the verdict or the payload changes."""
+    rows = []
+    for entry in items(part(verdict, "choice"), "slack") or items(verdict, "slack"):
+        unit = str(entry.get("unit") or "")
+        breaks = KINDS.get(str(entry.get("limited_by")), "")
+        rows.append((
+            f"{entry.get('stage')} \u00b7 {entry.get('term')}",
+            Cell(numbers.si_quantity(entry.get("value"), unit), numbers.finite(entry.get("value"))),
+            _threshold(entry.get("fails_at"), unit),
+            breaks,
+            _threshold(entry.get("payload_changes_at"), unit),
+        ))  # fmt: skip
+    heads = ("Term", "Now #", "Verdict fails at #", "What then breaks", "Payload changes at #")
+    return table("Slack: how far each term may grow", heads, rows) if rows else None
+
+
+def _threshold(value: object, unit: str) -> Cell:
+    known = numbers.finite(value)
+    return Cell("never" if known is None else numbers.si_quantity(known, unit), known)
+
+
+def measure_next(verdict: Json) -> Table | None:
+    """Datasheet figures that alone would flip the choice."""
+    source = part(verdict, "choice") if part(verdict, "choice").get("measure_next") else verdict
+    rows = [
+        (
+            str(entry.get("figure")),
+            Cell(numbers.number(entry.get("value")), numbers.finite(entry.get("value"))),
+            Cell(numbers.number(entry.get("at")), numbers.finite(entry.get("at"))),
+            "20 % tried, the datasheet gives none" if entry.get("assumed_tolerance")
+            else "datasheet tolerance",
+            str(entry.get("becomes") or ""),
+        )
+        for entry in items(source, "measure_next")
+    ]  # fmt: skip
+    heads = ("Figure (SI)", "Now #", "Flips at #", "Range", "The choice becomes")
+    return table("What to measure next", heads, rows) if rows else None
+
+
+def tolerance_sentence(verdict: Json) -> str:
+    """Whether the design passes always, sometimes or never within the datasheet tolerances."""
+    found = part(part(verdict, "choice"), "tolerances") or part(verdict, "tolerances")
+    if not found or not found.get("figures"):
+        return ""
+    text = f"Within the datasheet tolerances the design {found.get('passes')} passes"
+    deciding = [str(name) for name in found.get("deciding") or ()]
+    if not deciding:
+        return text + "."
+    verb = "decides it" if found.get("alone") else "decide it together"
+    return f"{text}; {sentence_list(deciding)} {verb}."
+
+
+def is_chosen(verdict: Json, entry: Json) -> bool:
+    """Whether a point of the front is the chosen design: same price, same error."""
+    cost = numbers.finite(part(verdict, "design").get("cost"))
+    total = numbers.finite(part(verdict, "syncline").get("total_m"))
+    error = numbers.finite(entry.get("error_m"))
+    if cost is None or total is None or error is None or entry.get("cost") != cost:
+        return False
+    return math.isclose(error, total, rel_tol=1e-6)
+
+
+def priced(verdict: Json, key: str, caption: str) -> Table | None:
+    """A list of designs with price and error: the front, the next best."""
+    currency = currency_of(verdict)
+    rows = []
+    for entry in items(part(verdict, "choice"), key):
+        error = entry.get("error_m")
+        shown: tuple[str, Tone] = ("\u25c6", "good") if is_chosen(verdict, entry) else ("", "")
+        rows.append((
+            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
+            Cell(numbers.length(error), numbers.finite(error)),
+            Cell(design_text(entry.get("design")), tone=shown[1], mark=shown[0]),
+        ))  # fmt: skip
+    return table(caption, ("Cost #", "Error #", "Design"), rows) if rows else None
+
+
+def design_text(design: object) -> str:
+    """A design as words: text as it is; a design record as its sensors."""
+    if not isinstance(design, Mapping):
+        return str(design or "")
+    names = []
+    for stage in items(design, "stages"):
+        for _, entry in named(stage, "roles"):
+            method = entry.get("timestamping")
+            sensor = str(entry.get("name") or entry.get("sensor"))
+            names.append(f"{sensor} ({method})" if method else sensor)
+    return ", ".join(names)
+
+
+def excluded(verdict: Json) -> Table | None:
+    """Options ruled out before the choice, with the reason."""
+    rows = [
+        (
+            f"{entry.get('stage')} \u00b7 {entry.get('role')}",
+            Cell(str(entry.get("sensor")), code=True),
+            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive"))),
+            Cell(str(entry.get("method")), code=True),
+            str(entry.get("reason")),
+        )
+        for entry in items(part(verdict, "choice"), "excluded")
+    ]
+    heads = ("Role", "Sensor", "Primitive", "Timestamping", "Reason")
+    return table("Options ruled out", heads, rows) if rows else None
