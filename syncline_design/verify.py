@@ -126,6 +126,26 @@ def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
     return _check_open(loaded, problem, settings)
 
 
+def picked_design(loaded: LoadedSpec) -> tuple[DesignProblem, Design]:
+    """The only design of a pinned spec, or the best of an open one; BadInput when there is none."""
+    known = known_of(loaded)
+    problem = build_problem(loaded, known.extra_tau_s, known.systematic)
+    sole = sole_design(problem)
+    if sole is not None:
+        return sole
+    from syncline_design.choose.decide import choose
+    from syncline_design.choose.outcome import Infeasible
+
+    choice = choose(problem)
+    if isinstance(choice, Infeasible):
+        line, column = loaded.positions.get(("stages",), (0, 0))
+        message = "no design meets this spec, so there is no system to work with"
+        hint = f"see `syncline-design check {loaded.path.name}`, or pin the sensors"
+        place = (str(loaded.path), line, column, "stages")
+        raise BadInput((Problem(*place, message, hint=hint),))
+    return problem, choice.design
+
+
 def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
     """Choose, then verify; without any design say why and what would help."""
     picked = pick(
