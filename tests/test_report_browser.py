@@ -234,6 +234,8 @@ def test_print_is_light_and_complete(browser: Any, report: Path) -> None:
         assert opened.page.is_hidden("nav")
         assert opened.page.is_hidden("#explorer")
         assert opened.page.is_visible("#provenance")
+        opened.page.set_viewport_size({"width": 688, "height": 900})  # A4 less its margins
+        assert opened.page.evaluate("() => document.documentElement.scrollWidth") <= 688
         pdf = opened.page.pdf(format="A4")
         assert pdf.startswith(b"%PDF")
         assert 2 <= pdf.count(b"/Type /Page\n") <= 16
