@@ -18,7 +18,7 @@ _COMMANDS = {"fail": "error", "undecided": "error", "waived": "warning", "warnin
 
 def render_github(verdicts: Sequence[Json]) -> str:
     """One command per finding that is no pass, then a notice with each spec's outcome."""
-    lines = [_command(f) for f in all_findings(list(verdicts)) if f.level not in SILENT]
+    lines = [github_command(f) for f in all_findings(list(verdicts)) if f.level not in SILENT]
     for verdict in verdicts:
         text = f"{outcome(verdict).word}. {design_sentence(verdict)}"
         place = f"file={_property(PurePath(spec_file(verdict)).as_posix())},line=1"
@@ -26,7 +26,8 @@ def render_github(verdicts: Sequence[Json]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _command(finding: Finding) -> str:
+def github_command(finding: Finding) -> str:
+    """One annotation."""
     title = f"{finding.id} {finding.rule}".strip()
     if finding.level == "waived":
         title += " (waived)"

@@ -37,7 +37,11 @@ _LEVELS: Final = {"fail": "error", "waived": "error", "undecided": "warning", "w
 
 def render_sarif(verdicts: Sequence[Json]) -> str:
     """A SARIF log with one run; what passes is left out, what is waived is suppressed."""
-    found = [f for f in all_findings(list(verdicts)) if f.level not in SILENT]
+    return sarif_log([f for f in all_findings(list(verdicts)) if f.level not in SILENT])
+
+
+def sarif_log(found: Sequence[Finding]) -> str:
+    """A SARIF log of these findings."""
     rules = sorted({_rule_id(f) for f in found})
     run = {
         "tool": {

@@ -103,16 +103,16 @@ def heat_table(heat: HeatMap, currency: str) -> Table:
     """Least cost over two factors as a table."""
     heads = [f"{heat.y.key} \\ {heat.x.key}", *(f"{text} #" for text in heat.x_labels)]
     rows = [
-        [Cell(name), *(_cost_cell(cost, pick, currency) for cost, pick in zip(*cells, strict=True))]
-        for name, *cells in zip(heat.y_labels, heat.cost, heat.picks, strict=True)
+        [Cell(name), *(_cost_cell(cost, currency) for cost in costs)]
+        for name, costs in zip(heat.y_labels, heat.cost, strict=True)
     ]
     return table("Least cost of a payload that meets the requirements", heads, rows)
 
 
-def _cost_cell(cost: float | None, payload: str, currency: str) -> Cell:
+def _cost_cell(cost: float | None, currency: str) -> Cell:
     if cost is None:
         return Cell("none", tone="bad", mark="\u2717")
-    return Cell(numbers.money(cost, currency), cost, sub=payload)
+    return Cell(numbers.money(cost, currency), cost)
 
 
 def winners_table(summary: Summary) -> Table:

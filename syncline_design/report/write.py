@@ -77,7 +77,7 @@ def _is_stream(path: Path) -> bool:
     return path.exists() and not path.is_file() and not path.is_dir()
 
 
-def write_outputs(rendered: Sequence[tuple[Target, str]]) -> None:
+def write_outputs(rendered: Sequence[tuple[Target, str | bytes]]) -> None:
     """Write every rendered text; files first, each atomically, then standard output.
 
     All texts are written to temporary files beside their targets before the first one is put in
@@ -103,7 +103,7 @@ def write_outputs(rendered: Sequence[tuple[Target, str]]) -> None:
             _print(text)
 
 
-def _stage(final: Path, text: str) -> Path:
+def _stage(final: Path, text: str | bytes) -> Path:
     """Write text to a temporary file in the folder of `final`, down to the disk."""
     try:
         final.parent.mkdir(parents=True, exist_ok=True)
@@ -112,7 +112,7 @@ def _stage(final: Path, text: str) -> Path:
         raise _explained(final, error) from None
     try:
         with os.fdopen(descriptor, "wb") as stream:
-            stream.write(text.encode("utf-8"))
+            stream.write(_encoded(text))
             stream.flush()
             os.fsync(stream.fileno())
         Path(name).chmod(_mode_for(final))
@@ -121,6 +121,10 @@ def _stage(final: Path, text: str) -> Path:
             Path(name).unlink(missing_ok=True)
         raise _explained(final, error) from None
     return Path(name)
+
+
+def _encoded(text: str | bytes) -> bytes:
+    return text if isinstance(text, bytes) else text.encode("utf-8")
 
 
 def _mode_for(final: Path) -> int:
@@ -145,10 +149,10 @@ def _put_in_place(temporary: Path, final: Path) -> None:
             os.close(descriptor)
 
 
-def _write_stream(path: Path, text: str) -> None:
+def _write_stream(path: Path, text: str | bytes) -> None:
     try:
         with path.open("wb") as stream:
-            stream.write(text.encode("utf-8"))
+            stream.write(_encoded(text))
     except OSError as error:
         raise _explained(path, error) from None
 
@@ -161,16 +165,18 @@ def _explained(final: Path, error: OSError) -> OutputError:
     return OutputError(f"{final}: cannot write: {reason}; {kept}")
 
 
-def _print(text: str) -> None:
+def _print(text: str | bytes) -> None:
     """Print to standard output in UTF-8, whatever the locale says."""
-    data = text if text.endswith("\n") else text + "\n"
+    data = text if isinstance(text, bytes) or text.endswith("\n") else text + "\n"
     try:
         binary = getattr(sys.stdout, "buffer", None)
-        if binary is None:  # a text-only stand-in, as under a test runner
+        if binary is None and isinstance(data, str):  # a text-only stand-in, as under a test runner
             sys.stdout.write(data)
-        else:
+        elif binary is not None:
             sys.stdout.flush()
-            binary.write(data.encode("utf-8"))
+            binary.write(_encoded(data))
+        else:
+            raise OutputError("standard output: takes text only; give this format a path")
         sys.stdout.flush()
     except OSError as error:
         _silence_stdout()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import math
+import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -179,13 +180,19 @@ def _bases(
             message, hint = "an absolute path", "write it relative to the study file"
             problems.append(problem_at(document, place, message, "a relative path", name, hint))
             continue
-        target = path.parent / name
+        target = _plain_path(path.parent / name)
         if seen.setdefault(target.resolve(), index) < index:
             problems.append(problem_at(document, place, "listed twice", "each base once", name))
             continue
         base = _base(target, document, place, factors, problems)
         if base is not None:
             yield base
+
+
+def _plain_path(path: Path) -> Path:
+    """`specs/studies/../uav.yaml` as `specs/uav.yaml`, unless a symlink makes that another file."""
+    short = Path(os.path.normpath(path))
+    return short if short.resolve() == path.resolve() else path
 
 
 def _base(

@@ -1,0 +1,172 @@
+"""Figures of a study: least cost over two factors, fronts side by side, a sampled study."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from syncline_design.report import axes as scales
+from syncline_design.report import numbers
+from syncline_design.report.figures import WIDTH
+from syncline_design.report.palette import BAD, GOOD, INK, MUTED, SERIES, SURFACE
+from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.text import shortened
+from syncline_design.study.summary import HeatMap
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+_FAINT, _STRONG = 0.08, 0.5  # opacity of the cheapest and the dearest cell: text stays readable
+MOST_TEXT = 8  # cells across in which the cost itself still fits
+
+
+def cost_map(heat: HeatMap, currency: str, name: str = "fig-heat") -> InlineFigure:
+    """Heat map of the least cost over two factors; a cross where no case meets."""
+    costs = [cost for row in heat.cost for cost in row if cost is not None]
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        for y, row in enumerate(heat.cost):
+            for x, cost in enumerate(row):
+                _cell(axes, (x, y), cost, costs, len(row))
+        axes.set_xlim(-0.5, len(heat.x_labels) - 0.5)
+        axes.set_ylim(-0.5, len(heat.y_labels) - 0.5)
+        _label_axis(axes, "x", heat.x_labels)
+        _label_axis(axes, "y", heat.y_labels)
+        axes.set_xlabel(shortened(heat.x.key, 60))
+        axes.set_ylabel(shortened(heat.y.key, 40))
+
+    spoken = "No case meets its requirements."
+    if costs:
+        spoken = (
+            f"Least cost from {numbers.money(min(costs), currency)} to "
+            f"{numbers.money(max(costs), currency)} in {len(costs)} of "
+            f"{len(heat.x_labels) * len(heat.y_labels)} cells; in the others no case meets."
+        )
+    height = 110.0 + 30.0 * min(len(heat.y_labels), 14)
+    return draw(name, "Least cost over two factors", spoken, (WIDTH, height), build)
+
+
+def _cell(
+    axes: Axes, place: tuple[int, int], cost: float | None, costs: Sequence[float], across: int
+) -> None:
+    from matplotlib.patches import Rectangle
+
+    x, y = place
+    corner = (x - 0.5, y - 0.5)
+    if cost is None:
+        axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=MUTED, linewidth=0.6))
+        axes.text(x, y, "\u2715", ha="center", va="center", color=BAD)
+        return
+    span = (max(costs) - min(costs)) or 1.0
+    share = (cost - min(costs)) / span
+    axes.add_patch(
+        Rectangle(
+            corner, 1, 1, facecolor=SERIES[0], alpha=_FAINT + (_STRONG - _FAINT) * share,
+            linewidth=0,
+        )
+    )  # fmt: skip
+    axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=SURFACE, linewidth=1.2))
+    if across <= MOST_TEXT:
+        axes.text(x, y, _thousands(cost), ha="center", va="center", color=INK, fontsize=9)
+
+
+def _thousands(cost: float) -> str:
+    return f"{cost / 1000:.4g}k" if cost >= 10_000 else numbers.count(cost)
+
+
+def _label_axis(axes: Axes, which: str, labels: Sequence[str]) -> None:
+    step = max(1, -(-len(labels) // (7 if which == "x" else 14)))
+    places = list(range(0, len(labels), step))
+    shown = [shortened(labels[place], 16) for place in places]
+    if which == "x":
+        axes.set_xticks(places, shown)
+    else:
+        axes.set_yticks(places, shown)
+    axes.tick_params(axis="x" if which == "x" else "y", length=0)
+
+
+@dataclass(frozen=True, slots=True)
+class NamedFront:
+    """One exact front with the words that tell it from the others."""
+
+    label: str
+    points: tuple[tuple[float, float], ...]  # (cost, error [m])
+
+
+def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts") -> InlineFigure:
+    """Exact fronts of cost against error as staircases, one colour and line style per case."""
+    styles = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)))
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        axes.set_yscale("log")
+        costs = [cost for front in shown for cost, _ in front.points]
+        span = (max(costs) - min(costs)) or max(costs) or 1.0
+        right = max(costs) + 0.08 * span
+        for index, front in enumerate(shown):
+            x = [cost for cost, _ in front.points] + [right]
+            y = [error for _, error in front.points] + [front.points[-1][1]]
+            colour, style = SERIES[index % len(SERIES)], styles[index // 2 % len(styles)]
+            axes.step(x, y, where="post", color=colour, linestyle=style, linewidth=1.8,
+                      label=shortened(front.label, 44))  # fmt: skip
+            axes.plot(x[:-1], y[:-1], "o", color=colour, markersize=3.5)
+        axes.set_xlim(max(0.0, min(costs) - 0.08 * span), right)
+        axes.margins(y=0.12)
+        low, high = axes.get_ylim()
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
+        scales.grid(axes)
+        _count_axis(axes)
+        axes.set_xlabel(f"cost [{currency}]")
+        axes.set_ylabel("worst-case error (Syncline)")
+        figure.legend(loc="outside lower left", ncols=1, fontsize=9)
+
+    errors = [error for front in shown for _, error in front.points]
+    spoken = (
+        f"{len(shown)} exact fronts; errors from {numbers.length(min(errors))} to "
+        f"{numbers.length(max(errors))}. The table holds their ends."
+    )
+    size = (WIDTH, 300.0 + 17.0 * len(shown))
+    return draw(name, "Cost against error, front by case", spoken, size, build)
+
+
+def _count_axis(axes: Axes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = axes.get_xlim()
+    places = [float(t) for t in MaxNLocator(5).tick_values(low, high) if low <= t <= high]
+    scales.set_ticks(axes, "x", places, numbers.count)
+
+
+@dataclass(frozen=True, slots=True)
+class Sampled:
+    """Where the cases of a sample lie in two factors, and which of them meet."""
+
+    x_label: str
+    y_label: str
+    points: tuple[tuple[float, float, bool], ...]  # (x, y, meets), in SI
+
+
+def sampled_cases(data: Sampled, name: str = "fig-sampled") -> InlineFigure:
+    """Cases over two sampled factors: discs meet, crosses do not."""
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        for meets, colour, marker, word in (
+            (True, GOOD, "o", "meets"),
+            (False, BAD, "x", "does not meet"),
+        ):
+            chosen = [(x, y) for x, y, met in data.points if met is meets]
+            if chosen:
+                axes.plot(*zip(*chosen, strict=True), marker, color=colour, markersize=5,
+                          label=f"{word} ({len(chosen)})")  # fmt: skip
+        axes.set_xlabel(shortened(data.x_label, 60))
+        axes.set_ylabel(shortened(data.y_label, 40))
+        scales.grid(axes)
+        figure.legend(loc="outside lower left", ncols=2)
+
+    met = sum(point[2] for point in data.points)
+    spoken = f"{met} of {len(data.points)} sampled cases meet their requirements."
+    return draw(name, "Sampled cases over two factors", spoken, (WIDTH, 330.0), build)
