@@ -283,6 +283,30 @@ def test_hostile_text_starts_no_github_command_of_its_own(text: str) -> None:
     assert len(lines) == 5 + 1 + 1  # requirements, one warning, the outcome
 
 
+def runner_reads(line: str) -> tuple[dict[str, str], str]:
+    """Properties and message of a workflow command, decoded as GitHub's runner does."""
+    head, _, message = line.removeprefix("::").partition("::")
+    properties = dict(p.split("=", 1) for p in head.partition(" ")[2].split(","))
+    pairs = (("%2C", ","), ("%3A", ":"), ("%0A", "\n"), ("%0D", "\r"), ("%25", "%"))
+
+    def decoded(text: str) -> str:
+        for code, character in pairs:
+            text = text.replace(code, character)
+        return text
+
+    return {key: decoded(value) for key, value in properties.items()}, decoded(message)
+
+
+@pytest.mark.parametrize("text", [*samples.HOSTILE, "100%25 done", "50 %, a:b"])
+def test_github_runner_reads_back_what_was_meant(text: str) -> None:
+    line = render_checks("github", [samples.with_hostile_text(text)]).splitlines()[0]
+    properties, message = runner_reads(line)
+    assert properties["title"] == f"ACC-1{visible(text)} accuracy"
+    assert properties["line"] == "8"
+    assert message.startswith(f"ACC-1{visible(text)}: ")
+    assert message.endswith(visible(text))
+
+
 @pytest.mark.parametrize("text", samples.HOSTILE)
 def test_hostile_text_keeps_junit_well_formed(text: str) -> None:
     root = junit_of(samples.with_hostile_text(text))

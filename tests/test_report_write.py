@@ -56,6 +56,22 @@ def test_permissions_are_those_of_a_new_or_of_the_old_file(tmp_path: Path) -> No
     assert stat.S_IMODE(new.stat().st_mode) == 0o640  # 0666 without 027
 
 
+def test_text_reaches_the_disk_before_it_takes_the_old_files_place(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "a.json"
+    path.write_text("old")
+    sync, seen = os.fsync, []
+
+    def watched(descriptor: int) -> None:
+        seen.append((os.fstat(descriptor).st_size, path.read_text()))
+        sync(descriptor)
+
+    monkeypatch.setattr(os, "fsync", watched)
+    write_outputs([(Target("json", str(path)), "new text")])
+    assert seen[0] == (len("new text"), "old")
+
+
 def test_symlink_is_written_through(tmp_path: Path) -> None:
     real = tmp_path / "real.json"
     real.write_text("old")
