@@ -54,22 +54,34 @@ class Rays:
     c: Array
 
     def probability(self, q_m: Array) -> tuple[Array, Array]:
-        """(P(|error| <= q), its derivative by q) of each copy, q (copies,)."""
+        """(P(|error| <= q), its derivative by q) of each copy, q (copies,).
+
+        The sphere of radius q cuts a line at s1 <= s2; between them lies half the difference of
+        sign(s) P(chi_3 <= |s|).
+        """
         q = q_m[:, None]
-        root = self.b * self.b - self.a * (self.c - q * q)
-        hits = root > 0.0
-        root = np.sqrt(np.maximum(root, 0.0))
-        inside, slope = np.zeros_like(root), np.zeros_like(root)
-        for sign in (1.0, -1.0):
-            far, near = (root - sign * self.b) / self.a, (-root - sign * self.b) / self.a
-            for end, weight in ((far, 0.5), (near, -0.5)):
-                length = np.maximum(end, 0.0)
-                factor = np.exp(-0.5 * length * length)
-                inside += weight * chi3_cdf(length, factor)
-                slope += np.abs(weight) * length * length * factor
-        inside *= hits
-        slope *= hits * math.sqrt(2.0 / math.pi) * q / np.where(hits, root, 1.0)
-        shares: tuple[Array, Array] = inside.mean(axis=1), slope.mean(axis=1)
+        square = self.b * self.b
+        square -= self.a * (self.c - q * q)
+        hits = square > 0.0
+        root = np.sqrt(np.where(hits, square, 1.0))
+        ends = np.stack([-root, root])
+        ends -= self.b
+        ends /= self.a
+        np.clip(ends, -1e3, 1e3, out=ends)  # without noise the ends are as good as infinite
+        length = np.abs(ends)
+        length_square = ends * ends
+        factor = np.exp(-0.5 * length_square)
+        below = chi3_cdf(length, factor)
+        np.copysign(below, ends, out=below)
+        inside = (below[1] - below[0]) * hits
+        length_square *= factor
+        slope = length_square.sum(axis=0)
+        slope /= root
+        slope *= hits
+        shares: tuple[Array, Array] = (
+            0.5 * inside.mean(axis=1),
+            math.sqrt(0.5 / math.pi) * q_m * slope.mean(axis=1),
+        )
         return shares
 
     def quantile(self, quantile: float) -> Array:
@@ -85,7 +97,7 @@ class Rays:
                 step = q - (inside - quantile) / slope
             usable = (step > low) & (step < high)
             last, q = q, np.where(usable, step, 0.5 * (low + high))
-            if np.all(np.abs(q - last) <= 1e-7 * q):
+            if np.all(np.abs(q - last) <= 1e-6 * q):
                 break
         found: Array = q
         return found
@@ -242,59 +254,52 @@ def _stage_covariance(stage: Stage, draw: kernel.Draw) -> Covariance:
         for part, sigma in zip((0, 3, 5), stage.position.sigma, strict=True):
             parts[part] += float(sigma) ** 2
     if stage.ranging is not None and stage.attitude is not None:
-        for column in _noise_columns(stage, draw):
-            x, y, z = column
-            for part, product in enumerate((x * x, x * y, x * z, y * y, y * z, z * z)):
-                parts[part] += product
+        columns = _noise_columns(stage, draw)
+        for part, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
+            parts[part] += np.einsum("kn,kn->n", columns[i], columns[j])
     return tuple(parts)  # type: ignore[return-value]
 
 
-def _noise_columns(stage: Stage, draw: kernel.Draw) -> list[Array]:
-    """Error [m] per standard deviation of each of the six noises, NED, (3, n) each.
+def _noise_columns(stage: Stage, draw: kernel.Draw) -> Array:
+    """Error [m] per standard deviation of each of the six noises, NED, (3, 6, n).
 
     Euler angles turn about z (yaw), the heading's y axis (pitch) and the body's x axis (roll);
     the bearing moves along dn/d az and dn/d el, the range along n.
     """
     assert stage.attitude is not None
     assert stage.ranging is not None
-    turn = draw.rate_radps * (draw.mu_attitude_s - draw.mu_ranging_s)
-    angles = kernel.attitude_angles(turn)
-    range_m = draw.range_m
     n = draw.bearing
+    angles = kernel.attitude_angles(draw.rate_radps * (draw.mu_attitude_s - draw.mu_ranging_s))
     flat = np.sqrt(n[0] ** 2 + n[1] ** 2)
     safe = np.where(flat > 0.0, flat, 1.0)
-    along_az = np.stack([-n[1], n[0], np.zeros_like(flat)]) * range_m
-    along_el = np.stack([n[2] * n[0] / safe, n[2] * n[1] / safe, -flat]) * range_m
     sigma_r, sigma_az, sigma_el = (float(s) for s in stage.ranging.sigma)
-    body = [n * sigma_r, along_az * sigma_az, along_el * sigma_el]
-    vector = draw.ranging_m - draw.antenna_m + range_m * n
-    axes = _euler_axes(angles)
-    vector = _rotated(vector, angles)
-    sigma_roll, sigma_pitch, sigma_yaw = (float(s) for s in stage.attitude.sigma)
-    columns = [_rotated(column, angles) for column in body]
-    columns += [
-        kernel.cross(axis, vector) * sigma
-        for axis, sigma in zip(axes, (sigma_roll, sigma_pitch, sigma_yaw), strict=True)
-    ]
-    for column in columns:
-        kernel.turn_columns(column, 2, draw.sin_yaw, draw.cos_yaw)
+    body = np.empty((3, 4, n.shape[1]))
+    np.multiply(n, sigma_r, out=body[:, 0])
+    across = draw.range_m * sigma_az
+    body[0, 1], body[1, 1], body[2, 1] = -n[1] * across, n[0] * across, 0.0
+    across = draw.range_m * sigma_el
+    body[0, 2], body[1, 2] = n[2] * n[0] / safe * across, n[2] * n[1] / safe * across
+    body[2, 2] = -flat * across
+    np.multiply(draw.range_m, n, out=body[:, 3])
+    body[:, 3] += draw.ranging_m - draw.antenna_m
+    for axis, (sine, cosine) in enumerate(angles):
+        kernel.turn_columns(body, axis, sine, cosine)
+    columns = np.empty((3, 6, n.shape[1]))
+    columns[:, :3] = body[:, :3]
+    columns[:, 3:] = kernel.cross(_euler_axes(angles), body[:, 3:])
+    columns[:, 3:] *= np.array([[float(sigma)] for sigma in stage.attitude.sigma])
+    kernel.turn_columns(columns, 2, draw.sin_yaw, draw.cos_yaw)
     return columns
 
 
-def _rotated(vector: Array, angles: tuple[tuple[Array, Array], ...]) -> Array:
-    """R v in level axes, v (3, n) body."""
-    out = vector.copy()
-    for axis, (sine, cosine) in enumerate(angles):
-        kernel.turn_columns(out, axis, sine, cosine)
-    return out
-
-
-def _euler_axes(angles: tuple[tuple[Array, Array], ...]) -> tuple[Array, Array, Array]:
-    """The axes about which roll, pitch and yaw turn, level axes, (3, n) each."""
+def _euler_axes(angles: tuple[tuple[Array, Array], ...]) -> Array:
+    """The axes about which roll, pitch and yaw turn, level axes, (3, 3, n): [:, k] is one."""
     _, (sin_pitch, cos_pitch), (sin_yaw, cos_yaw) = angles
-    zero, one = np.zeros_like(sin_yaw), np.ones_like(sin_yaw)
-    roll = np.stack([cos_pitch * cos_yaw, cos_pitch * sin_yaw, -sin_pitch])
-    return roll, np.stack([-sin_yaw, cos_yaw, zero]), np.stack([zero, zero, one])
+    axes = np.zeros((3, 3, sin_yaw.shape[0]))
+    axes[0, 0], axes[1, 0], axes[2, 0] = cos_pitch * cos_yaw, cos_pitch * sin_yaw, -sin_pitch
+    axes[0, 1], axes[1, 1] = -sin_yaw, cos_yaw
+    axes[2, 2] = 1.0
+    return axes
 
 
 def _factor_times(covariance: Covariance, vector: Array) -> Array:

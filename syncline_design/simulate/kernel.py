@@ -89,13 +89,12 @@ def cross(first: Array, second: Array) -> Array:
     return out
 
 
-def series(square: Array, start: int) -> Array:
+def series(square: Array, start: int, largest: float) -> Array:
     """sum over k of (-x)^k / (2k + start)!, x = a^2 [rad^2] >= 0, any shape.
 
     start 1: sin a / a; 2: (1 - cos a) / a^2; 3: (a - sin a) / a^3.  Cut after the term below which
-    nothing is left in double precision for the largest x of the array.
+    nothing is left in double precision for x up to `largest`.
     """
-    largest = float(square.max(initial=0.0))
     terms = 1
     while largest**terms * math.factorial(start) > 2e-17 * math.factorial(2 * terms + start):
         terms += 1
@@ -106,30 +105,32 @@ def series(square: Array, start: int) -> Array:
     return total
 
 
-def rotation_terms(square: Array) -> tuple[Array, Array, Array]:
-    """sin a / a, (1 - cos a) / a^2, (a - sin a) / a^3 for a^2 of any size, (n,)."""
-    if not np.max(square, initial=0.0) > _SERIES_LIMIT:
-        return series(square, 1), series(square, 2), series(square, 3)
+def rotation_terms(square: Array, terms: int = 3) -> tuple[Array, ...]:
+    """The first of sin a / a, (1 - cos a) / a^2, (a - sin a) / a^3 for a^2 of any size, (n,)."""
+    largest = float(square.max(initial=0.0))
+    if largest <= _SERIES_LIMIT:
+        return tuple(series(square, start, largest) for start in range(1, terms + 1))
     small = np.minimum(square, _SERIES_LIMIT)
     large = np.maximum(square, _SERIES_LIMIT)
     angle = np.sqrt(large)
     sine, half = np.sin(angle), np.sin(0.5 * angle)
+    closed = (sine / angle, 2 * half * half / large, (angle - sine) / (large * angle))
     near = square <= _SERIES_LIMIT
-    return (
-        np.where(near, series(small, 1), sine / angle),
-        np.where(near, series(small, 2), 2 * half * half / large),
-        np.where(near, series(small, 3), (angle - sine) / (large * angle)),
+    return tuple(
+        np.where(near, series(small, start + 1, _SERIES_LIMIT), closed[start])
+        for start in range(terms)
     )
 
 
 def sin_cos(angle: Array) -> tuple[Array, Array]:
     """sin and cos [-] of angles [rad], any shape; fast where all of them are small."""
     square = angle * angle
-    if not np.max(square, initial=0.0) <= _SERIES_LIMIT:
+    largest = float(square.max(initial=0.0))
+    if not largest <= _SERIES_LIMIT:
         return np.sin(angle), np.cos(angle)
-    sine = series(square, 1)
+    sine = series(square, 1, largest)
     sine *= angle
-    cosine = series(square, 2)
+    cosine = series(square, 2, largest)
     cosine *= square
     np.subtract(1.0, cosine, out=cosine)
     return sine, cosine
@@ -194,7 +195,7 @@ def attitude_angles(turn: Array) -> tuple[tuple[Array, Array], ...]:
 
     Straight from the matrix elements, no inverse trigonometry; at gimbal lock roll is 0.
     """
-    a, b, _ = rotation_terms(_square(turn))
+    a, b = rotation_terms(_square(turn), 2)
     x, y, z = turn
     bx, by = b * x, b * y
     r10 = bx * y + a * z
@@ -206,8 +207,8 @@ def attitude_angles(turn: Array) -> tuple[tuple[Array, Array], ...]:
     yy_zz += b * z * z
     r00 = 1.0 - yy_zz
     cos_pitch = np.sqrt(r21 * r21 + r22 * r22)
-    locked = cos_pitch < _GIMBAL_LOCK
-    if np.any(locked):
+    if not cos_pitch.min(initial=1.0) >= _GIMBAL_LOCK:
+        locked = cos_pitch < _GIMBAL_LOCK
         r01, r11 = bx * y - a * z, 1.0 - xx - b * z * z
         level = np.hypot(r01, r11)
         r21, r22 = np.where(locked, 0.0, r21), np.where(locked, 1.0, r22)

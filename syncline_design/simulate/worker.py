@@ -1,8 +1,8 @@
 """Long runs on several processes: the parent hands out shares, each child counts its own.
 
-A child runs `main` of this module by the same interpreter; it reads one pickled Share from standard input
-and writes its counts to standard output.  Counts are whole numbers and add up to the same sums
-whatever the number of children.
+A child runs `main` of this module by the same interpreter; it reads one pickled Share from
+standard input and writes its counts to standard output.  Counts are whole numbers and add up to
+the same sums whatever the number of children.
 """
 
 from __future__ import annotations
