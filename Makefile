@@ -2,17 +2,23 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-STAMP := $(VENV)/.installed
+RUN := $(VENV)/.installed
+DEV := $(VENV)/.installed-dev
+PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 JOBS ?= 2
 
 .PHONY: demo test lint bench study docs clean
 
-$(STAMP): pyproject.toml
+$(RUN): pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e '.[dev]'
+	$(PIP) -e .
 	touch $@
 
-demo: $(STAMP)
+$(DEV): $(RUN)
+	$(PIP) -e '.[dev,cluster,browser]'
+	touch $@
+
+demo: $(RUN)
 	@mkdir -p out
 	@$(BIN)/syncline-design check specs/uav_corridor.yaml --output html:out/uav_corridor.html
 	@echo "HTML report: $(CURDIR)/out/uav_corridor.html"
@@ -20,11 +26,28 @@ demo: $(STAMP)
 test: lint
 	$(BIN)/python -m pytest -n $(JOBS)
 
-lint: $(STAMP)
+lint: $(DEV)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+# Side by side with peers, as ratios in one run.
+bench: $(DEV)
+	$(PIP) -e '.[bench]'
+	$(BIN)/python benchmarks/startup.py
+	$(BIN)/python benchmarks/choice.py
+	$(BIN)/python benchmarks/simulate.py
+	$(BIN)/python benchmarks/diagnose.py
+	$(BIN)/python benchmarks/study.py
+
+# The full study of the diagnosis on hidden-world logs; resumes where it was stopped.
+study: $(DEV)
+	$(BIN)/python benchmarks/study_diagnosis.py
+
+docs: $(DEV)
+	$(PIP) -e '.[docs]'
+	$(BIN)/mkdocs build --strict
 
 clean:
 	rm -rf $(VENV) out build dist
