@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+import re
 from fractions import Fraction
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from syncline_design.resolution import (
     timestamping_of,
 )
 from syncline_design.spec import EffectChoice, InlineTimestamping, RoleChoice, Waiver, split_column
-from syncline_design.units import Quantity
+from syncline_design.units import UNITS, Dimension, Quantity
 
 SPECS = Path(__file__).parent.parent / "specs"
 SHIPPED = sorted(SPECS.glob("*.yaml"))
@@ -335,3 +336,20 @@ def test_specs_are_frozen() -> None:
         spec.name = "other"
     with pytest.raises(ValidationError, match="unknown_key"):
         RoleChoice.model_validate({"senser": "x"})
+
+
+def test_the_example_of_the_manual_loads(tmp_path: Path) -> None:
+    manual = (SPECS.parent / "docs" / "specs.md").read_text(encoding="utf-8")
+    spec, catalog = re.findall(r"```yaml\n(.*?)```", manual, re.DOTALL)
+    (tmp_path / "my_sensors.yaml").write_text(catalog, encoding="utf-8")
+    example = load_text(spec, tmp_path / "bridge.yaml")
+    assert "my_ins" in example.catalog.sensors
+    assert example.spec.effects[0].parameters == {"latency_s": 0.003}
+
+
+def test_the_manual_lists_every_unit() -> None:
+    manual = (SPECS.parent / "docs" / "specs.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"[^\s|,]+", manual.split("|---|---|")[1].split("\n\n")[0]))
+    left_out = {Dimension.FREQUENCY, Dimension.ACCELERATION}  # no key of a file takes them
+    units = {u for u, (d, _) in UNITS.items() if d not in left_out and u.isascii()}
+    assert units <= listed
