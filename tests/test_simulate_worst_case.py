@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -222,3 +223,32 @@ def test_nothing_moves_and_no_noise_is_no_error() -> None:
     (found,) = worst_cases(System((still,)), np.array([1.0]))
     assert found.value_m < 1e-13
     assert found.bound_m == 0.0
+
+
+def paper_systems() -> dict[str, System]:
+    """The two examples with lever arms of the baseline's length, free in direction."""
+    wing = fixed_wing().stages[0]
+    bare = {
+        role: dataclasses.replace(getattr(wing, role), lever_arm_m=None)
+        for role in ("position", "ranging")
+    }
+    vessel, vehicle = survey().stages
+    rtk = dataclasses.replace(vessel.position, sigma=(0.01,) * 3)
+    return {
+        "fixed wing": System((dataclasses.replace(wing, **bare),)),
+        "small SV and AUV": System((dataclasses.replace(vessel, position=rtk), vehicle)),
+    }
+
+
+def test_the_ratios_in_the_documentation_are_what_comes_out() -> None:
+    """Every cell of docs/simulation.md's comparison, to a unit of its last digit."""
+    text = (Path(__file__).parent.parent / "docs" / "simulation.md").read_text(encoding="utf-8")
+    lines = text.split("| tau | fixed wing", 1)[1].splitlines()[2:8]
+    cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+    units = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
+    taus = [float(cell[0].split()[0]) * units[cell[0].split()[1]] for cell in cells]
+    assert len(taus) == 6
+    for column, system in enumerate(paper_systems().values(), 1):
+        found = worst_cases(system, np.array(taus))
+        for cell, worst in zip(cells, found, strict=True):
+            assert worst.ratio == pytest.approx(float(cell[column]), abs=1.01e-3)
