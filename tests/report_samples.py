@@ -482,18 +482,39 @@ def diagnosis() -> dict[str, Any]:
                 "parameters": {
                     "latency_s": {"value": 0.0871, "standard_uncertainty": 0.0003, "unit": "s"}
                 },
-                "aliases": ["lever_arm (position)"],
+                "aliases": [{"effect": "lever_arm", "sensor": "position", "stage": "car"}],
+                "excluded": [{"effect": "filter_lag", "sensor": "position", "nats_worse": 140.7}],
                 "evidence": {"delta_nll": 812.0},
                 "separated_by": "vary the speed",
             }
         ],
         "remaining": {"unexplained": False, "where": []},
-        "where": ["speed above 8 m/s"],
+        "where": [
+            {
+                "covariate": "speed",
+                "low": 6.2,
+                "high": 9.0,
+                "unit": "m/s",
+                "axis": "along",
+                "score": -508.0,
+                "mean_m": -0.652,
+            }
+        ],
+        "first_disagreement_s": 0.0,
         "gap": {
+            "regime": {"held_out": {"before": scores, "after": good, "floor": good}},
+            "placebo": {"added": "boresight (ranging)", "held_out": {"after": scores}},
             "held_out": {"before": scores, "after": good, "floor": good},
             "closed_fraction": 0.981,
         },
-        "steps": [scores, {"effect": "latency", **good}],
+        "steps": [
+            {
+                "added": "latency (position)",
+                "held_out": {"before": scores, "after": good, "floor": good},
+            },
+            {"added": "boresight", "held_out": {"before": scores, "after": good, "floor": good}},
+        ],
+        "unseen": ["boresight: the vehicle never tilted"],
         "log": {"rows": 3000, "used": 2987, "rejected": {"missing values": 13}},
         "plots": {
             "residuals": {"time_s": time, "axes": {"north": axis, "east": axis, "down": axis}},
@@ -501,7 +522,11 @@ def diagnosis() -> dict[str, Any]:
                 {"covariate": "speed", "unit": "m/s",
                  "cells": [{"low": 0, "high": 2, "score": 1.0}, {"low": 2, "high": 4, "score": 9}]}
             ],
-            "coverage": [{"nominal": 0.5, "before": 0.1, "after": 0.5}],
+            "coverage": [
+                {"nominal": 0.5, "before": 0.1, "after": 0.5},
+                {"nominal": 0.8, "before": 0.2, "after": 0.79},
+                {"nominal": 0.95, "before": 0.31, "after": 0.949},
+            ],
         },
         "verdict_before": "meets",
         "verdict_after": "fails",

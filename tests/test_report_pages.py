@@ -107,13 +107,17 @@ def test_simulation_csv_is_the_grid() -> None:
     [
         "GNSS positions are 87.1 ms older than their stamps.",
         "87.10 \u00b1 0.30 ms".replace(" ", "\u00a0"),
-        "This log cannot tell it apart from lever_arm (position)",
+        "This log cannot tell it apart from lever arm (position)",
         "vary the speed",
         "98.1\u00a0%",
         "2\u00a0987 of 3\u00a0000",
         "missing values",
         "283\u00a0mm",
-        "speed above 8 m/s",
+        "along, speed 6.2\u00a0m/s to 9\u00a0m/s: mean \u2212652\u00a0mm, 508 standard errors",
+        "Told apart on this log from filter lag (position), 141 nat worse",
+        "boresight: the vehicle never tilted",
+        "after, plus a placebo: boresight (ranging)",
+        "held-out regime, after",
     ],
 )
 def test_diagnosis_says(words: str) -> None:

@@ -56,8 +56,9 @@ def render_diagnosis(data: Json) -> str:
         contents=[(key, label) for key, label in _CONTENTS if sections[key]],
         sections=sections,
         figures={key: None if key not in drawn else page.trusted_svg(drawn[key].svg)
-                 for key in ("residuals", "gap", "where")},
+                 for key in ("residuals", "gap", "where", "coverage")},
         coverage=_coverage(data),
+        unseen=[_text(entry) for entry in data.get("unseen") or ()],
         rejected=_rejected(data),
         remaining=_remaining(data),
     )  # fmt: skip
@@ -93,12 +94,30 @@ def _finding(entry: Json) -> dict[str, Any]:
         "title": str(entry.get("effect")).replace("_", " "),
         "code": str(entry.get("effect")),
         "place": " ".join(str(entry.get(key) or "") for key in ("stage", "sensor")).strip(),
-        "sentence": str(entry.get("sentence") or ""),
+        "sentence": _full_stop(str(entry.get("sentence") or "")),
         "parameters": parameters,
-        "aliases": _text(entry.get("aliases")),
+        "aliases": sentence_list([_effect_text(e) for e in entry.get("aliases") or ()]),
+        "excluded": sentence_list([_excluded_text(e) for e in items(entry, "excluded")]),
         "separated_by": _text(entry.get("separated_by")),
         "evidence": _text(entry.get("evidence")),
     }
+
+
+def _full_stop(text: str) -> str:
+    return text if not text or text.endswith(".") else text + "."
+
+
+def _effect_text(entry: object) -> str:
+    """`lever arm (position)`, from a record or from text."""
+    if not isinstance(entry, Mapping):
+        return str(entry)
+    name = str(entry.get("effect")).replace("_", " ")
+    return f"{name} ({entry.get('sensor')})" if entry.get("sensor") else name
+
+
+def _excluded_text(entry: Json) -> str:
+    worse = numbers.finite(entry.get("nats_worse"))
+    return _effect_text(entry) + (f", {worse:.3g} nat worse" if worse is not None else "")
 
 
 def _sentence(data: Json) -> str:
@@ -110,8 +129,7 @@ def _sentence(data: Json) -> str:
             if remaining
             else "Nothing beyond the spec's own noise was found."
         )
-    return " ".join(str(e.get("sentence") or f"{e.get('effect')} ({e.get('sensor')}).")
-                    for e in found)  # fmt: skip
+    return " ".join(_full_stop(str(e.get("sentence") or _effect_text(e))) for e in found)
 
 
 def _facts(data: Json) -> list[tuple[str, str]]:
@@ -144,45 +162,65 @@ _SCORES: Final = ("RMS #", "Reduced \u03c7\u00b2 #", "NLL per sample #", "95 % c
 
 
 def _gap(data: Json) -> Table | None:
-    held_out = part(part(data, "gap"), "held_out")
-    rows = [
-        (Cell(label), *_score_cells(part(held_out, key)))
-        for key, label in (("before", "before"), ("after", "after"), ("floor", "floor"))
-        if part(held_out, key)
-    ]
+    """Before, after and floor on blocks and on a regime that the fit did not see; the placebo."""
+    gap = part(data, "gap")
+    sources = (
+        ("held-out blocks, before", part(gap, "held_out"), "before"),
+        ("held-out blocks, after", part(gap, "held_out"), "after"),
+        ("held-out blocks, floor", part(gap, "held_out"), "floor"),
+        ("held-out regime, before", part(part(gap, "regime"), "held_out"), "before"),
+        ("held-out regime, after", part(part(gap, "regime"), "held_out"), "after"),
+    )
+    rows = [(Cell(label), *_score_cells(part(source, key))) for label, source, key in sources
+            if part(source, key)]  # fmt: skip
+    placebo = part(gap, "placebo")
+    if part(part(placebo, "held_out"), "after"):
+        label = f"after, plus a placebo: {_text(placebo.get('added'))}"
+        rows.append((Cell(label), *_score_cells(part(part(placebo, "held_out"), "after"))))
     return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
 
 
-def _step_label(entry: Json, index: int) -> str:
-    effect = entry.get("effect") or entry.get("added") or entry.get("label")
-    if effect is None:
-        return "spec as it is" if index == 0 else f"step {index}"
-    return f"+ {_text(effect)}" if index else _text(effect)
-
-
-def _step_scores(entry: Json) -> Json:
-    return part(entry, "held_out") or part(entry, "after") or entry
+def gap_steps(data: Json) -> list[tuple[str, Json]]:
+    """(label, scores on held-out data), the spec as it is first, then each addition."""
+    found: list[tuple[str, Json]] = []
+    for entry in items(data, "steps"):
+        held_out = part(entry, "held_out")
+        if not found:
+            found.append(("spec as it is", part(held_out, "before")))
+        found.append((f"+ {_text(entry.get('added'))}", part(held_out, "after")))
+    return [(label, scores) for label, scores in found if scores]
 
 
 def _steps(data: Json) -> Table | None:
-    steps = items(part(data, "gap"), "steps") or items(data, "steps")
-    rows = [
-        (Cell(_step_label(entry, index)), *_score_cells(_step_scores(entry)))
-        for index, entry in enumerate(steps)
-    ]
-    return table("Gap after each addition", ("Step", *_SCORES), rows) if rows else None
+    rows = [(Cell(label), *_score_cells(scores)) for label, scores in gap_steps(data)]
+    heads = ("Step", *_SCORES)
+    return table("Gap after each addition", heads, rows) if len(rows) > 2 else None
 
 
 def _where(data: Json) -> list[str]:
     found = data.get("where") or part(data, "remaining").get("where") or ()
-    return [_text(entry) for entry in found] if isinstance(found, Sequence) else [_text(found)]
+    return [_cell_text(entry) for entry in found] if isinstance(found, Sequence) else []
+
+
+def _cell_text(entry: object) -> str:
+    """`along track at speed 6.3 m/s to 9 m/s: mean -652 mm, 508 standard errors`."""
+    if not isinstance(entry, Mapping) or "covariate" not in entry:
+        return _text(entry)
+    unit = str(entry.get("unit") or "")
+    low, high = (numbers.si_quantity(entry.get(key), unit, 3) for key in ("low", "high"))
+    axis = str(entry.get("axis") or "all axes")
+    text = f"{axis}, {str(entry['covariate']).replace('_', ' ')} {low} to {high}"
+    mean, score = numbers.finite(entry.get("mean_m")), numbers.finite(entry.get("score"))
+    if mean is not None:
+        text += f": mean {numbers.length(mean, 3)}"
+    return text + (f", {abs(score):.3g} standard errors" if score is not None else "")
 
 
 def _remaining(data: Json) -> str:
     remaining = part(data, "remaining")
     if not remaining.get("unexplained"):
         return ""
-    where = _text(remaining.get("where"))
+    where = "; ".join(_cell_text(entry) for entry in remaining.get("where") or ())
     return "Unexplained and still there" + (f": {where}." if where else ".")
 
 
@@ -242,9 +280,9 @@ def _figures(data: Json) -> dict[str, InlineFigure]:
     if axes:
         drawn["residuals"] = drawings.residuals(time, axes)
     steps = [
-        drawings.Step(_step_label(entry, index), rms, None)
-        for index, entry in enumerate(items(part(data, "gap"), "steps") or items(data, "steps"))
-        if (rms := numbers.finite(_step_scores(entry).get("rms_m"))) is not None
+        drawings.Step(label, rms)
+        for label, scores in gap_steps(data)
+        if (rms := numbers.finite(scores.get("rms_m"))) is not None
     ]
     if steps:
         floor = part(part(part(data, "gap"), "held_out"), "floor").get("rms_m")
@@ -253,6 +291,15 @@ def _figures(data: Json) -> dict[str, InlineFigure]:
     shown = [entry for entry in maps if entry.cells]
     if shown:
         drawn["where"] = drawings.where_map(shown[:6])
+    coverage = [
+        (nominal, before, after)
+        for entry in items(plots, "coverage")
+        if (nominal := numbers.finite(entry.get("nominal"))) is not None
+        and (before := numbers.finite(entry.get("before"))) is not None
+        and (after := numbers.finite(entry.get("after"))) is not None
+    ]
+    if len(coverage) > 2:
+        drawn["coverage"] = drawings.coverage(coverage)
     return drawn
 
 
@@ -262,7 +309,7 @@ def _where_cells(entry: Json) -> drawings.WhereCells:
         values = [numbers.finite(cell.get(key)) for key in ("low", "high", "score")]
         known = [value for value in values if value is not None]
         if len(known) == 3:
-            cells.append((known[0], known[1], known[2]))
+            cells.append((known[0], known[1], abs(known[2])))
     return drawings.WhereCells(
         str(entry.get("covariate")), str(entry.get("unit") or ""), tuple(cells)
     )

@@ -79,7 +79,6 @@ class Step:
 
     label: str
     rms_m: float
-    nll: float | None
 
 
 def gap_staircase(
@@ -143,7 +142,7 @@ class WhereCells:
 
 
 def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigure:
-    """Score of the disagreement over cells of speed, turn rate, range and so on."""
+    """Disagreement in standard errors over cells of speed, turn rate, range and so on."""
 
     def build(figure: Figure) -> None:
         rows = figure.subplots(len(maps), 1, squeeze=False)[:, 0]
@@ -154,17 +153,50 @@ def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigu
             scores = [score for *_, score in entry.cells]
             axes.stairs(scores, edges, fill=True, color=SERIES[0], alpha=0.5)
             axes.stairs(scores, edges, color=SERIES[0], linewidth=1.2)
-            axes.axhline(1.0, color=MUTED, linewidth=1, linestyle=(0, (3, 2)))
-            axes.set_ylim(0, 1.08 * max(top, 1.0))
+            axes.axhline(3.0, color=MUTED, linewidth=1, linestyle=(0, (3, 2)))
+            axes.set_ylim(0, 1.08 * max(top, 4.0))
             unit = f" [{entry.unit}]" if entry.unit else ""
-            axes.set_xlabel(entry.covariate + unit)
-            axes.set_ylabel("score")
+            axes.set_xlabel(entry.covariate.replace("_", " ") + unit)
+            axes.set_ylabel("|z|")
             scales.grid(axes, "y")
 
     spoken = "; ".join(
-        f"{entry.covariate}: scores {min(s for *_, s in entry.cells):.3g} to "
+        f"{entry.covariate}: standard errors {min(s for *_, s in entry.cells):.3g} to "
         f"{max(s for *_, s in entry.cells):.3g}"
         for entry in maps
     )
     size = (WIDTH, 20.0 + 105.0 * len(maps))
     return draw(name, "Where simulation and log disagree", spoken, size, build)
+
+
+def coverage(
+    rows: Sequence[tuple[float, float, float]], name: str = "fig-coverage"
+) -> InlineFigure:
+    """Share of residuals inside the expected interval against its nominal share.
+
+    rows: (nominal, before, after), each a share of 1.
+    """
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        nominal = [row[0] for row in rows]
+        axes.plot([0, 1], [0, 1], color=MUTED, linewidth=1, linestyle=(0, (3, 2)))
+        axes.plot(nominal, [row[1] for row in rows], color=MUTED, marker="s", markersize=4,
+                  linewidth=1.2, label="before")  # fmt: skip
+        axes.plot(nominal, [row[2] for row in rows], color=SERIES[0], marker="o", markersize=4.5,
+                  linewidth=1.8, label="after")  # fmt: skip
+        axes.set_xlim(0, 1.02)
+        axes.set_ylim(0, 1.02)
+        quarters = (0.0, 0.25, 0.5, 0.75, 1.0)
+        scales.set_ticks(axes, "x", quarters, numbers.percent)
+        scales.set_ticks(axes, "y", quarters, numbers.percent)
+        axes.set_xlabel("nominal share inside the interval")
+        axes.set_ylabel("observed share")
+        axes.legend(loc="upper left")
+        scales.grid(axes)
+
+    spoken = "; ".join(
+        f"nominal {numbers.percent(n)}: {numbers.percent(b)} before, {numbers.percent(a)} after"
+        for n, b, a in rows
+    )
+    return draw(name, "Coverage of the expected intervals", spoken, (WIDTH, 280.0), build)
