@@ -39,7 +39,7 @@ from syncline_design.simulate.quadrature import (
 )
 from syncline_design.simulate.sampling import error_distribution, job_errors
 from syncline_design.simulate.worst_case import WorstCase
-from tests.simulation_systems import DEG, fixed_wing, position_only, survey
+from tests.simulation_systems import DEG, fixed_wing, survey
 
 UNUSED = WorstCase(0.0, 1.0, 1.0, 1.0, 1.0)
 
@@ -207,11 +207,12 @@ def test_conditional_moments_are_those_of_the_noise() -> None:
     assert np.all(shift < 5 * math.sqrt(size / count) + 2 * curvature)
 
 
-SYSTEMS = {"wing": fixed_wing(), "survey": survey(), "car": position_only()}
+SYSTEMS = {"wing": fixed_wing(), "survey": survey()}
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
-@pytest.mark.parametrize("envelope", ["limits", "inside"])
+@pytest.mark.parametrize(
+    ("name", "envelope"), [("wing", "limits"), ("survey", "limits"), ("survey", "inside")]
+)
 def test_fast_and_plain_estimators_agree(name: str, envelope) -> None:
     """z-scores of their difference over 200 seeds are standard normal.
 
@@ -239,22 +240,22 @@ def test_fast_and_plain_estimators_agree(name: str, envelope) -> None:
 
 
 def test_conditioned_intervals_cover() -> None:
-    """300 seeds against 4 million plain samples: 95 % intervals of 0.95 and of P(error <= limit).
+    """200 seeds against 2 million plain samples: 95 % intervals of 0.95 and of P(error <= limit).
 
-    Fewer than 270 of 300 has probability below 2e-4 where coverage is 95 %.
+    Fewer than 178 of 200 has probability below 5e-4 where coverage is 95 %.
     """
     system = fixed_wing()
-    reference = error_distribution(system, SimulationSettings(4_000_000, seed=99))
-    exact, limit = reference.order_statistics([3_800_000])[0], 0.05
-    share = reference.within(limit) / 4e6
+    reference = error_distribution(system, SimulationSettings(2_000_000, seed=99))
+    exact, limit = reference.order_statistics([1_900_000])[0], 0.05
+    share = reference.within(limit) / 2e6
     covered = inside = 0
-    for seed in range(300):
+    for seed in range(200):
         settings = SimulationSettings(1024, seed=seed, quantiles=(0.95,), limit_m=limit)
         found = conditioned_monte_carlo(system, settings, UNUSED)
         covered += found.quantiles[0].low_m <= exact <= found.quantiles[0].high_m
         inside += found.within_target.low <= share <= found.within_target.high
-    assert covered >= 270
-    assert inside >= 270
+    assert covered >= 178
+    assert inside >= 178
 
 
 def test_effective_samples_are_worth_what_they_say() -> None:

@@ -257,7 +257,7 @@ def test_quantile_intervals_cover() -> None:
     """1000 seeds, 500 samples each: the 95 % intervals of three quantiles cover the exact one.
 
     They cover with at least 95 %; a correct program fails one of these with probability below
-    0.002 each (binomial: fewer than 930 of 1000), and one that covers 90 % fails almost surely.
+    0.0025 each (binomial: fewer than 930 of 1000), and one that covers 90 % fails almost surely.
     """
     quantiles = (0.5, 0.9, 0.95)
     exact = [exact_quantile(q) for q in quantiles]

@@ -25,7 +25,6 @@ from syncline_design.simulate.settings import (
     SimulationSettings,
     demand_simulable,
 )
-from syncline_design.simulate.worker import tally
 from syncline_design.simulate.worst_case import WorstCase, worst_cases
 
 DEFAULT_SETTINGS = SimulationSettings()
@@ -147,6 +146,8 @@ def decide(
     four times as many at each further look, up to `cap_samples`.  An error that is not a number
     counts as beyond the limit.
     """
+    from syncline_design.simulate.worker import tally
+
     demand_simulable(system)
     sizes = look_sizes(settings.samples, cap_samples)
     look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
