@@ -13,6 +13,7 @@ from syncline_design.study.pool import PoolError, Result, encoded_case
 
 IN_HAND = 8  # cases given to the scheduler per thread of the cluster
 RETRIES = 5
+TIMEOUT = "15s"
 
 
 def run_on_cluster(
@@ -35,7 +36,7 @@ def run_on_cluster(
                 dask.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
             )
         try:
-            client = stack.enter_context(dask.Client(target, timeout="15s"))
+            client = stack.enter_context(dask.Client(target, timeout=TIMEOUT))
         except (OSError, TimeoutError, ValueError) as error:
             raise PoolError(f"no Dask scheduler answers at {address}: {error}") from None
         yield from run_with_client(client, study, settings, indices)

@@ -1,0 +1,174 @@
+"""What changed between two designs, in words; figures against the two checks themselves."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from study_specs import SPEC
+from syncline_design.diff import diff
+from syncline_design.loading import BadInput
+from syncline_design.report.differences import DIFF_FORMATS, diff_text, headline, render_diff
+from syncline_design.report.json_out import json_text
+from syncline_design.verify import CheckSettings, check_file
+
+PLAIN = CheckSettings(monte_carlo=False)
+
+
+@pytest.fixture
+def files(tmp_path: Path) -> tuple[Path, Path]:
+    old, new = tmp_path / "old.yaml", tmp_path / "new.yaml"
+    old.write_text(SPEC, encoding="utf-8")
+    new.write_text(SPEC, encoding="utf-8")
+    return old, new
+
+
+def change(path: Path, *pairs: tuple[str, str]) -> None:
+    text = path.read_text(encoding="utf-8")
+    for before, after in pairs:
+        assert before in text
+        text = text.replace(before, after)
+    path.write_text(text, encoding="utf-8")
+
+
+DISTANCE = (
+    "platform: uav_fixed_wing",
+    "platform: {use: uav_fixed_wing, distance: 40 m}",
+)
+
+
+def test_equal_specs_differ_in_nothing(files: tuple[Path, Path]) -> None:
+    data = diff(*files, PLAIN)
+    assert data["causes"] == []
+    assert data["payload"] == []
+    assert headline(data) == (
+        "Nothing in the files differs: same payload, still meets its requirements."
+    )
+
+
+def test_one_change_names_cause_payload_and_price(files: tuple[Path, Path]) -> None:
+    """Oracle: the price difference of the two verdicts, checked by themselves."""
+    old, new = files
+    change(new, DISTANCE)
+    data = diff(old, new, PLAIN)
+    before, after = check_file(old, PLAIN), check_file(new, PLAIN)
+    assert [(c["key"], c["old"], c["new"]) for c in data["causes"]] == [
+        ("stages[uav].distance", "100 m", "40 m")
+    ]
+    cost = next(s for s in data["sums"] if s["name"] == "cost")
+    assert cost["change"] == after["design"]["cost"] - before["design"]["cost"] != 0
+    roles = [entry["role"] for entry in data["payload"]]
+    sensors = [
+        f"uav.{role}"
+        for role, entry in before["design"]["stages"][0]["roles"].items()
+        if entry["sensor"] != after["design"]["stages"][0]["roles"][role]["sensor"]
+    ]
+    assert roles == sensors
+    assert roles
+    words = headline(data)
+    assert words.startswith("stages[uav].distance 100 m to 40 m: payload changes, \u2212")
+    assert words.endswith("still meets its requirements.")
+
+
+def test_several_changes_say_which_one_does_it(files: tuple[Path, Path]) -> None:
+    old, new = files
+    change(new, DISTANCE, ("limit: 0.30 m", "limit: 0.15 m"))
+    data = diff(old, new, PLAIN)
+    effects = {c["key"]: c["effect"]["verdict"]["new"] for c in data["causes"]}
+    assert effects == {
+        "requirements[ACC-1].limit": "infeasible",
+        "stages[uav].distance": "meets",
+    }
+    assert data["exit_code"] == 0
+    assert "alone: now no design meets the requirements" in diff_text(data)
+
+
+def test_the_exit_code_is_that_of_the_new_one(files: tuple[Path, Path]) -> None:
+    old, new = files
+    change(new, ("limit: 0.30 m", "limit: 1 mm"))
+    assert diff(old, new, PLAIN)["exit_code"] == 1
+    assert diff(new, old, PLAIN)["exit_code"] == 0
+    assert "now no design meets the requirements" in headline(diff(old, new, PLAIN))
+
+
+def test_verdict_files_compare_like_their_specs(files: tuple[Path, Path]) -> None:
+    old, new = files
+    change(new, DISTANCE)
+    saved = []
+    for path in files:
+        target = path.with_suffix(".json")
+        target.write_text(json_text(check_file(path, PLAIN)), encoding="utf-8")
+        saved.append(target)
+    of_specs, of_files = diff(old, new, PLAIN), diff(*saved)
+    mixed = diff(old, saved[1], PLAIN)
+    for key in ("verdict", "payload", "sums", "error", "exit_code"):
+        assert of_specs[key] == of_files[key] == mixed[key]
+    keys = {"stages[uav].distance_m"}
+    assert {c["key"] for c in of_files["causes"]} == keys
+
+
+def test_a_catalog_price_is_a_cause(files: tuple[Path, Path], tmp_path: Path) -> None:
+    old, new = files
+    entry = (
+        "sensors:\n  own_ins: {{modality: attitude, type: ins, sigma_attitude: 0.02 deg, "
+        "primitives: [pps], cost: {cost} EUR, mass: 1 kg, power: 1 W}}\n"
+    )
+    for path, cost in zip(files, (100, 150), strict=True):
+        name = f"{path.stem}_sensors.yaml"
+        (tmp_path / name).write_text(entry.format(cost=cost), encoding="utf-8")
+        change(path, ("[sbg_apogee, sbg_ellipse]", "[own_ins]"))
+        path.write_text(path.read_text() + f"catalogs: [{name}]\n", encoding="utf-8")
+    data = diff(old, new, PLAIN)
+    causes = {c["key"]: (c["old"], c["new"]) for c in data["causes"]}
+    assert causes["catalog.sensors[own_ins].cost"] == ("100 EUR", "150 EUR")
+    cost = next(s for s in data["sums"] if s["name"] == "cost")
+    assert cost["change"] == 50.0
+
+
+def test_candidates_requirements_and_stages_that_come_and_go(files: tuple[Path, Path]) -> None:
+    old, new = files
+    change(
+        new,
+        ("[sbg_apogee, sbg_ellipse]", "[sbg_apogee]"),
+        ("  - {id: COST-1, kind: cost, limit: 100000 EUR}\n", ""),
+    )
+    causes = {c["key"]: (c["old"], c["new"]) for c in diff(old, new, PLAIN)["causes"]}
+    assert causes["stages[uav].attitude.candidates"] == (
+        '["sbg_apogee", "sbg_ellipse"]', '["sbg_apogee"]',
+    )  # fmt: skip
+    assert causes["requirements[COST-1]"][1] is None
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("x.json", "{", "not JSON"),
+        ("x.json", "[]", "not a verdict"),
+        ("x.json", '{"verdict": "meets"}', "not a verdict"),
+        ("x.json", "[" * 100_000, "nested too deeply|not JSON"),
+        ("x.json", "\xff", "not a verdict|not JSON"),
+        ("x.yaml", "", "an empty file"),
+        ("gone.yaml", None, "cannot read the file"),
+        ("gone.json", None, "cannot read the file"),
+    ],
+)
+def test_files_that_are_no_designs_are_refused(
+    files: tuple[Path, Path], tmp_path: Path, name: str, content: str | None, message: str
+) -> None:
+    if content is not None:
+        (tmp_path / name).write_text(content, encoding="utf-8")
+    with pytest.raises(BadInput, match=message) as caught:
+        diff(files[0], tmp_path / name, PLAIN)
+    assert name in str(caught.value)
+
+
+def test_every_format_is_written(files: tuple[Path, Path]) -> None:
+    change(files[1], ("limit: 0.30 m", "limit: 1 mm"), ("name: Small UAV", 'name: "x\\n::error::"'))
+    data = diff(*files, PLAIN)
+    written = {name: render_diff(name, data) for name in DIFF_FORMATS}
+    assert json.loads(written["json"])["schema"] == "syncline-design/diff/v1"
+    assert written["markdown"].startswith("## ")
+    [line] = written["github"].splitlines()
+    assert line.startswith("::error file=")

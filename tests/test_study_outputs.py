@@ -1,0 +1,147 @@
+"""Outputs of a study: every format well-formed, places right, hostile text harmless."""
+
+from __future__ import annotations
+
+import csv
+import html
+import io
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+from report_samples import HOSTILE
+from study_specs import SPEC, STUDY, write
+from syncline_design.report.progress_line import ProgressLine
+from syncline_design.report.studies import STUDY_FORMATS, render_study
+from syncline_design.report.study_words import plain_table, progress_text, study_text
+from syncline_design.report.tables import table
+from syncline_design.study import Progress, StudyResult, StudySettings, run_study
+
+LINE_OF_ACC = 4
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> StudyResult:
+    return run_study(write(tmp_path_factory.mktemp("outputs")), StudySettings(workers=1))
+
+
+def text_of(name: str, result: StudyResult) -> str:
+    content = render_study(name, result)
+    assert isinstance(content, str)
+    return content
+
+
+def test_every_format_repeats_its_bytes(result: StudyResult) -> None:
+    again = run_study(result.study.path)
+    for name in STUDY_FORMATS:
+        assert render_study(name, result) == render_study(name, again), name
+
+
+def test_junit_has_a_test_per_case(result: StudyResult) -> None:
+    root = ElementTree.fromstring(text_of("junit", result))
+    tests = list(root.iter("testcase"))
+    missing = [t for t in tests if t.find("failure") is not None]
+    assert len(tests) == len(result) == int(root.get("tests", "0"))
+    assert len(missing) == len(result) - result.counts["meets"] == int(root.get("failures", "0"))
+    assert missing
+    assert {t.get("line") for t in missing} == {str(LINE_OF_ACC)}
+
+
+def test_allowed_misses_are_skipped_tests(tmp_path: Path) -> None:
+    done = run_study(write(tmp_path, STUDY + "meets_when: any\n"))
+    root = ElementTree.fromstring(text_of("junit", done))
+    assert (done.verdict, done.exit_code) == ("meets", 0)
+    assert root.get("failures") == "0"
+    assert int(root.get("skipped", "0")) == len(done) - done.counts["meets"] > 0
+    assert "::error" not in text_of("github", done)
+
+
+def test_sarif_points_at_the_requirement_once(result: StudyResult) -> None:
+    log = json.loads(text_of("sarif", result))
+    found = log["runs"][0]["results"]
+    assert found[0]["ruleId"] == "accuracy"
+    place = found[0]["locations"][0]["physicalLocation"]
+    assert place["region"]["startLine"] == LINE_OF_ACC
+    assert place["artifactLocation"]["uri"].endswith("/spec.yaml")
+    missed = len(result) - result.counts["meets"]
+    assert f"missed in {missed} of {len(result)} cases" in found[0]["message"]["text"]
+
+
+def test_github_annotates_the_requirement(result: StudyResult) -> None:
+    lines = text_of("github", result).splitlines()
+    errors = [line for line in lines if line.startswith("::error ")]
+    assert f"line={LINE_OF_ACC}," in errors[0]
+    assert lines[-1].startswith("::notice ::")
+
+
+def test_json_says_what_the_table_says(result: StudyResult) -> None:
+    data = json.loads(text_of("json", result))
+    rows = list(csv.DictReader(io.StringIO(text_of("csv", result))))
+    assert data["schema"] == "syncline-design/study/v1"
+    assert [c["verdict"] for c in data["cases"]] == [r["verdict"] for r in rows]
+    assert data["counts"] == result.counts
+    assert data["factors"][0]["values"] == ["40 m", "60 m", "100 m"]
+
+
+def test_the_page_is_offline_and_complete(result: StudyResult) -> None:
+    page = text_of("html", result)
+    assert "default-src 'none'" in html.unescape(page)
+    assert "<script src" not in page
+    assert "http://" not in page.replace("http://www.w3.org", "")
+    for heading in ("Least cost", "What wins where", "Where feasibility ends", "front by case"):
+        assert heading in page
+    assert len(page) < 3_000_000
+
+
+def test_the_console_summary_names_counts_and_table(result: StudyResult) -> None:
+    text = study_text(result)
+    assert f"{result.counts['meets']} of {len(result)} cases meet their requirements" in text
+    assert "Least cost of a payload" in text
+    assert "uav.attitude" in text
+
+
+@pytest.mark.parametrize("hostile", [t for t in HOSTILE if "\ud800" not in t and "\x00" not in t])
+def test_hostile_names_stay_text(tmp_path: Path, hostile: str) -> None:
+    quoted = json.dumps(hostile)
+    if "\u202e" in hostile:
+        pytest.skip("refused by the reader (bidirectional override)")
+    study = STUDY.replace("name: Height and accuracy", f"name: {quoted}")
+    study = study.replace("[40 m, 60 m, 100 m]", "[60 m]").replace("[0.15 m, 0.3 m]", "[0.3 m]")
+    study = study.replace("stages[uav]", "stages[0]")
+    spec = SPEC.replace("name: Small UAV", f"name: {quoted}").replace(
+        "- name: uav", f"- name: {quoted}"
+    )
+    spec = spec.replace("ACC-1", "ACC")
+    done = run_study(write(tmp_path, study.replace("[ACC-1]", "[0]"), spec))
+    assert done.counts["meets"] == 1
+    page = text_of("html", done)
+    assert page.count("<script>") == 1
+    assert "<img" not in page
+    ElementTree.fromstring(text_of("junit", done))
+    assert all(line.startswith("::notice ::") for line in text_of("github", done).splitlines())
+    for line in csv.reader(io.StringIO(text_of("csv", done))):
+        assert not any(cell.startswith(("=", "@", "+")) for cell in line)
+    assert "\x1b" not in study_text(done) + text_of("markdown", done) + page
+
+
+def test_progress_says_what_is_left() -> None:
+    assert progress_text(Progress(0, 10, 0, 0.0)) == "0 of 10 cases, estimating"
+    assert progress_text(Progress(6, 10, 2, 8.0)) == "6 of 10 cases, 2 already there, 00:08 left"
+    assert progress_text(Progress(10, 10, 0, 3725.0)) == "10 of 10 cases, took 1:02:05"
+    assert "1 done again" in progress_text(Progress(1, 2, 0, 1.0, retried=1))
+
+
+def test_progress_in_a_log_is_written_now_and_then() -> None:
+    stream = io.StringIO()
+    line = ProgressLine(stream)
+    for done in range(1001):
+        line(Progress(done, 1000, 0, done / 100))
+    assert len(stream.getvalue().splitlines()) <= 3
+    assert stream.getvalue().endswith("1000 of 1000 cases, took 00:10\n")
+
+
+def test_console_tables_line_up() -> None:
+    shown = plain_table(table("T", ("a", "b #"), [("x", "1"), ("long", "22")]))
+    assert shown == "T\n  a      b\n  x      1\n  long  22"
