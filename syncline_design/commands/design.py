@@ -1,0 +1,162 @@
+"""Commands that judge and choose designs: check, optimize, study, diff."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+import typer
+
+from syncline_design.commands.shared import (
+    MethodOption,
+    OutputOption,
+    QuietOption,
+    SeedOption,
+    SpecArgument,
+    TimeLimitOption,
+    emit,
+    guarded,
+    output_targets,
+    road,
+)
+
+if TYPE_CHECKING:
+    from syncline_design.study import Progress
+
+
+@guarded
+def check(
+    spec: Annotated[list[Path], typer.Argument(help="Specs, or folders of specs.")],
+    output: OutputOption = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    method: MethodOption = "auto",
+    time_limit: TimeLimitOption = None,
+) -> int:
+    """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
+    from syncline_design.report.checks import CHECK_FORMATS, render_checks
+    from syncline_design.report.console import verdict_text
+    from syncline_design.report.write import STDOUT
+    from syncline_design.verify import CheckSettings, check_files, exit_code
+
+    targets = output_targets(output, CHECK_FORMATS)
+    settings = CheckSettings(seed=seed, method=road(method), time_limit_s=time_limit)
+    verdicts = check_files(spec, settings)
+    refused = [verdict for verdict in verdicts if verdict["verdict"] == "refused"]
+    for verdict in refused:
+        print(verdict["text"], file=sys.stderr)
+    if refused:  # no file is written; what goes to standard output may say so
+        targets = [target for target in targets if target.path == STDOUT]
+    text = "\n".join(verdict_text(v) for v in verdicts if v not in refused)
+    emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
+    return max(exit_code(verdict) for verdict in verdicts)
+
+
+@guarded
+def optimize(
+    spec: SpecArgument,
+    output: OutputOption = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    method: MethodOption = "auto",
+    time_limit: TimeLimitOption = None,
+    best: Annotated[int, typer.Option(min=1, help="How many truly different designs.")] = 1,
+    pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
+    resource: Annotated[
+        Literal["cost", "mass", "power"], typer.Option(help="What the front sets against error.")
+    ] = "cost",
+    write_design: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")
+    ] = None,
+) -> int:
+    """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
+    from syncline_design.loading import load
+    from syncline_design.optimisation import OptimizeSettings, optimisation_text, optimize
+    from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
+
+    targets = output_targets(output, OPTIMIZE_FORMATS)
+    loaded = load(spec)
+    settings = OptimizeSettings(
+        best, pareto, resource, road(method), time_limit_s=time_limit, seed=seed
+    )
+    found = optimize(loaded, settings)
+    if write_design is not None and found.exit_code == 0:
+        _write_design(found, write_design)
+    emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
+    return found.exit_code
+
+
+def _write_design(found: Any, path: Path) -> None:
+    from syncline_design.optimisation import pinned_text
+    from syncline_design.spec_writer import write_spec
+
+    write_spec(pinned_text(found.loaded, found.problem, found.designs[0]), path)
+    print(f"design written to {path}", file=sys.stderr)
+
+
+@guarded
+def study(
+    study_file: Annotated[
+        Path, typer.Argument(metavar="STUDY", help="Study (YAML).", show_default=False)
+    ],
+    output: OutputOption = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    output_format: Annotated[
+        str | None, typer.Option("--format", help="Print this format to standard output.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Local worker processes.")] = 2,
+    store: Annotated[
+        Path | None, typer.Option(help="Folder of the case files; default: beside the study.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on this Dask scheduler.")
+    ] = None,
+    dask: Annotated[bool, typer.Option("--dask", help="Run on a local Dask cluster.")] = False,
+) -> int:
+    """Sweep specs over grids or samples of their keys; a stopped study resumes."""
+    from syncline_design.report.studies import STUDY_FORMATS, render_study
+    from syncline_design.report.study_words import study_text
+    from syncline_design.study import StudySettings, run_study
+
+    wanted = [*(output or ()), *([f"{output_format}:-"] if output_format else ())]
+    targets = output_targets(wanted, STUDY_FORMATS)
+    settings = StudySettings(seed, workers, store, scheduler, dask)
+    with _study_progress(quiet) as progress:
+        result = run_study(study_file, settings, progress)
+    emit(study_text(result), targets, lambda name: render_study(name, result), quiet=quiet)
+    return result.exit_code
+
+
+@contextmanager
+def _study_progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
+    """One line on standard error, rewritten in place, where that is a terminal."""
+    from syncline_design.report.study_words import progress_text
+
+    if quiet or not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    yield lambda now: print(f"\r\033[K{progress_text(now)}", end="", file=sys.stderr, flush=True)
+    print("\r\033[K", end="", file=sys.stderr, flush=True)
+
+
+@guarded
+def diff(
+    old: Annotated[Path, typer.Argument(help="Spec, or verdict written as JSON.")],
+    new: Annotated[Path, typer.Argument(help="Spec, or verdict written as JSON.")],
+    output: OutputOption = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+) -> int:
+    """Say in words what changed between two specs or verdicts; the exit code is the new one's."""
+    from syncline_design.diff import diff as compare
+    from syncline_design.report.differences import DIFF_FORMATS, diff_text, render_diff
+    from syncline_design.verify import CheckSettings
+
+    targets = output_targets(output, DIFF_FORMATS)
+    data = compare(old, new, CheckSettings(seed=seed))
+    emit(diff_text(data), targets, lambda name: render_diff(name, data), quiet=quiet)
+    return int(data["exit_code"])

@@ -1,0 +1,129 @@
+"""Commands that show evidence: simulate, diagnose, reproduce."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from syncline_design.commands.shared import (
+    OutputOption,
+    QuietOption,
+    SeedOption,
+    SpecArgument,
+    emit,
+    guarded,
+    output_targets,
+)
+
+
+@guarded
+def simulate(
+    spec: SpecArgument,
+    output: OutputOption = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    samples: Annotated[
+        int | None, typer.Option(help="Monte Carlo samples; default: the spec's.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes for long runs; the result is the same.")
+    ] = None,
+) -> int:
+    """Simulate the nonlinear chain against the Syncline over a grid of tau."""
+    from syncline_design.loading import load
+    from syncline_design.report.simulations import SIMULATE_FORMATS, render_simulate
+    from syncline_design.simulate.summary import summary_text
+    from syncline_design.simulated_spec import simulate_spec
+
+    targets = output_targets(output, SIMULATE_FORMATS)
+    loaded = load(spec)
+    run = simulate_spec(loaded, seed=seed, samples=samples, workers=workers)
+    text = f"{loaded.spec.name} ({spec})\n\n{summary_text(run.result, run.system)}"
+    emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
+    return 0
+
+
+@guarded
+def diagnose(
+    spec: SpecArgument,
+    log: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Measured logs (CSV, Parquet); default: the spec's `log: files:`."),
+    ] = None,
+    output: OutputOption = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    write_spec: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Write the spec with the findings in it.")
+    ] = None,
+    false_alarm_rate: Annotated[
+        float, typer.Option(min=0.0005, max=0.5, help="Chance that a clean log is found at fault.")
+    ] = 0.05,
+    max_effects: Annotated[int, typer.Option(min=0, max=20, help="Effects named at most.")] = 4,
+) -> int:
+    """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
+    from syncline_design.after_diagnosis import as_measured, meaning
+    from syncline_design.diagnose import DiagnosisSettings, summary_text
+    from syncline_design.diagnose import diagnose as diagnose_log
+    from syncline_design.loading import load
+    from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
+
+    targets = output_targets(output, DIAGNOSE_FORMATS)
+    loaded = load(spec)
+    settings = DiagnosisSettings(
+        seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects
+    )
+    with _progress(quiet) as progress:
+        found = diagnose_log(as_measured(loaded), log or (), settings, progress)
+        means = meaning(loaded, found, seed)
+    data, text = found.to_json(), f"{loaded.spec.name} ({spec})\n\n{summary_text(found)}"
+    if means is not None:
+        data["design"] = means.to_json()
+        text += "\nWhat it means for the design:\n" + "".join(f"  {x}\n" for x in means.lines)
+    if write_spec is not None and means is not None:
+        from syncline_design.spec_writer import write_spec as write_checked
+
+        write_checked(means.spec_text, write_spec)
+        print(f"spec with the findings written to {write_spec}", file=sys.stderr)
+    elif write_spec is not None:
+        print("nothing was found: no spec written", file=sys.stderr)
+    emit(text, targets, lambda name: render_diagnose(name, data), quiet=quiet)
+    return found.exit_code
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error where that is a terminal; otherwise nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda _, __: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda words, share: bar.update(task, description=words, completed=share)
+
+
+@guarded
+def reproduce(output: OutputOption = None, quiet: QuietOption = False) -> int:
+    """Compute every table and figure of the paper and compare it with what is printed."""
+    from syncline_design import reproduce as paper
+
+    targets = output_targets(output, ("json", "html"))
+    data = paper.reproduce()
+    emit(paper.text(data), targets, lambda name: _reproduction(name, data), quiet=quiet)
+    return 0 if data.ok else 1
+
+
+def _reproduction(name: str, data: Any) -> str:
+    from syncline_design.report.json_out import json_text
+    from syncline_design.report.pages import render_reproduction
+
+    return json_text(data.to_json()) if name == "json" else render_reproduction(data.to_json())

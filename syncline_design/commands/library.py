@@ -1,0 +1,68 @@
+"""Commands to look and to start: catalog, schema, init."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from syncline_design.commands.shared import guarded, refuse
+
+
+@guarded
+def catalog_list(
+    section: Annotated[
+        str | None,
+        typer.Argument(help="platforms, sensors, timestamping, infrastructure or clocks."),
+    ] = None,
+) -> int:
+    """List what the built-in catalogs hold."""
+    from syncline_design.loading import load_builtin
+    from syncline_design.report.catalogs import SECTIONS, list_text
+
+    if section is not None and section not in SECTIONS:
+        refuse(f"syncline-design: catalog list {section}: expected one of {', '.join(SECTIONS)}")
+    sys.stdout.write(list_text(load_builtin(), section))
+    return 0
+
+
+@guarded
+def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
+    """Show one catalog entry with its figures, sources and assumptions."""
+    from syncline_design.loading import load_builtin
+    from syncline_design.report.catalogs import show_text, suggestion
+
+    catalog = load_builtin()
+    text = show_text(catalog, identity)
+    if text is None:
+        refuse(
+            f"syncline-design: catalog show {identity}: no such entry"
+            f"{suggestion(catalog, identity)}"
+        )
+    sys.stdout.write(text)
+    return 0
+
+
+@guarded
+def schema(
+    name: Annotated[Literal["spec", "catalog"], typer.Argument(help="spec or catalog")],
+) -> int:
+    """Print the JSON Schema of specs or catalogs, for editors."""
+    from syncline_design.schema import schema_text
+
+    sys.stdout.write(schema_text(name))
+    return 0
+
+
+@guarded
+def init(
+    directory: Annotated[Path, typer.Argument(help="Folder for the starter spec.")],
+) -> int:
+    """Write a commented starter spec and its schema into a folder."""
+    from syncline_design.scaffold import init_project
+
+    for path in init_project(directory):
+        print(path)
+    return 0

@@ -1,0 +1,122 @@
+"""What every command shares: options, refusals, where results go."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
+
+import typer
+
+if TYPE_CHECKING:
+    from syncline_design.report.write import Target
+
+BAD_INPUT, NO_VERDICT, INTERRUPTED = 2, 3, 130
+DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal error
+
+P = ParamSpec("P")
+
+SpecArgument = Annotated[Path, typer.Argument(help="System spec (YAML).", show_default=False)]
+OutputOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--output",
+        "-o",
+        metavar="FORMAT:PATH",
+        help="Write the result too; repeatable; `-` is standard output.",
+    ),
+]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of every random number.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No text, only the exit code.")]
+MethodOption = Annotated[str, typer.Option(help="auto, front, milp or enumerate.")]
+TimeLimitOption = Annotated[
+    float | None, typer.Option(min=0.0, help="Seconds for the choice; beyond: no verdict.")
+]
+
+
+def refuse(message: str, code: int = BAD_INPUT) -> NoReturn:
+    print(message, file=sys.stderr)
+    raise typer.Exit(code)
+
+
+def guarded(command: Callable[P, int]) -> Callable[P, None]:
+    """Turn what can go wrong into a message and an exit code; never a traceback for a user."""
+
+    @functools.wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        from syncline_design.loading import BadInput
+        from syncline_design.report.write import OutputError
+
+        try:
+            code = command(*args, **kwargs)
+        except typer.Exit:
+            raise
+        except BadInput as error:
+            refuse(str(error))
+        except OutputError as error:
+            refuse(f"syncline-design: {error}", NO_VERDICT)
+        except KeyboardInterrupt:
+            refuse("syncline-design: interrupted", INTERRUPTED)
+        except MemoryError:
+            refuse("syncline-design: out of memory; no verdict", NO_VERDICT)
+        except Exception as error:
+            if DEBUG_VARIABLE in os.environ:
+                raise
+            refuse_unexpected(error)
+        raise typer.Exit(code)
+
+    return run
+
+
+def refuse_unexpected(error: Exception) -> NoReturn:
+    """Known errors speak for themselves; unknown ones are ours."""
+    codes: dict[str, int] = {
+        "NoVerdict": NO_VERDICT,
+        "SimulationError": BAD_INPUT,
+        "DiagnosisError": BAD_INPUT,
+        "StudyError": BAD_INPUT,
+    }
+    names = [c.__name__ for c in type(error).__mro__]
+    for name, code in codes.items():
+        if name in names:
+            refuse(f"syncline-design: {error}", code)
+    refuse(
+        f"syncline-design: internal error, no verdict: {type(error).__name__}: {error}\n"
+        f"Please report it with the spec; {DEBUG_VARIABLE}=1 shows where it happened.",
+        NO_VERDICT,
+    )
+
+
+def output_targets(output: list[str] | None, formats: tuple[str, ...]) -> list[Target]:
+    from syncline_design.report.write import OutputError, check_targets, parse_target
+
+    try:
+        targets = [parse_target(text, formats) for text in output or ()]
+        check_targets(targets)
+    except OutputError as error:
+        refuse(f"syncline-design: {error}")
+    return targets
+
+
+def emit(
+    text: str, targets: list[Target], render: Callable[[str], str | bytes], *, quiet: bool
+) -> None:
+    """Write every target, then the text unless something else already claims standard output."""
+    from syncline_design.report.write import STDOUT, Target, write_outputs
+
+    rendered: list[tuple[Target, str | bytes]] = [
+        (target, render(target.format)) for target in targets
+    ]
+    if text and not quiet and not any(target.path == STDOUT for target in targets):
+        rendered.append((Target("text", STDOUT), text))
+    write_outputs(rendered)
+
+
+def road(name: str) -> Any:
+    known = ("auto", "front", "milp", "enumerate")
+    if name not in known:
+        refuse(f"syncline-design: --method {name}: expected one of {', '.join(known)}")
+    return name
