@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from syncline_design import __version__
 from syncline_design.cautions import cautions
@@ -248,12 +248,21 @@ def simulation_settings(loaded: LoadedSpec, seed: int) -> SimulationSettings:
 def _monte_carlo(
     loaded: LoadedSpec, system: System, settings: CheckSettings
 ) -> tuple[MonteCarlo | None, str]:
+    """The cross-check, or why there is none; a trajectory that cannot be used is bad input."""
     if not settings.monte_carlo:
         return None, "left out on request"
     try:
         return cross_check(system, simulation_settings(loaded, settings.seed)), ""
     except SimulationError as error:
+        if loaded.spec.monte_carlo.trajectory is not None:
+            _refuse_trajectory(loaded, str(error))
         return None, str(error)
+
+
+def _refuse_trajectory(loaded: LoadedSpec, message: str) -> NoReturn:
+    place = ("monte_carlo", "trajectory")
+    line, column = loaded.positions.get(place, (0, 0))
+    raise BadInput((Problem(str(loaded.path), line, column, ".".join(place), message),))
 
 
 def _results(
