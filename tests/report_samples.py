@@ -528,7 +528,6 @@ def diagnosis() -> dict[str, Any]:
                 {"nominal": 0.95, "before": 0.31, "after": 0.949},
             ],
         },
-        "verdict_before": "meets",
-        "verdict_after": "fails",
+        "design": {"before": {}, "after": {}, "text": ["ACC-1 now fails", "the payload changes"]},
         "provenance": {"seed": 0},
     }  # fmt: skip

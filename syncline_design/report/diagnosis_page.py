@@ -38,11 +38,7 @@ def render_diagnosis(data: Json) -> str:
         "gap": [t for t in (_gap(data), _steps(data)) if t is not None],
         "residuals": "residuals" in drawn,
         "where": _where(data),
-        "design": [
-            (label, _text(data[key]))
-            for key, label in (("verdict_before", "Before"), ("verdict_after", "After"))
-            if data.get(key)
-        ],
+        "design": [_text(line) for line in part(data, "design").get("text") or ()],
         "log": _log_facts(data),
         "provenance": _provenance(data),
     }

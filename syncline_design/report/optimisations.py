@@ -7,10 +7,11 @@ from typing import Final
 from syncline_design.optimisation import Optimisation, optimisation_csv, optimisation_json
 
 OPTIMIZE_FORMATS: Final = ("json", "html", "csv")
+_HINGES: Final = ("staircase", "slack", "tolerances", "measure_next")
 
 
 def render_optimize(name: str, found: Optimisation) -> str:
-    """The text of one format; html is the design report, which holds front, prices, runners-up."""
+    """The text of one format; html is the design report with all that the choice hinges on."""
     if name == "csv":
         return optimisation_csv(found)
     if name == "json":
@@ -21,4 +22,8 @@ def render_optimize(name: str, found: Optimisation) -> str:
     from syncline_design.verify import CheckSettings, check_loaded
 
     settings = CheckSettings(found.settings.seed, found.settings.method)
-    return render_verdict(check_loaded(found.loaded, settings))
+    verdict = check_loaded(found.loaded, settings)
+    told = optimisation_json(found)
+    choice = dict(verdict.get("choice") or {})
+    choice |= {key: told[key] for key in _HINGES if told.get(key)}
+    return render_verdict({**verdict, "choice": choice})

@@ -82,11 +82,3 @@ def _provenance(data: Json) -> list[tuple[str, Any]]:
     found = [(str(key), str(value)) for key, value in part(data, "versions").items()]
     file = part(data, "spec").get("file")
     return [*([("Spec file", str(file))] if file else []), *found]
-
-
-def simulation_csv(data: Json) -> str:
-    """The grid as CSV, figures in full."""
-    from syncline_design.report.csv_out import csv_text
-
-    columns = ("tau_s", "worst_case_m", "syncline_m", "ratio", "bound_m", "gap", "reason")
-    return csv_text(columns, items(data, "grid"))
