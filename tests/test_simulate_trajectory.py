@@ -333,6 +333,14 @@ def test_settings_that_make_no_sense(changes: dict[str, object], says: str) -> N
         (EffectEntry("latency", "position", "usv", (("latency_s", 1.0),)), "stage: expected one"),
         (EffectEntry("range_bias", "position", "uav", (("bias_m", 1.0),)), "acts on ranging"),
         (EffectEntry("latency", "position", "uav", ()), "missing latency_s"),
+        (
+            EffectEntry("frame_convention", "attitude", "uav", (("convention", "upside_down"),)),
+            "convention: expected one of .*, found upside_down",
+        ),
+        (
+            EffectEntry("frame_convention", "ranging", "uav", (("convention", "transposed"),)),
+            r"frame_convention \(ranging\) does not know 'transposed'",
+        ),
     ],
 )
 def test_effects_that_do_not_fit(entry: EffectEntry, says: str) -> None:

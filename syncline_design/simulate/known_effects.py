@@ -64,6 +64,14 @@ def _demand_entry(
     missing = {p.name for p in effect.parameters} - {name for name, _ in entry.parameters}
     if missing:
         raise SimulationError(f"{path}.parameters: missing {', '.join(sorted(missing))}")
+    values = dict(entry.parameters)
+    for parameter in effect.parameters:
+        value, choices = values[parameter.name], parameter.choices
+        if choices and value not in choices:
+            raise SimulationError(
+                f"{path}.parameters.{parameter.name}: expected one of {', '.join(choices)}, "
+                f"found {value}"
+            )
 
 
 def departures(
@@ -77,12 +85,18 @@ def departures(
     for one in acting:
         if systematic_only and one.effect.kind == "stochastic":
             continue
-        total = total + one.effect.depart(
-            rows,
-            one.values,
-            one.sensor,  # type: ignore[arg-type]
-            generator,
-        )
+        try:
+            departed = one.effect.depart(
+                rows,
+                one.values,
+                one.sensor,  # type: ignore[arg-type]
+                generator,
+            )
+        except KeyError as unknown:
+            raise SimulationError(
+                f"effects: {one.effect.name} ({one.sensor}) does not know {unknown}"
+            ) from None
+        total = total + departed
     return total
 
 

@@ -44,7 +44,8 @@ class WorstCase:
 
     value_m: |e| of the best directions found; bound_m: no directions give more; triangle_m: the
     terms' sum, lever arms included; syncline_m: the Syncline at tau_s plus systematic terms.
-    gap: 1 - value / bound.
+    gap: 1 - value / bound.  Known effects enter the bound with what they add to the budget, to
+    first order, and stochastic ones do not act here.
     """
 
     tau_s: float
