@@ -9,12 +9,20 @@ from dataclasses import replace
 from fractions import Fraction
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from random_problems import random_problem, with_random_limits
 from syncline_design.choose import decide
 from syncline_design.choose.decide import best, choose
 from syncline_design.choose.enumerate import all_designs
-from syncline_design.choose.evaluate import broken, evaluate, rank
+from syncline_design.choose.evaluate import (
+    broken,
+    evaluate,
+    exact_product,
+    rank,
+    total_error_m,
+)
 from syncline_design.choose.outcome import Choice, Infeasible, NoVerdict, TooLarge
 from syncline_design.choose.ranked import iter_best
 from syncline_design.design_space import (
@@ -261,6 +269,20 @@ def test_too_many_combinations_are_not_enumerated() -> None:
     problem = one_stage([many, many, many], Limits(None, 1.0), 1.0, 1.0)
     with pytest.raises(NoVerdict, match="too many to enumerate"):
         choose(problem, "enumerate")
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_total_alone_is_rounded_once_too(seed: int) -> None:
+    """Split products and one rounded sum against fractions, to the last bit."""
+    problem = limited(seed + 5000)
+    for design, found in itertools.islice(all_designs(problem), 60):
+        assert total_error_m(problem, design) == float(found.total_m)
+
+
+@given(st.floats(1e-120, 1e120), st.floats(1e-120, 1e120))
+def test_products_are_split_exactly(a: float, b: float) -> None:
+    high, low = exact_product(a, b)
+    assert Fraction(high) + Fraction(low) == Fraction(a) * Fraction(b)
 
 
 @pytest.mark.parametrize("seed", range(25))

@@ -23,7 +23,7 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choose.arrays import MARGIN, Tables, tabulate, useful_options
-from syncline_design.choose.evaluate import error_key, evaluate
+from syncline_design.choose.evaluate import error_key, evaluate, total_error_m
 from syncline_design.choose.labels import Labels, concatenate
 from syncline_design.choose.merge import Ceiling, Merge
 from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
@@ -213,13 +213,14 @@ def _replaces(one: ClockOption, other: ClockOption, earlier: bool) -> bool:
 
 
 def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoint, ...]:
-    """Front points of complete designs, by rising amount."""
+    """Front points of complete designs, by rising amount; errors exact, rounded once."""
     bottom = tables.keys[0].denominator
-    amounts, totals = finished.labels.resources[0].tolist(), finished.total.tolist()
-    points = [
-        FrontPoint(Fraction(amounts[row], bottom), totals[row], _design(tables, finished, int(row)))
-        for row in np.flatnonzero(rows)
-    ]
+    amounts = finished.labels.resources[0].tolist()
+    points = []
+    for row in np.flatnonzero(rows):
+        design = _design(tables, finished, int(row))
+        error = total_error_m(tables.problem, design)
+        points.append(FrontPoint(Fraction(amounts[row], bottom), error, design))
     return _joined(points)
 
 
