@@ -15,7 +15,8 @@ import pytest
 
 import report_samples as samples
 from html_page import Page
-from syncline_design.report import figures
+from syncline_design.paper_errata import ERRATA
+from syncline_design.report import errata, figures
 from syncline_design.report.pages import render_verdict, render_verdicts
 from syncline_design.report.text import visible
 
@@ -88,7 +89,7 @@ def test_answer_comes_first(page: Page) -> None:
         "price of riegl_vux1uav is an assumption",
         "The position data are 2 ms older than their stamp.",
         "Errata of the paper that bear on this design",
-        "45\u00b7\u221a3",
+        "77.9 deg/s is a rounding of 45 sqrt(3)",
         "a" * 64,
         "200\u00a0000",
         "30.9\u00a0mm to 31.1\u00a0mm",
@@ -151,6 +152,17 @@ def test_any_optional_leaf_may_be_null() -> None:
             if holder is not None:
                 holder[path[-1]] = None
         assert Page(render_verdict(verdict)).unbalanced == []
+
+
+def test_errata_follow_the_design() -> None:
+    verdict = samples.fixed_wing()
+    assert set(errata.NEEDED) | {"lever_arm"} <= {entry.id for entry in ERRATA}
+    assert any("45 sqrt(3)" in text for text in errata.relevant(verdict))
+    assert not any("1.4127 m" in text for text in errata.relevant(verdict))
+    verdict["spec"]["stages"][0]["platform"]["id"] = "auv_printed"
+    found = errata.relevant(verdict)
+    assert any("1.4127 m" in text for text in found)
+    assert not any("45 sqrt(3)" in text for text in found)
 
 
 def test_infeasible_says_why_first() -> None:
