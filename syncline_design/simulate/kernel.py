@@ -271,7 +271,11 @@ def as_rows(draw: Draw) -> tuple[StageRows, ConstantTwist, Noise]:
         ranging_m=ranging,
         target_m=target,
     )
-    noise = Noise(
+    return rows, ConstantTwist(rotation, velocity, rate), _noise_rows(draw)
+
+
+def _noise_rows(draw: Draw) -> Noise:
+    return Noise(
         position_m=draw.position_noise_m.T,
         attitude_rad=draw.angle_noise_rad[:3].T,
         range_m=draw.range_noise_m,
@@ -281,4 +285,3 @@ def as_rows(draw: Draw) -> tuple[StageRows, ConstantTwist, Noise]:
         mu_attitude_s=draw.mu_attitude_s,
         mu_ranging_s=draw.mu_ranging_s,
     )
-    return rows, ConstantTwist(rotation, velocity, rate), noise

@@ -29,6 +29,7 @@ from syncline_design.simulate.worst_case import WorstCase, worst_cases
 
 DEFAULT_SETTINGS = SimulationSettings()
 DEFAULT_CAP = 4_000_000
+Status = Literal["pass", "fail", "indeterminate"]
 LOOK_GROWTH = 4  # each further look of `decide` has this many times the samples
 CROSS_CHECK_GAP = 1e-3  # where a cross-check stops looking: so near, relatively, to the bound
 CROSS_CHECK_ITERATIONS = 30
@@ -121,7 +122,7 @@ class Decision:
     `confidence` (Bonferroni).
     """
 
-    status: Literal["pass", "fail", "indeterminate"]
+    status: Status
     limit_m: float
     samples: int
     looks: int
@@ -151,35 +152,40 @@ def decide(
     demand_simulable(system)
     sizes = look_sizes(settings.samples, cap_samples)
     look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
-    counts, within, drawn = distribution.no_counts(), 0, 0
-    if first is not None and isinstance(first.distribution, Values):
-        distribution.add_counts(counts, first.distribution.errors_m)
-        within, drawn = first.distribution.within(limit_m), first.samples
-    for look, size in enumerate(sizes, 1):
+    counts, within, drawn = _counted(first, limit_m)
+    for size in sizes:
         if drawn < size:
             # a shorter first run may have ended inside a job: that job is drawn again
             if drawn % JOB:
-                counts, within, drawn = distribution.no_counts(), 0, 0
+                counts, within, drawn = _counted(None, limit_m)
             found, more = tally(system, settings, drawn, size, limit_m)
             counts, within, drawn = counts + found, within + more, size
         low, high = proportion_interval(within, size, look_confidence)
-        undecided = low < quantile <= high
-        if not undecided or look == len(sizes):
+        status = _status(low, high, quantile)
+        if status != "indeterminate":
             break
     (estimate,) = quantile_estimates(Binned(counts), (quantile,), look_confidence)
-    status: Literal["pass", "fail", "indeterminate"] = "indeterminate"
-    if not undecided:
-        status = "pass" if low >= quantile else "fail"
+    share = ProportionEstimate(limit_m, within / size, low, high)
+    looks = sizes.index(size) + 1
     return Decision(
-        status=status,
-        limit_m=limit_m,
-        samples=size,
-        looks=look,
-        confidence=settings.confidence,
-        look_confidence=look_confidence,
-        estimate=estimate,
-        within=ProportionEstimate(limit_m, within / size, low, high),
+        status, limit_m, size, looks, settings.confidence, look_confidence, estimate, share
     )
+
+
+def _counted(first: MonteCarlo | None, limit_m: float) -> tuple[distribution.Counts, int, int]:
+    """(counts, how many within the limit, how many) of the samples of a first run, if any."""
+    counts = distribution.no_counts()
+    if first is None or not isinstance(first.distribution, Values):
+        return counts, 0, 0
+    distribution.add_counts(counts, first.distribution.errors_m)
+    return counts, first.distribution.within(limit_m), first.samples
+
+
+def _status(low: float, high: float, quantile: float) -> Status:
+    """Whether P(|error| <= limit), between low and high, reaches the quantile."""
+    if low >= quantile:
+        return "pass"
+    return "fail" if high < quantile else "indeterminate"
 
 
 def look_sizes(samples: int, cap_samples: int) -> list[int]:
