@@ -229,8 +229,9 @@ def deleted(seed: int) -> Iterator[Case]:
         effect, sensor, _, where = GEOREFERENCE[row]
         platform = where[(seed + index) % len(where)]
         label = f"{effect} ({sensor})"
-        group = "true effect not in the dictionary"
-        yield Case(group, label, platform, seed, (_one(row),), 30.0, exclude=names)
+        times = 30.0 if (seed + index) % 2 else 150.0
+        group = f"true effect, {times:g} times its bound, not in the dictionary"
+        yield Case(group, label, platform, seed, (_one(row),), times, exclude=names)
 
 
 def families(seed: int) -> Iterator[Case]:

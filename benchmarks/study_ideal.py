@@ -12,7 +12,7 @@ import numpy as np
 from scipy import stats
 
 from benchmarks.study_cases import GEOREFERENCE, POSITION
-from tests.world import CHAIN, Hidden, hidden
+from tests.world import CHAIN, DISCRETE, STOCHASTIC, Hidden, hidden
 from tests.world.bound import all_faults, fitted_keys, row_covariance, slopes, whitened
 from tests.world.noise import wanders
 from tests.world.trajectory import Array
@@ -66,7 +66,8 @@ def told_apart(log: WorldLog, truth: Hidden, other: tuple[str, str, str | None])
     """Whether this log could tell another effect from the true one.
 
     It could when the other leaves more than INVISIBLE standard deviations of the truth's whitened
-    signal unexplained, and does not reproduce SAME_CLASS of its length.
+    signal unexplained, and does not reproduce SAME_CLASS of its length; both beside what further
+    true effects there are, since a reader has to fit those as well.
     """
     first = log.run.carriers[0].name
     matching = [
@@ -76,10 +77,15 @@ def told_apart(log: WorldLog, truth: Hidden, other: tuple[str, str, str | None])
     ]
     if not matching:
         return True
-    own, beside = _signatures(log, [truth, matching[0]])
+    company = [e for e in log.truth if e != truth and e.effect not in STOCHASTIC | DISCRETE]
+    own, beside, *others = _signatures(log, [truth, matching[0], *company])
+    if others:
+        known = np.linalg.qr(np.concatenate(others, axis=1))[0]
+        own, beside = (part - known @ (known.T @ part) for part in (own, beside))
     theta = np.array([truth.number(name) for _, name in fitted_keys((truth,))])
     signal = own @ theta
-    basis = np.linalg.qr(beside)[0]
+    directions, sizes, _ = np.linalg.svd(beside, full_matrices=False)
+    basis = directions[:, sizes > 1e-9 * sizes[0]]
     left = float(np.linalg.norm(signal - basis @ (basis.T @ signal)))
     length = float(np.linalg.norm(signal))
     return left > INVISIBLE and left > np.sqrt(1.0 - SAME_CLASS**2) * length

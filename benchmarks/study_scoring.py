@@ -147,7 +147,7 @@ def right(group: str) -> tuple[str, Callable[[Row], bool]]:
         return "no physical effect named", lambda row: not _physical(row)
     if group.startswith("clean"):
         return "nothing named, agrees", lambda row: not row["found"] and row["verdict"] == "agrees"
-    if group.startswith("true effect not"):
+    if "not in the dictionary" in group:
         return "unexplained", lambda row: row["verdict"] == "unexplained"
     return "named, or its class", lambda row: bool(row["named"])
 
