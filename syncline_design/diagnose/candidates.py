@@ -13,7 +13,7 @@ from syncline_design.effects import registry
 from syncline_design.effects.base import Array, Effect, Target
 
 STEP_TIMES = 24  # places along the log where a step is looked for at first
-EDGE = 0.04  # share of the log at either end where a step is not looked for
+EDGE = 0.15  # share of the rows at either end where a step is not looked for: it would be a latency
 
 
 # Where two effects fit equally well, the one that is met more often is named and the other listed

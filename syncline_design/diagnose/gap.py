@@ -46,7 +46,7 @@ class Fit:
 class Gap:
     """Before, after and floor on held-out rows.
 
-    floor: the same effects fitted to the held-out rows themselves; where something unexplained
+    floor: the same effects fitted to all rows, the held-out ones too; where something unexplained
     remains, what the spec's noise alone would give, if that is lower.
     closed_fraction: (before - after) / (before - floor) in NLL; None where there was no gap.
     difference: NLL per sample saved, with its standard error over the blocks.
@@ -154,8 +154,7 @@ def gap(
         left = model.error
         train = precision(data.structure.rows(training), model.level)
         learned = left[held] - columns[held] @ _step(train, columns[training], left[training])
-        own = left[held] - columns[held] @ _step(part.known, columns[held], left[held])
-        before, after, floor = part.before(plain[held]), part.after(learned), part.after(own)
+        before, after, floor = part.before(plain[held]), part.after(learned), part.after(left[held])
         if unexplained:
             floor = min(floor, part.noise_only(floor), key=lambda s: s.nll)
         for name, sums in (("before", before), ("after", after), ("floor", floor)):

@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from syncline_design.diagnose.log import Log, StageLog
+from syncline_design.diagnose.log import Log, StageLog, Track
+from syncline_design.diagnose.merging import hermite
 from syncline_design.diagnose.simulation import Acting, Scene, acting, scene
+from syncline_design.diagnose.trajectory import GAP_FACTOR
 from syncline_design.effects import registry
 from syncline_design.effects.base import Array, Target
 from syncline_design.effects.frame_convention import conventions
@@ -46,6 +48,41 @@ def undone(log: Log, sensor: Target, stage: int, convention: str) -> Log:
         new = _ranging(old, convention)
     stages = tuple(new if k == stage else s for k, s in enumerate(log.stages))
     return replace(log, stages=stages)
+
+
+def unslipped(log: Log, seconds: float) -> Log:
+    """The log with every position paired with the rows it belongs to.
+
+    stamp = true + seconds, so the position that was true at t carries the stamp t + seconds.  Rows
+    whose position lies beyond the log or in a gap are left out.
+    """
+    first = log.stages[0]
+    assert first.antenna_m is not None
+    times = log.time_s
+    wanted = times + seconds
+    right = np.clip(np.searchsorted(times, wanted), 1, len(log) - 1)
+    step = times[right] - times[right - 1]
+    inside = (wanted >= times[0]) & (wanted <= times[-1]) & (step <= GAP_FACTOR * log.interval_s)
+    track = first.velocity_track or Track(times, first.velocity_mps)
+    moved = [
+        hermite(
+            times,
+            first.antenna_m[:, k],
+            np.interp(times - seconds, track.time_s, track.value[:, k]),
+            wanted,
+            right,
+        )
+        for k in range(3)
+    ]
+    stages = (replace(first, antenna_m=np.stack(moved, axis=1)), *log.stages[1:])
+    return replace(log, stages=stages).rows(inside)
+
+
+def mended(log: Log, one: Acting) -> Log:
+    """The log with one gross fault undone."""
+    if one.effect.name == "integer_second_slip":
+        return unslipped(log, float(one.values["seconds"]))
+    return undone(log, one.sensor, one.stage, str(one.values["convention"]))
 
 
 def _position(antenna: Array, convention: str) -> Array:
@@ -86,36 +123,26 @@ def gross_faults(
     known: Sequence[Acting],
     expected_m: float,
     exclude: Sequence[str] = (),
-) -> tuple[tuple[Gross, ...], Log, tuple[Acting, ...]]:
-    """Gross faults of a log, the log with column faults undone, and the slips to simulate.
+) -> tuple[tuple[Gross, ...], Log]:
+    """Gross faults of a log, and the log with them undone.
 
     expected_m: usual length of the error vector that the spec's noise makes.
     """
     found: list[Gross] = []
-    slips: tuple[Acting, ...] = ()
     while len(found) < MOST:
         thin = log.rows(slice(None, None, max(1, len(log) // ROWS)))
-        size = usual_size(scene(system, thin, (*known, *slips)).error())
+        size = usual_size(scene(system, thin, known).error())
         if not size > FAR_FROM_NOISE * expected_m:
             break
-        sizes = [
-            (usual_size(trial()), k, one)
-            for k, (one, trial) in enumerate(
-                _trials(system, log, thin, (*known, *slips), [g.acting.label for g in found])
-            )
-            if one.effect.name not in exclude
-        ]
-        if not sizes:
-            break
-        best, _, one = min(sizes, key=lambda entry: entry[:2])
-        if not best < FALLS_TO * size:
+        taken = [g.acting.label for g in found]
+        trials = _trials(system, log, thin, known, taken, exclude)
+        sizes = [(usual_size(trial()), k, one) for k, (one, trial) in enumerate(trials)]
+        best, _, one = min(sizes, key=lambda entry: entry[:2], default=(size, 0, None))
+        if one is None or not best < FALLS_TO * size:
             break
         found.append(Gross(one, size / max(best, 1e-300)))
-        if one.effect.name == "frame_convention":
-            log = undone(log, one.sensor, one.stage, str(one.values["convention"]))
-        else:
-            slips = (*slips, one)
-    return tuple(found), log, slips
+        log = mended(log, one)
+    return tuple(found), log
 
 
 Trials = list[tuple[Acting, Callable[[], Array]]]
@@ -127,6 +154,7 @@ def _trials(
     thin: Log,
     known: Sequence[Acting],
     taken: Sequence[tuple[str, str, int]],
+    exclude: Sequence[str],
 ) -> Trials:
     """Every gross fault with a function that re-simulates the log under it."""
     trials: Trials = []
@@ -147,7 +175,7 @@ def _trials(
         for seconds in SECONDS:
             one = acting("integer_second_slip", "position", 0, {"seconds": float(seconds)})
             trials.append((one, _slipped(base, one)))
-    return trials
+    return [trial for trial in trials if trial[0].effect.name not in exclude]
 
 
 def _reread(

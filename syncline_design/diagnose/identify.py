@@ -17,7 +17,8 @@ Label = tuple[str, str, int]
 SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
 CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
 MOST_REFITTED = 5
-RIVAL_NATS = 4.5  # a rival that fits worse by less than this is not excluded by the data
+RIVAL_COSINE = 0.7  # ... if it also points roughly the same way
+RIVAL_NATS = 3.0  # a rival that fits worse by less than this is not excluded by the data
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +72,15 @@ def compare(data: Data, model: Model, index: int, others: Sequence[Signature]) -
             best[s.candidate.label] = alias
             found[s.candidate.label] = s
     ranked = sorted(best.values(), key=lambda a: (-a.cosine, a.candidate.label))
-    near = [a for a in ranked if a.cosine > SAME or a.loss < RIVAL_NATS]
+    near = [a for a in ranked if a.cosine > SAME or _rivals(a)]
     refitted = [_refitted(data, model, index, a, found) for a in near[:MOST_REFITTED]]
-    same = tuple(a for a in refitted if a.loss < (CLASS_NATS if a.cosine > SAME else RIVAL_NATS))
+    same = tuple(a for a in refitted if _rivals(a) or (a.cosine > SAME and a.loss < CLASS_NATS))
     kept = {a.candidate.label for a in same}
     return Comparison(same, tuple(a for a in ranked if a.candidate.label not in kept))
+
+
+def _rivals(alias: Alias) -> bool:
+    return alias.loss < RIVAL_NATS and alias.cosine > RIVAL_COSINE
 
 
 def _refitted(

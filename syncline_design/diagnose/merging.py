@@ -104,7 +104,7 @@ def interpolated(
     for name, values in taken.items():
         if name not in result:
             slope = taken.get(_slope_name(name))
-            result[name] = _hermite(own, values, slope, stamps, right)
+            result[name] = hermite(own, values, slope, stamps, right)
     for values in result.values():
         values[~covered] = np.nan
     return result, covered
@@ -119,7 +119,7 @@ def _slope_name(name: str) -> str:
     return ""
 
 
-def _hermite(own: Array, values: Array, slope: Array | None, stamps: Array, right: Array) -> Array:
+def hermite(own: Array, values: Array, slope: Array | None, stamps: Array, right: Array) -> Array:
     """Cubic Hermite interpolation with known slopes, or with those of a parabola."""
     slopes = np.gradient(values, own) if slope is None else slope
     left = right - 1

@@ -9,7 +9,8 @@ from typing import Any, Literal
 
 from syncline_design.diagnose.findings import Finding
 from syncline_design.diagnose.gap import Gap
-from syncline_design.diagnose.regimes import Cell, Remainder
+from syncline_design.diagnose.regimes import Cell
+from syncline_design.diagnose.remainder import Remainder
 from syncline_design.spec_effects import EffectChoice
 
 SCHEMA = "syncline-design/diagnosis/v1"

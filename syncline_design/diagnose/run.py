@@ -21,10 +21,10 @@ from syncline_design.diagnose.identify import unseen
 from syncline_design.diagnose.log import Log
 from syncline_design.diagnose.regimes import (
     first_disagreement_s,
-    remainder,
     strongest,
     where_map,
 )
+from syncline_design.diagnose.remainder import remainder
 from syncline_design.diagnose.result import Diagnosis, Json, Stairs, Verdict
 from syncline_design.diagnose.search import Search, SearchResult, start_search
 from syncline_design.diagnose.settings import DiagnosisSettings, Progress, silent
@@ -59,14 +59,14 @@ def diagnose_measured(
 ) -> Diagnosis:
     """The diagnosis of a system and a log that are already in memory."""
     progress("looking for gross faults", 0.05)
-    faults, log, slips = gross_faults(
+    faults, log = gross_faults(
         inputs.system,
         inputs.log,
         inputs.known,
         expected_size(inputs),
         settings.exclude_effects,
     )
-    view = scene(inputs.system, log, (*inputs.known, *slips))
+    view = scene(inputs.system, log, inputs.known)
     parts = directed_parts(view, candidates(view, settings.exclude_effects))
     data = data_of(view, structure_of(view, parts))
     progress("searching", 0.15)

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from syncline_design.diagnose.candidates import (
+    EDGE,
     STEP_TIMES,
     Candidate,
     Signature,
@@ -48,6 +49,10 @@ DRAWS = 3000  # clean scores drawn for the distribution of the largest
 MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
 SCATTER_SHARE = 0.2  # for effects that only scatter; the rest is the remainder test's
 RIDGE = 1e-8
+WANDERING = frozenset({"correlated_noise", "height_drift"})
+WANDER_NATS = (
+    15.0  # slow noise can take the shape of anything slow, so it has to be that much better
+)
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
 LOST = 1e-7  # share of a signature's information below which the model's own effects hold it all
@@ -143,7 +148,9 @@ class Search:
         best: dict[tuple[str, str, int], tuple[float, Signature, NoiseLevel]] = {}
         for level in ladder(self.data, model):
             seen = scores if level is model.level else gram(self.data, model, free, level)
-            for s, gain in zip(free, seen.gains(), strict=True):
+            for s, (gain, values) in zip(free, seen.gains(), strict=True):
+                if not _possible(s, values):
+                    continue
                 total = gain - seen.nll - 2.0 * s.columns.shape[2] - 4.0 * len(s.at)
                 known = best.get(s.candidate.label)
                 if gain > SCREENED_OUT and (known is None or known[0] < total):
@@ -220,12 +227,19 @@ class Gram:
     groups: tuple[slice, ...]
     nll: float
 
-    def gains(self) -> list[float]:
-        """NLL saved [nat] by each signature alone, to first order."""
-        return [self._gain(self.score[g], self.normal[g, g]) for g in self.groups]
+    def gains(self) -> list[tuple[float, Array]]:
+        """NLL saved [nat] by each signature alone, and its parameters, to first order."""
+        result = []
+        for g in self.groups:
+            values = solve_scaled(self.normal[g, g], self.score[g])
+            result.append((0.5 * float(self.score[g] @ values), values))
+        return result
 
-    def _gain(self, score: Array, normal: Array) -> float:
-        return 0.5 * float(score @ solve_scaled(normal, score))
+
+def _possible(found: Signature, values: Array) -> bool:
+    """Whether first-order parameters are at most twice what the effect can have."""
+    slopes_of = found.candidate.effect.slopes()
+    return all(abs(v) <= 2.0 * p.high for v, p in zip(values, slopes_of, strict=True))
 
 
 def gram(data: Data, model: Model, found: Sequence[Signature], level: NoiseLevel) -> Gram:
@@ -312,7 +326,10 @@ def preferred(trials: Sequence[Trial]) -> Trial | None:
     """The least likely by chance; among those that are as good, the commonest in practice."""
     if not trials:
         return None
+    lasting = [t for t in trials if t.candidate.effect.name not in WANDERING]
     least = min(t.log_p for t in trials)
+    if lasting and min(t.log_p for t in lasting) <= least + WANDER_NATS:
+        trials, least = lasting, min(t.log_p for t in lasting)
     close = [t for t in trials if t.log_p <= least + AS_GOOD_NATS]
     return min(close, key=lambda t: (commonness(t.candidate), t.log_p, t.candidate.label))
 
@@ -354,12 +371,13 @@ def located(data: Data, model: Model) -> Model:
     """Refine where the newest effect starts, by halving the grid around the best place."""
     last = model.acting[-1]
     name = next(p.name for p in last.effect.parameters if p.located)
-    times = data.view.log.time_s
-    reach = (times[-1] - times[0]) / 24.0
+    first, last_time = np.quantile(data.view.log.time_s, [EDGE, 1.0 - EDGE])
+    reach = (last_time - first) / STEP_TIMES
     best = model
     for _ in range(4):
         centre = best.acting[-1].values[name]
-        for t in np.linspace(centre - reach, centre + reach, 7):
+        low, high = max(centre - reach, first), min(centre + reach, last_time)
+        for t in np.linspace(low, high, 7):
             moved = replace(best.acting[-1], values={**best.acting[-1].values, name: float(t)})
             trial = refitted(data, (*best.acting[:-1], moved), best)
             best = trial if trial.nll < best.nll else best

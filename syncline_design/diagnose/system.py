@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from syncline_design.diagnose.gross import undone
+from syncline_design.diagnose.gross import mended
 from syncline_design.diagnose.log import Log
 from syncline_design.diagnose.reading import read_log
 from syncline_design.diagnose.simulation import Acting
@@ -45,9 +45,9 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
     _demand_fit(loaded, system, log)
     known = known_effects(system)
     for one in known:
-        if one.effect.name == "frame_convention":
-            log = undone(log, one.sensor, one.stage, str(one.values["convention"]))
-    kept = tuple(one for one in known if one.effect.name != "frame_convention")
+        if one.effect.kind == "discrete":
+            log = mended(log, one)
+    kept = tuple(one for one in known if one.effect.kind != "discrete")
     return Measured(system, log, kept, tuple(path.name for path in files))
 
 
