@@ -17,6 +17,7 @@ from scipy import stats
 from syncline_design.effects import registry
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
 from syncline_design.simulate import (
+    SimulationError,
     SimulationSettings,
     cross_check,
     decide,
@@ -322,6 +323,20 @@ def test_a_first_run_is_used_as_it_stands() -> None:
     found = decide(gaussian_ball(), settings, 0.95, limit, first=first)
     assert found == decide(gaussian_ball(), settings, 0.95, limit)
     assert found.samples == 30_000
+
+
+def test_a_first_run_of_other_settings_is_not_used() -> None:
+    limit = 1.02 * exact_quantile(0.95)
+    settings = SimulationSettings(samples=5_000, seed=12)
+    other = cross_check(gaussian_ball(), dataclasses.replace(settings, samples=20_000, seed=3))
+    expected = decide(gaussian_ball(), settings, 0.95, limit)
+    assert decide(gaussian_ball(), settings, 0.95, limit, first=other) == expected
+
+
+@pytest.mark.parametrize("quantile", [0.0, 1.0, math.nan])
+def test_a_quantile_that_makes_no_sense_is_refused(quantile: float) -> None:
+    with pytest.raises(SimulationError, match="quantile"):
+        decide(gaussian_ball(), SimulationSettings(samples=100), quantile, 1.0)
 
 
 def test_wrong_decisions_are_rare() -> None:

@@ -22,6 +22,7 @@ from syncline_design.simulate.results import (
 from syncline_design.simulate.sampling import JOB, error_distribution
 from syncline_design.simulate.settings import (
     DEFAULT_MANOEUVRE,
+    SimulationError,
     SimulationSettings,
     demand_simulable,
 )
@@ -150,14 +151,16 @@ def decide(
     from syncline_design.simulate.worker import tally
 
     demand_simulable(system)
+    if not 0.0 < quantile < 1.0:
+        raise SimulationError(f"quantile: expected a number between 0 and 1, found {quantile}")
     sizes = look_sizes(settings.samples, cap_samples)
     look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
-    counts, within, drawn = _counted(first, limit_m)
+    counts, within, drawn = _counted(first, settings, limit_m)
     for size in sizes:
         if drawn < size:
             # a shorter first run may have ended inside a job: that job is drawn again
             if drawn % JOB:
-                counts, within, drawn = _counted(None, limit_m)
+                counts, within, drawn = _counted(None, settings, limit_m)
             found, more = tally(system, settings, drawn, size, limit_m)
             counts, within, drawn = counts + found, within + more, size
         low, high = proportion_interval(within, size, look_confidence)
@@ -172,10 +175,18 @@ def decide(
     )
 
 
-def _counted(first: MonteCarlo | None, limit_m: float) -> tuple[distribution.Counts, int, int]:
-    """(counts, how many within the limit, how many) of the samples of a first run, if any."""
+def _counted(
+    first: MonteCarlo | None, settings: SimulationSettings, limit_m: float
+) -> tuple[distribution.Counts, int, int]:
+    """(counts, how many within the limit, how many) of the samples of a first run, if any fits."""
     counts = distribution.no_counts()
     if first is None or not isinstance(first.distribution, Values):
+        return counts, 0, 0
+    if (first.samples, first.seed, first.envelope) != (
+        settings.samples,
+        settings.seed,
+        settings.envelope,
+    ):
         return counts, 0, 0
     distribution.add_counts(counts, first.distribution.errors_m)
     return counts, first.distribution.within(limit_m), first.samples
