@@ -27,6 +27,7 @@ from syncline_design.diagnose.simulation import Acting, Scene
 from syncline_design.effects.base import Array
 
 NOISE_ROWS = 800  # rows on which the noise is fitted; stretches spread over the whole log
+POLISH_ROWS = 3000
 STRETCH = 80
 FIRST_TIMES_S = (None, 3.0, 30.0)
 LONG, SHORT = 25, 10  # iterations of a noise fit from scratch, and from a good start
@@ -47,11 +48,11 @@ class Data:
         return np.nan_to_num(self.view.error(acting))
 
 
-def stretches(rows: int) -> NDArray[np.int64]:
-    """Indices of contiguous stretches spread over a log, NOISE_ROWS rows at most."""
-    if rows <= NOISE_ROWS:
+def stretches(rows: int, most: int = NOISE_ROWS) -> NDArray[np.int64]:
+    """Indices of contiguous stretches spread over a log, `most` rows at most."""
+    if rows <= most:
         return np.arange(rows)
-    count = NOISE_ROWS // STRETCH
+    count = most // STRETCH
     starts = np.linspace(0, rows - STRETCH, count).astype(np.int64)
     return (starts[:, None] + np.arange(STRETCH)).ravel()
 
@@ -144,6 +145,13 @@ def fit(
     _, _, covariance = adjusted(data, now, factored, error, steps=0)
     nll = factored.negative_log_likelihood(error)
     return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
+
+
+def polished(data: Data, model: Model) -> Model:
+    """The model with its noise fitted on POLISH_ROWS rows, for the final figures."""
+    index = stretches(len(data.view), POLISH_ROWS)
+    fine = replace(data, noise_rows=index, noise_structure=data.structure.rows(index))
+    return fit(fine, model.acting, model.opened, start=model.level)
 
 
 def slow_guess(level: NoiseLevel, time_s: float | None) -> NoiseLevel:

@@ -26,6 +26,7 @@ OPEN = 1e6
 TIME_LEAST_S = 0.2
 TIME_MOST_S = 120.0
 TIME_USUAL_S = 25.0  # centre of the weak prior on time constants: minutes or fractions of one
+FACTOR_SPREAD = 0.15  # of the prior on log factor, below the limit
 TIME_SPREAD = 1.0  # its standard deviation in log T
 
 
@@ -247,8 +248,9 @@ class _Packing:
         return NoiseLevel(factor, tuple(slow), tuple(times), tuple(size))
 
     def prior(self, level: NoiseLevel) -> float:
-        """Weak prior [nat] that keeps time constants from wandering where nothing tells them."""
-        total = 0.0
+        """Weak prior [nat]: where the log does not tell, factors are 1 and time constants usual."""
+        logs = [np.log(min(f, FACTOR_LIMIT)) for f in level.factor]
+        total = float(sum(0.5 * (value / FACTOR_SPREAD) ** 2 for value in logs))
         for part, times in zip(self.structure.slow, level.time_constant_s, strict=True):
             used = times[:1] if part.shared_time else times
             total += sum(0.5 * (np.log(t / TIME_USUAL_S) / TIME_SPREAD) ** 2 for t in used)

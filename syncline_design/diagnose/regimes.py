@@ -58,6 +58,14 @@ def covariates(view: Scene) -> tuple[Covariate, ...]:
     return tuple(found)
 
 
+def level_axes(view: Scene) -> Array:
+    """North, east, down, and level forward and right by the smoothed heading: (n, 3, 5)."""
+    heading = _smooth_angle(view.rows[-1].euler_rad[:, 2], view)
+    cos, sin, zero = np.cos(heading), np.sin(heading), np.zeros_like(heading)
+    turned = np.stack([np.stack([cos, sin, zero], 1), np.stack([-sin, cos, zero], 1)], axis=2)
+    return np.concatenate([np.broadcast_to(np.eye(3), (len(view), 3, 3)), turned], axis=2)
+
+
 def _smooth_angle(angle_rad: Array, view: Scene) -> Array:
     """Angles averaged over SMOOTH_S, wrapped.
 

@@ -1,9 +1,10 @@
 """Is anything left that the model does not explain?  A test with no dictionary in it.
 
-Two families of regressors: quadratic functions of the covariates along body and NED axes, and the
+Families of regressors: quadratic functions of the covariates along NED and level body axes; the
 ways in which any motion-linked error can point (along the antenna's velocity, along the sweep of
 the lever, across the heading, along the beam, along the acceleration) times smooth functions of
-time, heading, bearing, speed and turn rate.  Their whitened energy, freed of the effects already
+time, heading, bearing, speed and turn rate; and the named effects' own signatures in separate
+regimes, as a right effect has the same parameters in all of them.  Their whitened energy, freed of the effects already
 in the model, is chi-square when only noise is left; circular shifts of the whitened error against
 the regressors show how large it is for this noise anyhow.
 """
@@ -17,7 +18,7 @@ from scipy.stats import chi2, norm
 
 from syncline_design.diagnose.candidates import slopes
 from syncline_design.diagnose.fitting import Data, Model, inner, inverse_scaled
-from syncline_design.diagnose.regimes import axis_vectors, covariates
+from syncline_design.diagnose.regimes import covariates, level_axes
 from syncline_design.diagnose.simulation import Scene
 from syncline_design.effects.base import Array
 from syncline_design.effects.kinematics import (
@@ -30,19 +31,21 @@ from syncline_design.effects.kinematics import (
 
 SHIFTS = 60
 LOST = 1e-6  # share of a regressor's information below which the model's effects hold it all
-TESTS = 3  # energy of both families and the largest single regressor
+CELLS = 4  # regimes per covariate in which a named effect must have the same parameters
 
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
-    """p_regimes, p_motion: of the energy on the two families; p_peak: of the largest single one.
+    """p_regimes, p_motion, p_constant: of the energy on the three families (p_constant 1 when
+    nothing is named); p_peak: of the largest single regressor of the first two.
 
-    shifted: median energy under circular shifts over its expectation, the larger of the two
+    shifted: median energy under circular shifts over its expectation, the largest of the
     families' (1 when the noise model is right); energies are divided by it when it exceeds 1.
     """
 
     p_regimes: float
     p_motion: float
+    p_constant: float
     p_peak: float
     shifted: float
     freedom: int
@@ -50,7 +53,8 @@ class Remainder:
     @property
     def p(self) -> float:
         """Of all tests together (Bonferroni)."""
-        return min(1.0, TESTS * min(self.p_regimes, self.p_motion, self.p_peak))
+        tests = [self.p_regimes, self.p_motion, self.p_constant, self.p_peak]
+        return min(1.0, len(tests) * min(tests))
 
 
 def remainder(data: Data, model: Model, rng: np.random.Generator) -> Remainder:
@@ -63,8 +67,12 @@ def remainder(data: Data, model: Model, rng: np.random.Generator) -> Remainder:
     freedom = sum(t.freedom for t in tested)
     peak = max(t.peak for t in tested)
     p_peak = min(1.0, 2.0 * float(norm.sf(np.sqrt(peak))) * freedom)
+    p_constant = 1.0
+    if model.acting:
+        tested.append(_energy(data, model, _constancy_columns(data, model), residual, shifts))
+        p_constant = tested[-1].p
     inflation = max(t.inflation for t in tested)
-    return Remainder(tested[0].p, tested[1].p, p_peak, inflation, freedom)
+    return Remainder(tested[0].p, tested[1].p, p_constant, p_peak, inflation, freedom)
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,12 +104,11 @@ def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Ar
 
 
 def _regime_columns(view: Scene) -> Array:
-    """1, c_i, c_i c_j of the covariates along north, east, down and the body's axes."""
+    """1, c_i, c_i c_j of the covariates along north, east, down, level forward and right."""
     base = _standardised(view)
     i, j = np.triu_indices(base.shape[1])
     features = base[:, i] * base[:, j]
-    axes = axis_vectors(view)[:, :, [0, 1, 2, 5, 6, 7]]
-    return _products(axes, features)
+    return _products(level_axes(view), features)
 
 
 def _motion_columns(view: Scene) -> Array:
@@ -117,6 +124,22 @@ def _motion_columns(view: Scene) -> Array:
             beam = rotate(rows.rotation, bearing(rows.azimuth_rad, rows.elevation_rad))
             vectors += [sweep_velocity(rows), down_axis_sweep(rows), beam]
     return _products(np.stack(vectors, axis=-1), features)
+
+
+def _constancy_columns(data: Data, model: Model) -> Array:
+    """Each named effect's fitted signature in each regime of each covariate."""
+    own = np.nan_to_num(slopes(data.view, model.acting))
+    at, parts = 0, []
+    for one in model.acting:
+        names = [p.name for p in one.effect.slopes()]
+        values = np.array([one.values[name] for name in names])
+        shape = own[:, :, at : at + len(names)] @ values
+        at += len(names)
+        for covariate in covariates(data.view):
+            edges = np.quantile(covariate.values, np.linspace(0.0, 1.0, CELLS + 1)[1:-1])
+            cell = np.searchsorted(edges, covariate.values)
+            parts += [shape * (cell == k)[:, None] for k in range(CELLS)]
+    return np.stack(parts, axis=-1)
 
 
 def _products(vectors: Array, features: Array) -> Array:
@@ -156,6 +179,6 @@ def _freed(normal: Array, width: int) -> tuple[Array, Array, Array]:
     kept = np.diag(rest) > LOST * np.maximum(whole, 1e-300)
     single = np.where(kept, 1.0 / np.sqrt(np.where(kept, np.diag(rest), 1.0)), 0.0)
     values, vectors = np.linalg.eigh(rest * single[:, None] * single)
-    usable = values > 1e-6 * max(float(values[-1]), 1e-300)
+    usable = values > 1e-4 * max(float(values[-1]), 1e-300)
     root = single[:, None] * vectors[:, usable] / np.sqrt(values[usable])
     return projector, root, single

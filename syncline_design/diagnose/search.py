@@ -35,6 +35,7 @@ from syncline_design.diagnose.fitting import (
     fit,
     inner,
     inverse_scaled,
+    polished,
     solve_scaled,
 )
 from syncline_design.diagnose.noise import NoiseLevel, as_specified, precision
@@ -123,7 +124,7 @@ class Search:
             model = self.exchanged(trial.model)
             steps.append(Step(trial.candidate.label, trial.gain, trial.log_p, threshold, model))
             self.progress(len(steps) / self.settings.max_effects)
-        model = self.pruned(model)
+        model = polished(self.data, self.pruned(model))
         return SearchResult(base, model, tuple(steps))
 
     def threshold(self, scores: Gram) -> float:
