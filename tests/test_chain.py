@@ -177,6 +177,18 @@ def test_kernel_agrees_with_chain_at_gimbal_lock() -> None:
     np.testing.assert_allclose(fast, slow, atol=1e-6, rtol=0)
 
 
+def test_kernel_agrees_with_chain_straight_up_and_down() -> None:
+    """Lines of sight at the zenith, at the nadir and almost there."""
+    draw = drawn(fixed_wing(), count=600)
+    for columns, z in ((slice(0, 200), 1.0), (slice(200, 400), -1.0)):
+        draw.bearing[:, columns] = np.array([[0.0], [0.0], [z]])
+    draw.bearing[:, 400:] = np.array([[3e-9], [-4e-9], [1.0]])
+    draw.angle_noise_rad[3:] *= 100.0
+    rows, motion, noise = kernel.as_rows(draw)
+    expected = stage_error(rows, motion, noise).T
+    np.testing.assert_allclose(kernel.stage_error(draw), expected, atol=1e-10, rtol=0)
+
+
 def test_euler_angles_at_gimbal_lock_give_the_rotation_back() -> None:
     for pitch in (math.pi / 2, -math.pi / 2):
         rotation = Rotation.from_euler("ZYX", [0.7, pitch, 0.3]).as_matrix()
@@ -342,8 +354,8 @@ def test_series_and_closed_form_meet() -> None:
             else [mpmath.sin(a) / a, (1 - mpmath.cos(a)) / a**2, (a - mpmath.sin(a)) / a**3]
         )
         for term in range(3):
-            assert abs(float(found[term][i] - expected[term])) < 4e-16
-            assert abs(float(alone[i][term][0] - expected[term])) < 4e-16
+            assert abs(float(found[term][i] - expected[term])) < 1.5e-15
+            assert abs(float(alone[i][term][0] - expected[term])) < 1.5e-15
 
 
 def test_rotation_exp_and_screw_against_scipy() -> None:
@@ -363,5 +375,5 @@ def test_sin_cos_of_small_and_large_angles() -> None:
     for scale in (1e-8, 1e-3, 0.05, 0.9, 5.0):
         angles = np.linspace(-scale, scale, 401)
         sine, cosine = kernel.sin_cos(angles)
-        np.testing.assert_allclose(sine, np.sin(angles), atol=2e-16, rtol=2e-15)
-        np.testing.assert_allclose(cosine, np.cos(angles), atol=3e-16)
+        np.testing.assert_allclose(sine, np.sin(angles), atol=2e-16, rtol=3e-15)
+        np.testing.assert_allclose(cosine, np.cos(angles), atol=1.2e-15)

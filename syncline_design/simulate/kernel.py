@@ -3,8 +3,7 @@ faster, for level vehicles (roll = pitch = 0, any yaw) that move with constant t
 
 Everything is (3, n) or (n,): each row of an array is contiguous, so a chunk that fits the cache
 is worked through at the speed of the cache.  Sines of draws never appear: a uniform angle comes
-from the tangent of its half, and small angles from their series, cut where the next term is below
-double precision.
+from the tangent of its half, and small angles from their series.
 """
 
 from __future__ import annotations
@@ -18,6 +17,7 @@ from syncline_design.effects.base import Array, StageRows
 from syncline_design.simulate.chain import ConstantTwist, Noise
 
 _SERIES_LIMIT = 1.0  # squared angle up to which the series is used
+_SERIES_ERROR = 1e-15  # relative size of the first term left out
 _GIMBAL_LOCK = 1e-9  # cos(pitch) below which roll is taken as 0, as in chain.rotation_to_euler
 
 
@@ -92,11 +92,13 @@ def cross(first: Array, second: Array) -> Array:
 def series(square: Array, start: int, largest: float) -> Array:
     """sum over k of (-x)^k / (2k + start)!, x = a^2 [rad^2] >= 0, any shape.
 
-    start 1: sin a / a; 2: (1 - cos a) / a^2; 3: (a - sin a) / a^3.  Cut after the term below which
-    nothing is left in double precision for x up to `largest`.
+    start 1: sin a / a; 2: (1 - cos a) / a^2; 3: (a - sin a) / a^3.  Cut where the first term
+    left out is below 1e-15 of the whole for x up to `largest`.
     """
     terms = 1
-    while largest**terms * math.factorial(start) > 2e-17 * math.factorial(2 * terms + start):
+    while largest**terms * math.factorial(start) > _SERIES_ERROR * math.factorial(
+        2 * terms + start
+    ):
         terms += 1
     total = np.full_like(square, (-1) ** (terms - 1) / math.factorial(2 * terms - 2 + start))
     for k in range(terms - 2, -1, -1):
@@ -174,19 +176,26 @@ def _believed_object(draw: Draw) -> Array:
 
 
 def _measured_bearing(bearing: Array, sine: Array, cosine: Array) -> Array:
-    """n at azimuth and elevation plus their noise: angle addition on the components of n."""
-    sin_el = -bearing[2]
-    cos_el = np.sqrt(bearing[0] ** 2 + bearing[1] ** 2)
-    flat = cos_el > 0.0
-    scale = 1.0 / np.where(flat, cos_el, 1.0)
-    cos_az = np.where(flat, bearing[0] * scale, 1.0)
-    sin_az = bearing[1] * scale
-    new_cos_el = cos_el * cosine[1] - sin_el * sine[1]
-    out = np.empty((3, new_cos_el.shape[0]))
-    np.multiply(cos_az * cosine[0] - sin_az * sine[0], new_cos_el, out=out[0])
-    np.multiply(sin_az * cosine[0] + cos_az * sine[0], new_cos_el, out=out[1])
-    np.add(sin_el * cosine[1], cos_el * sine[1], out=out[2])
-    np.negative(out[2], out=out[2])
+    """n at azimuth and elevation plus their noise: angle addition on the components of n.
+
+    The horizontal part turns by the azimuth's noise and shrinks by
+    cos(el + d) / cos el = cos d - tan el sin d; straight up or down azimuth counts as 0.
+    """
+    x, y, z = bearing
+    flat = np.sqrt(x * x + y * y)
+    out = np.empty((3, sine.shape[1]))
+    np.multiply(flat, sine[1], out=out[2])
+    np.subtract(z * cosine[1], out[2], out=out[2])
+    upright = not flat.min(initial=1.0) > 0.0
+    if upright:
+        x, flat = np.where(flat > 0.0, x, 1.0), np.where(flat > 0.0, flat, 1.0)
+    scale = z * sine[1]
+    scale /= flat
+    scale += cosine[1]
+    if upright:
+        scale = np.where((bearing[0] == 0.0) & (bearing[1] == 0.0), scale - cosine[1], scale)
+    np.multiply(x * cosine[0] - y * sine[0], scale, out=out[0])
+    np.multiply(y * cosine[0] + x * sine[0], scale, out=out[1])
     return out
 
 
