@@ -405,6 +405,11 @@ def test_summary_says_what_was_found() -> None:
     assert "range_bias (ranging)" in told
 
 
+def test_summary_says_when_the_ratio_never_leaves_one() -> None:
+    result = simulate(survey(), SimulationSettings(samples=500, tau_grid_s=(1e-5, 1e-3)))
+    assert "within 2 % of the Syncline over the whole grid" in summary_text(result, survey())
+
+
 def test_trajectory_is_named_in_text_and_json() -> None:
     result = simulate(fixed_wing(), settings("circle", 500, tau_grid_s=(1e-4,)))
     assert "along the trajectory circle" in summary_text(result, fixed_wing())
