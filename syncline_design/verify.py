@@ -6,12 +6,10 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 from syncline_design import __version__
 from syncline_design.cautions import cautions
-from syncline_design.choice_data import choice_json, excluded_json
-from syncline_design.choose.outcome import Method
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
@@ -20,7 +18,6 @@ from syncline_design.known_effects import describe, effect_entries, known_of
 from syncline_design.loading import BadInput, LoadedSpec, Problem, load
 from syncline_design.model.budget import budget
 from syncline_design.model.system import System
-from syncline_design.open_choice import MOST_SIMULATED, Picked, pick
 from syncline_design.problem import build_problem, selection_of, sole_design
 from syncline_design.recheck import Recheck, recheck
 from syncline_design.resolution import platform_of
@@ -42,6 +39,10 @@ from syncline_design.verdict import (
     Verified,
     syncline_json,
 )
+
+if TYPE_CHECKING:
+    from syncline_design.choose.outcome import Method
+    from syncline_design.open_choice import Picked
 
 Json = dict[str, Any]
 
@@ -148,6 +149,9 @@ def picked_design(loaded: LoadedSpec) -> tuple[DesignProblem, Design]:
 
 def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
     """Choose, then verify; without any design say why and what would help."""
+    from syncline_design.choice_data import choice_json
+    from syncline_design.open_choice import pick
+
     picked = pick(
         problem,
         settings.method,
@@ -167,6 +171,7 @@ def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSetti
 
 def _infeasible_json(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
     """Why there is no design, and which single changes would help."""
+    from syncline_design.choice_data import excluded_json
     from syncline_design.choose.explain import explain
 
     known = known_of(loaded)
@@ -197,6 +202,8 @@ def _unmet(loaded: LoadedSpec, one: Requirement, in_conflict: bool) -> Requireme
 
 
 def _passed_over(picked: Picked) -> Json:
+    from syncline_design.open_choice import MOST_SIMULATED
+
     count = f"{picked.passed_over} design{'s' if picked.passed_over > 1 else ''}"
     met = picked.verified is not None and picked.verified.word == "meets"
     message = (
