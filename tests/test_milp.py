@@ -109,6 +109,8 @@ def test_version_that_gives_wrong_optima_is_refused(monkeypatch: pytest.MonkeyPa
 
 
 def test_canary_stops_a_wrong_solver(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(milp, "_SUNG", [])
+
     def wrong(self: Any, *_: Any, **__: Any) -> None:
         """Claims the optimum that HiGHS 1.14 claims: x = 0, z = 5."""
         x, z = sorted(self.variables(), key=lambda v: v.attributes["integer"])
@@ -150,6 +152,7 @@ def test_time_limit_is_no_verdict() -> None:
 
 def test_values_left_by_an_unfinished_solve_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a time limit cvxpy may leave values in the variables: only `optimal` counts."""
+    monkeypatch.setattr(milp, "_SUNG", [])
     real = cp.Problem.solve
     calls = []
 

@@ -21,8 +21,6 @@ from syncline_design.design_space import (
     Resources,
 )
 
-SPLIT = 2.0**27 + 1.0
-
 
 @dataclass(frozen=True, slots=True)
 class Units:
@@ -95,63 +93,8 @@ def _errors(
 
 def total_error_m(problem: Problem, design: Design) -> float:
     """Total error alone [m], rounded once: what `evaluate` gives as error_m."""
-    options = chosen_options(problem, design)
-    if _is_plain(problem, design, options):
-        return _plain_total_m(problem, design, options)
-    sensor, _, sync = _errors(problem, design, options)
+    sensor, _, sync = _errors(problem, design, chosen_options(problem, design))
     return float(sensor + sync + Fraction(problem.fixed_error_m))
-
-
-def _is_plain(problem: Problem, design: Design, options: list[Option]) -> bool:
-    """Whether every figure is a float and nothing more."""
-    given = [problem.exact_sync_rate_mps, *(pair.exact_rate_mps for pair in problem.pairs)]
-    given += [option.exact_error_m for option in options]
-    given += [option.exact_tau_s for option in options]
-    given += [clock.exact_offset_s for clock in chosen_clocks(problem, design)]
-    return all(figure is None for figure in given)
-
-
-def _plain_total_m(problem: Problem, design: Design, options: list[Option]) -> float:
-    """The same for plain floats: products split into exact halves, the sum rounded once."""
-    terms = [option.sensor_error_m for option in options]
-    terms.append(problem.fixed_error_m)
-    parts = [_bound_parts(problem, design, options, pair) for pair in problem.pairs]
-    if problem.sync_model == "syncline":
-        largest = max(parts, key=math.fsum, default=[])
-        for part in largest:
-            terms += exact_product(problem.sync_rate_mps, part)
-    else:
-        for pair, bound in zip(problem.pairs, parts, strict=True):
-            for part in bound:
-                terms += exact_product(pair.rate_mps, part)
-    return math.fsum(terms)
-
-
-def exact_product(a: float, b: float) -> tuple[float, float]:
-    """Two floats whose sum is a * b exactly (T. J. Dekker, Numer. Math. 18, 1971, section 5.4)."""
-    product = a * b
-    a_high, b_high = a * SPLIT - (a * SPLIT - a), b * SPLIT - (b * SPLIT - b)
-    a_low, b_low = a - a_high, b - b_high
-    rest = ((a_high * b_high - product) + a_high * b_low + a_low * b_high) + a_low * b_low
-    return product, rest
-
-
-def _bound_parts(
-    problem: Problem, design: Design, options: list[Option], pair: Pair
-) -> list[float]:
-    """What the bound of a pair adds up from [s]."""
-    own = options[pair.role]
-    if pair.reference is None:
-        return [own.tau_s]
-    other = options[pair.reference]
-    parts = [own.tau_s, other.tau_s]
-    vehicles = (problem.roles[pair.role].vehicle, problem.roles[pair.reference].vehicle)
-    if own.timeline == other.timeline and (own.timeline == "utc" or vehicles[0] == vehicles[1]):
-        return parts
-    for option, v in zip((own, other), vehicles, strict=True):
-        if option.timeline == "host":
-            parts.append(problem.vehicles[v].clocks[design.clocks[v]].offset_bound_s)
-    return parts
 
 
 def chosen_options(problem: Problem, design: Design) -> list[Option]:

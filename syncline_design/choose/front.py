@@ -23,11 +23,12 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choose.arrays import MARGIN, Tables, tabulate, useful_options
-from syncline_design.choose.evaluate import error_key, evaluate, total_error_m
-from syncline_design.choose.labels import Labels, concatenate
-from syncline_design.choose.merge import Ceiling, Merge
+from syncline_design.choose.evaluate import error_key, evaluate
+from syncline_design.choose.labels import Labels, concatenate, total_m
+from syncline_design.choose.merge import Ceiling, Merge, lowered
 from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
-from syncline_design.choose.pareto import Bools, Column, Columns, Floats, undominated
+from syncline_design.choose.pareto import Bools, Column, Columns, Floats, Indices, undominated
+from syncline_design.choose.rounded_once import total_errors_m
 from syncline_design.design_space import ClockOption, Design, Problem, ResourceName
 
 
@@ -122,6 +123,8 @@ def _merge_all(
         merge = Merge(tables, clocks, accuracy=accuracy, guarded=guarded, ceiling=ceiling)
         labels = merge.run(deadline)
         if labels is not None and len(labels):
+            if not guarded:
+                ceiling = lowered(ceiling, labels, total_m(tables.problem, labels))
             clock = np.full((len(labels), 1), place, dtype=np.intp)
             parts.append(replace(labels, choice=np.column_stack([labels.choice, clock])))
     if not parts:
@@ -146,12 +149,8 @@ def _no_labels(keys: int) -> Labels:
 def _with_total(
     tables: Tables, labels: Labels, combinations: tuple[tuple[int, ...], ...]
 ) -> _Finished:
-    """Complete designs with their total error [m], added in one fixed order."""
-    problem = tables.problem
-    caused = labels.sync
-    if problem.sync_model == "syncline":
-        caused = problem.sync_rate_mps * labels.bound
-    return _Finished(labels, labels.error + problem.fixed_error_m + caused, combinations)
+    """Complete designs with their total error."""
+    return _Finished(labels, total_m(tables.problem, labels), combinations)
 
 
 def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
@@ -163,15 +162,21 @@ def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
     caused, allowed = problem.sync_rate_mps * labels.bound, limit * labels.error
     holds = np.asarray(caused < allowed * (1.0 - MARGIN))
     close = np.flatnonzero(~holds & (caused <= allowed * (1.0 + MARGIN)))
-    for row in close:
-        holds[row] = evaluate(problem, _design(tables, finished, int(row))).sync_ratio < limit
+    for row, design in zip(close, _designs(tables, finished, close), strict=True):
+        holds[row] = evaluate(problem, design).sync_ratio < limit
     return holds
 
 
-def _design(tables: Tables, finished: _Finished, row: int) -> Design:
-    places = finished.labels.choice[row].tolist()
-    options = tuple(tables.order[r][place] for r, place in enumerate(places[:-1]))
-    return Design(options, finished.clocks[places[-1]])
+def _designs(tables: Tables, finished: _Finished, rows: Indices) -> list[Design]:
+    """Designs of some of the labels."""
+    if len(rows) == 0:
+        return []
+    places = finished.labels.choice[rows]
+    options = np.column_stack(
+        [np.array(order)[places[:, r]] for r, order in enumerate(tables.order)]
+    )
+    clocks = [finished.clocks[place] for place in places[:, -1].tolist()]
+    return [Design(tuple(o), c) for o, c in zip(options.tolist(), clocks, strict=True)]
 
 
 def _tie_columns(tables: Tables, labels: Labels) -> list[Column]:
@@ -214,20 +219,22 @@ def _replaces(one: ClockOption, other: ClockOption, earlier: bool) -> bool:
 
 def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoint, ...]:
     """Front points of complete designs, by rising amount; errors exact, rounded once."""
+    kept = np.flatnonzero(rows)
+    designs = _designs(tables, finished, kept)
+    errors = total_errors_m(tables.problem, designs)
     bottom = tables.keys[0].denominator
-    amounts = finished.labels.resources[0].tolist()
-    points = []
-    for row in np.flatnonzero(rows):
-        design = _design(tables, finished, int(row))
-        error = total_error_m(tables.problem, design)
-        points.append(FrontPoint(Fraction(amounts[row], bottom), error, design))
-    return _joined(points)
+    amounts = [Fraction(a, bottom) for a in finished.labels.resources[0][kept].tolist()]
+    return _joined(list(map(FrontPoint, amounts, errors, designs)))
 
 
 def _joined(points: list[FrontPoint]) -> tuple[FrontPoint, ...]:
     """Points as one front; errors equal to 12 figures count as equal."""
+    keyed = [(point.amount, error_key(point.error_m), point) for point in points]
+    keyed.sort(key=lambda entry: entry[:2])
     out: list[FrontPoint] = []
-    for point in sorted(points, key=lambda p: (p.amount, error_key(p.error_m))):
-        if not out or error_key(point.error_m) < error_key(out[-1].error_m):
+    least = math.inf
+    for _, error, point in keyed:
+        if error < least:
             out.append(point)
+            least = error
     return tuple(out)

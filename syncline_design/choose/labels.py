@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.choose.arrays import RoleArrays
 from syncline_design.choose.outcome import TooLarge
 from syncline_design.choose.pareto import Bools, Column, Floats, Indices
+from syncline_design.design_space import Problem
 
 CHUNK = 200_000  # candidates looked at in one go
 MOST_PER_STEP = 10 * CHUNK
@@ -156,3 +157,11 @@ def with_pair(labels: Labels, bound: Floats, rate_mps: float) -> Labels:
         bound=np.maximum(labels.bound, bound),
         sync=labels.sync + rate_mps * bound,
     )
+
+
+def total_m(problem: Problem, labels: Labels) -> Floats:
+    """Total error of complete designs [m]."""
+    caused = labels.sync
+    if problem.sync_model == "syncline":
+        caused = problem.sync_rate_mps * labels.bound
+    return np.asarray(labels.error + problem.fixed_error_m + caused)

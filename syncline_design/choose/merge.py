@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 from syncline_design.choose.arrays import MARGIN, RoleArrays, Tables
-from syncline_design.choose.labels import Addition, Labels, concatenate, extend, with_pair
+from syncline_design.choose.labels import Addition, Labels, concatenate, extend, total_m, with_pair
 from syncline_design.choose.outcome import Deadline
 from syncline_design.choose.pareto import (
     Bools,
@@ -34,6 +34,18 @@ class Ceiling:
 
     amount: Column
     total: Floats
+
+
+def lowered(ceiling: Ceiling | None, labels: Labels, total: Floats) -> Ceiling:
+    """A ceiling with further complete designs."""
+    amount = labels.resources[0]
+    if ceiling is not None:
+        amount = np.concatenate([ceiling.amount, amount])
+        total = np.concatenate([ceiling.total, total])
+    order = np.lexsort((total, amount))
+    amount, total = amount[order], total[order]
+    steps = np.flatnonzero(total < np.minimum.accumulate(np.append(np.inf, total[:-1])))
+    return Ceiling(amount[steps], total[steps])
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,11 +107,14 @@ class Merge:
         labels = self._start()
         for number, stage in enumerate(self.stages):
             parts = []
+            complete = number == len(self.stages) - 1 and not self.tables.tracked
             for timing in self._classes(stage):
                 deadline.check()
                 done = self._stage(labels, number, timing)
                 if len(done):
                     parts.append(done)
+                    if complete and self.safety is None:
+                        self.ceiling = lowered(self.ceiling, done, total_m(self.problem, done))
             if not parts:
                 return None
             labels = concatenate(parts)

@@ -30,6 +30,8 @@ OPTIONS |= {"mip_feasibility_tolerance": 1e-9, "primal_feasibility_tolerance": 1
 OPTIONS |= {"dual_feasibility_tolerance": 1e-9}
 ERROR_STEPS = 1e6  # the error objective counts millionths of a typical error
 
+_SUNG: list[bool] = []  # whether the canary has been solved rightly in this process
+
 
 def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
     """A design with the least objective and, among those, the least error; None if none is."""
@@ -85,12 +87,18 @@ class _Solver:
         return status
 
     def demand_canary(self) -> None:
-        """min 2 x + 3 z, x + z >= 4.5, z whole: 9; HiGHS 1.14 says 15 (highs-js issue 53)."""
+        """min 2 x + 3 z, x + z >= 4.5, z whole: 9; HiGHS 1.14 says 15 (highs-js issue 53).
+
+        Once per process: the solver does not change under way.
+        """
+        if _SUNG:
+            return
         x, z = self.cp.Variable(), self.cp.Variable(integer=True)
         rows = [x + z >= 4.5, x >= 0, x <= 10, z >= 0, z <= 10]
         canary = self.cp.Problem(self.cp.Minimize(2 * x + 3 * z), rows)
         if self.run(canary) != "optimal" or abs(float(canary.value) - 9.0) > 1e-6:
             raise NoVerdict(f"the MILP solver fails its canary: {canary.value} instead of 9")
+        _SUNG.append(True)
 
 
 def is_recent(version: str) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -141,6 +141,34 @@ def _staircase(column: Column) -> Bools:
     return keep
 
 
+def _one_staircase(
+    amount: list[Any], first: list[float], second: list[float], ties: list[int]
+) -> list[int]:
+    """Rows by rising amount that no earlier row replaces: the inner loop of the merge."""
+    one_at: list[float] = []
+    two_at: list[float] = []
+    row_at: list[int] = []
+    kept: list[int] = []
+    for row, (one, two) in enumerate(zip(first, second, strict=True)):
+        place = bisect_right(one_at, one)
+        if place and two_at[place - 1] <= two:
+            other = row_at[place - 1]
+            clear = amount[other] < amount[row] or first[other] < one or ties[other] < ties[row]
+            if not clear:
+                kept.append(row)
+            continue
+        kept.append(row)
+        end = place
+        while end < len(two_at) and two_at[end] >= two:
+            end += 1
+        if place and one_at[place - 1] == one:
+            place -= 1
+        one_at[place:end] = [one]
+        two_at[place:end] = [two]
+        row_at[place:end] = [row]
+    return kept
+
+
 def _is_error(weak: Sequence[Column]) -> bool:
     return bool(weak) and weak[0].dtype == np.float64
 
@@ -160,14 +188,16 @@ class _Stairs:
 
     def add(self, one: float, two: float, row: int) -> None:
         """Take in a row, and drop those that it makes superfluous."""
-        if self.lowest(one, two) is not None:
+        first, second = self.first, self.second
+        start = end = bisect_right(first, one)
+        if start and second[start - 1] <= two:
             return
-        start = bisect_left(self.first, one)
-        end = start
-        while end < len(self.first) and self.second[end] >= two:
+        if start and first[start - 1] == one:
+            start -= 1
+        while end < len(first) and second[end] >= two:
             end += 1
-        self.first[start:end] = [one]
-        self.second[start:end] = [two]
+        first[start:end] = [one]
+        second[start:end] = [two]
         self.row[start:end] = [row]
 
 
@@ -242,6 +272,8 @@ class _Sorted:
         """Rows by rising first key against the staircases of the other two columns so far."""
         first, second = (self.columns[k][left].tolist() for k in self.stepped)
         amount, ties = self.keys[0][left].tolist(), self.ties[left].tolist()
+        if len(below) == 1:
+            return left[_one_staircase(amount, first, second, ties)]
         stairs = [_Stairs() for _ in below]
         kept = []
         for row, (one, two) in enumerate(zip(first, second, strict=True)):
