@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,12 +14,14 @@ from syncline_design.diagnose.identify import Comparison, compare
 from syncline_design.diagnose.noise import NoiseLevel, precision
 from syncline_design.diagnose.scales import figure
 from syncline_design.diagnose.search import SearchResult, Step
-from syncline_design.diagnose.simulation import Scene
+from syncline_design.diagnose.simulation import Acting, Scene
+from syncline_design.effects import registry
 from syncline_design.effects.base import Effect
 
 Label = tuple[str, str, int]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
+WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +111,31 @@ def _deterministic(
             at += 1
         figures[p.name] = Figure(float(one.values[p.name]), spread, p.unit)
     compared = compare(data, model, index, signatures)  # type: ignore[arg-type]
+    whole = _whole_seconds(one, figures)
+    if whole is not None:
+        return _as_slip(_finding(data.view, one.effect, one.label, figures, compared, steps), whole)
     return _finding(data.view, one.effect, one.label, figures, compared, steps)
+
+
+def _whole_seconds(one: Acting, figures: Mapping[str, Figure]) -> float | None:
+    """The number of seconds if a position latency is one of whole seconds."""
+    if one.label[:2] != ("latency", "position"):
+        return None
+    latency = figures["latency_s"]
+    seconds = float(round(float(latency.value)))
+    reach = max(3.0 * (latency.standard_uncertainty or 0.0), WHOLE_S)
+    return seconds if seconds and abs(float(latency.value) - seconds) < reach else None
+
+
+def _as_slip(latency: Finding, seconds: float) -> Finding:
+    """A latency of whole seconds as what it is in practice: two time scales."""
+    alias = AliasFigure("latency", latency.sensor, latency.stage, 1.0, 0.0)
+    return replace(
+        latency,
+        effect=registry()["integer_second_slip"],
+        parameters={"seconds": Figure(seconds, None, "s")},
+        aliases=(alias, *latency.aliases),
+    )
 
 
 def _finding(
@@ -212,8 +238,6 @@ def _log_spread(data: Data, model: Model, where: tuple[str, int, int]) -> float:
 
 
 def _scaled(level: NoiseLevel, where: tuple[str, int, int], by: float) -> NoiseLevel:
-    from dataclasses import replace
-
     kind, index, axis = where
     if kind == "size":
         sizes = tuple(s * by if k == index else s for k, s in enumerate(level.size))

@@ -25,8 +25,12 @@ FALLS_TO = 1.0 / 3.0
 FAR_FROM_NOISE = 4.0  # times the expected size
 MOST = 3  # gross faults at once
 ROWS = 3000
-SECONDS = tuple(k for k in range(-18, 19) if k)
+LEAST_SLIP = 3  # a shorter one is found as a latency first, which may be no whole number
+SECONDS = tuple(k for k in range(-18, 19) if abs(k) >= LEAST_SLIP)
 DEGREE = np.pi / 180.0
+
+
+Reread = Callable[[float], Log]
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +82,11 @@ def unslipped(log: Log, seconds: float) -> Log:
     return replace(log, stages=stages).rows(inside)
 
 
-def mended(log: Log, one: Acting) -> Log:
+def mended(log: Log, one: Acting, reread: Reread | None = None) -> Log:
     """The log with one gross fault undone."""
     if one.effect.name == "integer_second_slip":
-        return unslipped(log, float(one.values["seconds"]))
+        seconds = float(one.values["seconds"])
+        return unslipped(log, seconds) if reread is None else reread(seconds)
     return undone(log, one.sensor, one.stage, str(one.values["convention"]))
 
 
@@ -123,25 +128,28 @@ def gross_faults(
     known: Sequence[Acting],
     expected_m: float,
     exclude: Sequence[str] = (),
+    reread: Reread | None = None,
 ) -> tuple[tuple[Gross, ...], Log]:
     """Gross faults of a log, and the log with them undone.
 
-    expected_m: usual length of the error vector that the spec's noise makes.
+    expected_m: usual length of the error vector that the spec's noise makes.  reread: gives the
+    log anew with the positions' stamps set back by so many seconds; None where one file holds it.
     """
     found: list[Gross] = []
     while len(found) < MOST:
         thin = log.rows(slice(None, None, max(1, len(log) // ROWS)))
-        size = usual_size(scene(system, thin, known).error())
+        base = scene(system, thin, known)
+        size = usual_size(base.error())
         if not size > FAR_FROM_NOISE * expected_m:
             break
         taken = [g.acting.label for g in found]
-        trials = _trials(system, log, thin, known, taken, exclude)
+        trials = _trials(system, log, base, taken, exclude)
         sizes = [(usual_size(trial()), k, one) for k, (one, trial) in enumerate(trials)]
         best, _, one = min(sizes, key=lambda entry: entry[:2], default=(size, 0, None))
         if one is None or not best < FALLS_TO * size:
             break
         found.append(Gross(one, size / max(best, 1e-300)))
-        log = mended(log, one)
+        log = mended(log, one, reread)
     return tuple(found), log
 
 
@@ -151,14 +159,12 @@ Trials = list[tuple[Acting, Callable[[], Array]]]
 def _trials(
     system: System,
     log: Log,
-    thin: Log,
-    known: Sequence[Acting],
+    base: Scene,
     taken: Sequence[tuple[str, str, int]],
     exclude: Sequence[str],
 ) -> Trials:
     """Every gross fault with a function that re-simulates the log under it."""
     trials: Trials = []
-    base = scene(system, thin, known)
     for k, stage in enumerate(system.stages):
         sensors = (
             ("position",) if log.kind == "position" else registry()["frame_convention"].sensors
@@ -170,7 +176,7 @@ def _trials(
                 values: dict[str, float] = {"convention": convention}  # type: ignore[dict-item]
                 one = acting("frame_convention", sensor, k, values)
                 if one.label not in taken:
-                    trials.append((one, _reread(system, thin, sensor, k, convention, known)))
+                    trials.append((one, _reread(system, base, sensor, k, convention)))
     if ("integer_second_slip", "position", 0) not in taken:
         for seconds in SECONDS:
             one = acting("integer_second_slip", "position", 0, {"seconds": float(seconds)})
@@ -179,9 +185,9 @@ def _trials(
 
 
 def _reread(
-    system: System, thin: Log, sensor: Target, stage: int, convention: str, known: Sequence[Acting]
+    system: System, base: Scene, sensor: Target, stage: int, convention: str
 ) -> Callable[[], Array]:
-    return lambda: scene(system, undone(thin, sensor, stage, convention), known).error()
+    return lambda: scene(system, undone(base.log, sensor, stage, convention), base.known).error()
 
 
 def _slipped(base: Scene, one: Acting) -> Callable[[], Array]:

@@ -18,6 +18,7 @@ from syncline_design.diagnose.columns import (
     TIME,
     VELOCITY,
 )
+from syncline_design.diagnose.derivatives import derived_velocity
 from syncline_design.diagnose.log import Track
 from syncline_design.diagnose.tables import Table, refuse
 from syncline_design.effects.base import Array
@@ -33,11 +34,15 @@ class Merged:
     columns: Mapping[str, Array]
     tracks: Mapping[str, Track]  # "PREFIXvelocity" or "PREFIXrate"
     notes: tuple[str, ...]
+    follows_position: bool = False
 
 
 def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
     """Interpolate every other file to the stamps of the file that sets the rows."""
     tables = [in_order(t) for t in tables]
+    follows = _needs_velocity(tables, prefixes[0])
+    if follows is not None:
+        tables = [_with_velocity(t, prefixes[0]) if t is follows else t for t in tables]
     base = _base(tables, prefixes)
     columns: dict[str, Array] = dict(base.columns)
     tracks: dict[str, Track] = {}
@@ -61,7 +66,28 @@ def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
                 found=f"{table.columns[TIME][0]:.3f} to {table.columns[TIME][-1]:.3f} s",
                 hint="are both files on the same time scale?",
             )
-    return Merged(columns, tracks, tuple(notes))
+    return Merged(columns, tracks, tuple(notes), follows is not None)
+
+
+def _needs_velocity(tables: Sequence[Table], prefix: str) -> Table | None:
+    """The file of antenna positions, if nothing else can tell the velocity at a high rate."""
+    if any(prefix + VELOCITY[0] in t.columns for t in tables):
+        return None
+    holds = [t for t in tables if all(prefix + n in t.columns for n in POSITION)]
+    reference = [t for t in tables if all(n in t.columns for n in REFERENCE)]
+    if not holds or (reference and len(reference[0]) >= len(holds[0])):
+        return None
+    return holds[0]
+
+
+def _with_velocity(table: Table, prefix: str) -> Table:
+    place = np.stack([table.columns[prefix + n] for n in POSITION], axis=1)
+    kept = np.all(np.isfinite(place), axis=1)
+    columns = {name: values[kept] for name, values in table.columns.items()}
+    slope = derived_velocity(columns[TIME], place[kept])
+    columns |= {prefix + n: slope[:, k] for k, n in enumerate(VELOCITY)}
+    note = f"velocity was derived from the positions of {table.path.name}, smoothed over 1 s"
+    return Table(table.path, columns, table.header, (*table.notes, note))
 
 
 def in_order(table: Table) -> Table:

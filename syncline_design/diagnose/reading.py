@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -41,6 +41,7 @@ class _Draft:
     columns: dict[str, Array]
     tracks: Mapping[str, Track]
     notes: list[str] = field(default_factory=list)
+    follows_position: bool = False
 
     def vectors(self, names: Sequence[str]) -> Array:
         return np.stack([self.columns[n] for n in names], axis=1)
@@ -54,13 +55,17 @@ def read_log(
     stages: Sequence[str],
     mapping: Mapping[str, str] | None = None,
     needs_ranging: bool = True,
+    slip_s: float = 0.0,
 ) -> Log:
     """Read one log, from one file or several, for a system of these stages.
 
     needs_ranging: whether the spec has ranging sensors; it decides what is said to be missing.
+    slip_s: by how much the stamps of a file of positions are ahead; they are set back.
     """
     prefixes = [f"{name}_" for name in stages] if len(stages) > 1 else [""]
     tables = [read_table(Path(p), mapping or {}, tuple(stages)) for p in paths]
+    if slip_s and len(tables) > 1:
+        tables = [_set_back(t, prefixes[0], slip_s) for t in tables]
     rejected = _time_faults(tables)
     read = len(tables[0]) if len(tables) == 1 else 0
     draft = _draft(tables, prefixes)
@@ -79,6 +84,13 @@ def read_log(
             found=f"{len(draft.columns[TIME])} of {read}",
         )
     return _log(draft, stages, prefixes, kind, read, rejected)
+
+
+def _set_back(table: Table, prefix: str, slip_s: float) -> Table:
+    """A file of antenna positions with its stamps set back; others as they are."""
+    if not any(prefix + name in table.columns for name in (POSITION[0], GEODETIC[0])):
+        return table
+    return replace(table, columns={**table.columns, TIME: table.columns[TIME] - slip_s})
 
 
 def _time_faults(tables: Sequence[Table]) -> dict[str, int]:
@@ -119,7 +131,14 @@ def _draft(tables: Sequence[Table], prefixes: Sequence[str]) -> _Draft:
         return _Draft(only.path, only.header, dict(only.columns), {}, list(only.notes))
     joined = merged(tables, prefixes)
     header = tuple(name for table in tables for name in table.header)
-    return _Draft(tables[0].path, header, dict(joined.columns), joined.tracks, list(joined.notes))
+    return _Draft(
+        tables[0].path,
+        header,
+        dict(joined.columns),
+        joined.tracks,
+        list(joined.notes),
+        joined.follows_position,
+    )
 
 
 def _make_local(draft: _Draft, prefixes: Sequence[str]) -> None:
@@ -292,7 +311,7 @@ def _velocity(
                 found=f"{fastest:.4g} m/s",
                 hint="is the unit in the column's name right?",
             )
-        return velocity, False
+        return velocity, draft.follows_position
     reference = draft.vectors(REFERENCE) if kind == "position" else None
     if reference is not None and np.all(np.isfinite(reference)):
         draft.notes.append(f"velocity of {name} was derived from the reference positions")

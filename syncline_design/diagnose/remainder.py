@@ -4,9 +4,9 @@ Families of regressors: quadratic functions of the covariates along NED and leve
 ways in which any motion-linked error can point (along the antenna's velocity, along the sweep of
 the lever, across the heading, along the beam, along the acceleration) times smooth functions of
 time, heading, bearing, speed and turn rate; and the named effects' own signatures in separate
-regimes, as a right effect has the same parameters in all of them.  Their whitened energy, freed of the effects already
-in the model, is chi-square when only noise is left; circular shifts of the whitened error against
-the regressors show how large it is for this noise anyhow.
+regimes, as a right effect has the same parameters in all of them.  Their whitened energy, freed of
+the effects already in the model, is chi-square when only noise is left; circular shifts of the
+whitened error against the regressors show how large it is for this noise anyhow.
 """
 
 from __future__ import annotations

@@ -65,6 +65,7 @@ def diagnose_measured(
         inputs.known,
         expected_size(inputs),
         settings.exclude_effects,
+        inputs.reread,
     )
     view = scene(inputs.system, log, inputs.known)
     parts = directed_parts(view, candidates(view, settings.exclude_effects))

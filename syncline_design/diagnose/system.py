@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from syncline_design.diagnose.gross import mended
+from syncline_design.diagnose.gross import Reread, mended
 from syncline_design.diagnose.log import Log
 from syncline_design.diagnose.reading import read_log
 from syncline_design.diagnose.simulation import Acting
@@ -26,6 +26,7 @@ class Measured:
     log: Log
     known: tuple[Acting, ...]
     files: tuple[str, ...] = ()
+    reread: Reread | None = None
 
 
 def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
@@ -35,7 +36,12 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
     mapping = loaded.spec.log.columns if loaded.spec.log else {}
     ranges = system.stages[-1].ranging is not None
     files = list(paths) or own_files(loaded)
-    log = read_log(files, names, mapping, ranges)
+
+    def read(slip_s: float) -> Log:
+        return read_log(files, names, mapping, ranges, slip_s)
+
+    log = read(0.0)
+    reread = read if len(files) > 1 else None
     system = System(
         system.stages[: len(log.stages)],
         system.coverage_factor,
@@ -46,9 +52,9 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
     known = known_effects(system)
     for one in known:
         if one.effect.kind == "discrete":
-            log = mended(log, one)
+            log = mended(log, one, reread)
     kept = tuple(one for one in known if one.effect.kind != "discrete")
-    return Measured(system, log, kept, tuple(path.name for path in files))
+    return Measured(system, log, kept, tuple(path.name for path in files), reread)
 
 
 def own_files(loaded: LoadedSpec) -> list[Path]:
