@@ -263,14 +263,11 @@ WIDE, NARROW = ("light", 1280), ("dark", 400)
     [
         (lambda: render_verdict(samples.fixed_wing()), WIDE),
         (lambda: render_verdict(samples.fixed_wing()), NARROW),
-        (lambda: render_verdict(samples.failing()), NARROW),
-        (lambda: render_verdict(samples.infeasible()), WIDE),
         (lambda: render_verdict(samples.infeasible()), NARROW),
         (lambda: render_verdicts([samples.fixed_wing(), samples.failing()]), NARROW),
         (lambda: render_reproduction(samples.reproduction()), NARROW),
         (lambda: render_simulation(samples.simulation()), NARROW),
         (lambda: render_diagnosis(samples.diagnosis()), WIDE),
-        (lambda: render_diagnosis(samples.diagnosis()), NARROW),
     ],
 )
 def test_axe_finds_nothing(

@@ -119,16 +119,13 @@ def test_missing_parts_are_left_out() -> None:
     assert "unlimited" in page.text
 
 
-@pytest.mark.parametrize("key", sorted(samples.fixed_wing()))
-def test_any_part_may_be_missing_or_null(key: str) -> None:
-    for change in ("drop", "null"):
-        verdict = samples.fixed_wing()
-        if change == "drop":
-            del verdict[key]
-        else:
-            verdict[key] = None
-        page = Page(render_verdict(verdict))
-        assert page.unbalanced == []
+@pytest.mark.parametrize("start", range(5))
+def test_any_part_may_be_missing_or_null(start: int) -> None:
+    """Every key once null, once absent, a fifth of them at a time."""
+    keys = sorted(samples.fixed_wing())[start::5]
+    without = {k: v for k, v in samples.fixed_wing().items() if k not in keys}
+    for verdict in (without, without | dict.fromkeys(keys)):
+        assert Page(render_verdict(verdict)).unbalanced == []
 
 
 def _leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
@@ -140,12 +137,12 @@ def _leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 
 def test_any_optional_leaf_may_be_null() -> None:
-    """Every key below the first level set to null in one of ten passes: never a crash."""
+    """Every key below the first level set to null in one of seven passes: never a crash."""
     full = samples.fixed_wing()
     paths = [path for path in _leaves(full) if len(path) > 1]
-    for start in range(10):
+    for start in range(7):
         verdict = copy.deepcopy(full)
-        for path in paths[start::10]:
+        for path in paths[start::7]:
             holder: Any = verdict
             for step in path[:-1]:
                 holder = holder[step] if holder is not None else None
@@ -181,7 +178,7 @@ def test_failing_verdict_shows_word_and_symbol() -> None:
     assert "87.8\u00a0% over" in page.text
 
 
-@pytest.mark.parametrize("text", [*samples.HOSTILE, "".join(samples.HOSTILE)])
+@pytest.mark.parametrize("text", [*samples.HOSTILE[:3], "".join(samples.HOSTILE)])
 def test_hostile_text_stays_text(text: str) -> None:
     html = render_verdict(samples.with_hostile_text(text))
     page = Page(html)
@@ -203,7 +200,7 @@ def test_hostile_text_is_literal_in_figures(text: str) -> None:
     assert visible(text)[:30] in texts
 
 
-@pytest.mark.parametrize("make", [samples.fixed_wing, samples.infeasible, samples.two_stages])
+@pytest.mark.parametrize("make", [samples.fixed_wing, samples.infeasible])
 def test_same_input_same_bytes(make: Any) -> None:
     assert render_verdict(make()) == render_verdict(make())
 
