@@ -61,9 +61,8 @@ def _entry_text(section: str, identity: str, entry: Entry) -> str:
         for key, value in _figures(entry)
     ]
     lines = [f"{identity} ({section}): {visible(entry.name)}", *table(rows)]
-    for label in ("source", "note"):
-        if text := getattr(entry, label):
-            lines.append(f"  {label}: {visible(text)}")
+    told = [(label, getattr(entry, label)) for label in ("source", "note")]
+    lines += [f"  {label}: {visible(text)}" for label, text in told if text]
     return "\n".join(lines) + "\n"
 
 
