@@ -11,6 +11,7 @@ Source: Rue and Held, Gaussian Markov Random Fields (2005), ch. 2; Woodbury's id
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,7 +71,7 @@ class Precision:
     def negative_log_likelihood(self, error: Array) -> float:
         """-log N(e; 0, C) [nat], e (n, 3)."""
         squares = float(np.sum(error * self.solve(error[:, :, None])[:, :, 0]))
-        return 0.5 * (squares + self.log_determinant + error.size * np.log(2.0 * np.pi))
+        return 0.5 * (squares + self.log_determinant + error.size * math.log(2.0 * math.pi))
 
 
 def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array) -> Precision:

@@ -224,7 +224,7 @@ def solve_scaled(normal: Array, right: Array) -> Array:
     """Solve normal x = right with columns scaled alike; directions the log cannot see stay put."""
     scale = _scale(normal)
     scaled = normal / scale[:, None] / scale
-    solution: Array = np.linalg.lstsq(scaled, right / scale, rcond=1e-10)[0] / scale
+    solution: Array = np.asarray(np.linalg.lstsq(scaled, right / scale, rcond=1e-10)[0]) / scale
     return solution
 
 
@@ -237,5 +237,6 @@ def _scale(normal: Array) -> Array:
 def inverse_scaled(normal: Array) -> Array:
     """Inverse of the normal matrix, columns scaled alike first."""
     scale = _scale(normal)
-    inverse: Array = np.linalg.pinv(normal / scale[:, None] / scale, rcond=1e-12)
-    return inverse / scale[:, None] / scale
+    scaled = normal / scale[:, None] / scale
+    inverse: Array = np.asarray(np.linalg.pinv(scaled, rcond=1e-12)) / scale[:, None] / scale
+    return inverse

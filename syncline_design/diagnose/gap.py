@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +25,7 @@ BLOCKS = 5
 PURGE_S = 5.0  # left out on both sides of a held-out block
 PURGE_SHARE = 0.1  # of a block, at most
 REGIME_SHARE = 0.3  # fastest share of the rows, held out as a regime
+LEAST_GAP = 1e-9  # nat per sample
 LEAST_TRAINING = 30  # rows
 NORMAL_95 = 1.959963984540054
 
@@ -160,19 +160,12 @@ def gap(
         for name, sums in (("before", before), ("after", after), ("floor", floor)):
             totals[name] = totals[name] + sums
         saved.append((before.nll - after.nll) / before.samples)
-    fits = {name: sums.fit() for name, sums in totals.items()}
-    return Gap(**fits, **_closed(fits, saved))
-
-
-def _closed(fits: dict[str, Fit], saved: Sequence[float]) -> dict[str, float | None]:
-    whole = fits["before"].nll_per_sample - fits["floor"].nll_per_sample
-    part = fits["before"].nll_per_sample - fits["after"].nll_per_sample
+    before_fit, after_fit, floor_fit = (totals[n].fit() for n in ("before", "after", "floor"))
+    whole = before_fit.nll_per_sample - floor_fit.nll_per_sample
+    part_closed = before_fit.nll_per_sample - after_fit.nll_per_sample
     spread = float(np.std(saved, ddof=1) / np.sqrt(len(saved))) if len(saved) > 1 else 0.0
-    return {
-        "closed_fraction": part / whole if whole > 1e-9 else None,
-        "difference": part,
-        "difference_error": spread,
-    }
+    closed = part_closed / whole if whole > LEAST_GAP else None
+    return Gap(before_fit, after_fit, floor_fit, closed, part_closed, spread)
 
 
 def _step(known: Precision, columns: Array, error: Array) -> Array:

@@ -91,7 +91,7 @@ def mended(log: Log, one: Acting, reread: Reread | None = None) -> Log:
 
 
 def _position(antenna: Array, convention: str) -> Array:
-    flipped = antenna * np.array([1.0, 1.0, -1.0])
+    flipped: Array = antenna * np.array([1.0, 1.0, -1.0])
     return flipped[:, [1, 0, 2]] if convention == "enu" else flipped
 
 

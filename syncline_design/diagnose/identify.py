@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -65,7 +66,8 @@ def compare(data: Data, model: Model, index: int, others: Sequence[Signature]) -
         at = group.stop
         inverse = inverse_scaled(normal[group, group])
         cross = normal[0, group]
-        cosine = float(np.sqrt(max(cross @ inverse @ cross, 0.0) / max(length, 1e-300)))
+        inside = max(float(cross @ inverse @ cross), 0.0)
+        cosine = math.sqrt(inside / max(length, 1e-300))
         gain = 0.5 * float(score[group] @ inverse @ score[group])
         alias = Alias(s.candidate, min(cosine, 1.0), _gain_of_named(score, normal) - gain)
         if s.candidate.label not in best or best[s.candidate.label].loss > alias.loss:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.effects.base import Array
 
 Kind = Literal["georeference", "position"]
-Rows = NDArray[np.int64] | NDArray[np.bool_] | slice
+Rows = NDArray[np.signedinteger[Any]] | NDArray[np.bool_] | slice
 
 
 @dataclass(frozen=True, slots=True)

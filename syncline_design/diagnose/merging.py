@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.diagnose.columns import (
     ATTITUDE,
@@ -24,6 +25,7 @@ from syncline_design.diagnose.tables import Table, refuse
 from syncline_design.effects.base import Array
 from syncline_design.simulate.chain import euler_to_rotation, rotation_to_euler
 
+Index = NDArray[np.intp]
 REACH = 2.5  # intervals of the other file across which its values are still interpolated
 
 
@@ -145,7 +147,7 @@ def _slope_name(name: str) -> str:
     return ""
 
 
-def hermite(own: Array, values: Array, slope: Array | None, stamps: Array, right: Array) -> Array:
+def hermite(own: Array, values: Array, slope: Array | None, stamps: Array, right: Index) -> Array:
     """Cubic Hermite interpolation with known slopes, or with those of a parabola."""
     slopes = np.gradient(values, own) if slope is None else slope
     left = right - 1
@@ -161,7 +163,7 @@ def hermite(own: Array, values: Array, slope: Array | None, stamps: Array, right
     return result
 
 
-def _slerp(own: Array, euler: Array, stamps: Array, right: Array) -> Array:
+def _slerp(own: Array, euler: Array, stamps: Array, right: Index) -> Array:
     """Attitude at the stamps along the shortest turn between the neighbours, as Euler angles."""
     from scipy.spatial.transform import Rotation
 

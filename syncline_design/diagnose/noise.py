@@ -14,6 +14,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from syncline_design.diagnose.covariance import Precision, factored
+from syncline_design.diagnose.log import Rows
 from syncline_design.effects.base import Array
 
 Sensor = tuple[str, str]  # (stage, role)
@@ -69,7 +70,7 @@ class Structure:
     fixed: Array  # (n, 3, 3) [m2] what is known and not fitted: the spec's timing errors
     directed: tuple[Directed, ...] = ()
 
-    def rows(self, index: Array) -> Structure:
+    def rows(self, index: Rows) -> Structure:
         """The same structure on some of the rows."""
         return Structure(
             self.time_s[index],
@@ -216,7 +217,8 @@ class _Packing:
         values += [max(level.size[i], 1e-6) for i in self.free_sizes]
         logs = np.log(np.array(values))
         low, high = np.array(self.limits()).T
-        return np.clip(logs, low, high)
+        packed: Array = np.clip(logs, low, high)
+        return packed
 
     def limits(self) -> list[tuple[float, float]]:
         limits = [(np.log(FACTOR_LEAST), np.log(b)) for b in self.bounds.factor]

@@ -281,14 +281,18 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
     else:
         rate = derived_rate(time_s, euler)
         draft.notes.append(f"rates of {name} were derived from its attitude")
-    ranging = [draft.columns[prefix + n] if kind == "georeference" else None for n in RANGING]
+    distance, azimuth, elevation = (
+        draft.columns[prefix + n] if kind == "georeference" else None for n in RANGING
+    )
     return StageLog(
         name,
         antenna,
         euler,
         velocity,
         rate,
-        *ranging,
+        distance,
+        azimuth,
+        elevation,
         velocity_track=draft.tracks.get(prefix + "velocity"),
         rate_track=draft.tracks.get(prefix + "rate"),
         follows_position=follows,

@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from syncline_design.diagnose.candidates import slopes
@@ -29,6 +30,7 @@ from syncline_design.effects.kinematics import (
     sweep_velocity,
 )
 
+Shifts = NDArray[np.int64]
 SHIFTS = 60
 LOST = 1e-6  # share of a regressor's information below which the model's effects hold it all
 CELLS = 4  # regimes per covariate in which a named effect must have the same parameters
@@ -83,7 +85,7 @@ class _Tested:
     freedom: int
 
 
-def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Array) -> _Tested:
+def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Shifts) -> _Tested:
     """Energy of the residual on one family of regressors (n, 3, f)."""
     own = np.nan_to_num(slopes(data.view, model.acting))
     columns = np.concatenate([own, family], axis=2)

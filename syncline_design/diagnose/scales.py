@@ -21,9 +21,9 @@ def figure(value: float, uncertainty: float | None = None, unit: str = "") -> st
     if uncertainty is None or not uncertainty > 0.0 or not math.isfinite(uncertainty):
         return f"{shown:.4g} {name}".strip()
     spread = uncertainty / scale
-    places = max(0, 1 - math.floor(math.log10(spread))) if spread < 1e3 else 0
-    if f"{spread:.{places}f}".lstrip("0.")[:1] not in ("1", "2"):
-        places = max(0, places - 1)
+    mantissa, exponent = f"{spread:.1e}".split("e")
+    digits = 1 if float(mantissa) < 3.0 else 0  # two figures of 1.0 to 2.9, else one
+    places = max(0, digits - int(exponent))
     return f"{shown:.{places}f} ± {spread:.{places}f} {name}".strip()
 
 

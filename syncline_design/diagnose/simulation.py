@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from syncline_design import timing
-from syncline_design.diagnose.log import Log, StageLog, Track
+from syncline_design.diagnose.log import Log, Rows, StageLog, Track
 from syncline_design.diagnose.trajectory import LoggedMotion, pieces
 from syncline_design.effects import registry
 from syncline_design.effects.base import Array, Departures, Effect, StageRows, Target
@@ -64,7 +64,7 @@ class Scene:
             total[a.stage] = total[a.stage] + departed
         return total
 
-    def part(self, index: Array) -> Scene:
+    def part(self, index: Rows) -> Scene:
         """The scene on some of the rows (rising); the motions keep all of the log."""
         times = self.log.time_s[index]
         motions = tuple(replace(m, time_s=times) for m in self.motions)
@@ -72,7 +72,7 @@ class Scene:
         return Scene(self.system, self.log.rows(index), motions, rows, self.known)
 
 
-def cut_rows(rows: StageRows, index: Array) -> StageRows:
+def cut_rows(rows: StageRows, index: Rows) -> StageRows:
     """Some rows of a stage; lever arms stay as they are.
 
     Elapsed time counts from the first row of what an effect is given, so the first row is kept.

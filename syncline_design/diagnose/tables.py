@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 4 * 1024**3
 MOST_ROWS = 20_000_000
+_NO_NOTES: tuple[str, ...] = ()
 PACKED = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd", b"PK\x03\x04": "zip", b"BZh": "bzip2"}
 
 
@@ -55,7 +56,7 @@ def read_table(path: Path, mapping: Mapping[str, str], stages: tuple[str, ...]) 
     """Read one CSV or Parquet file; raises BadInput."""
     _demand_plain_file(path)
     if path.suffix.lower() in (".parquet", ".pq"):
-        frame, notes = _read_parquet(path), ()
+        frame, notes = _read_parquet(path), _NO_NOTES
     else:
         frame, notes = _read_csv(path)
     found = si_columns(frame.columns, mapping, known_names(stages))

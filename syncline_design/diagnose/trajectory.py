@@ -51,8 +51,9 @@ class SplinePieces:
 
     def _summed(self, piece: int, at_s: Array) -> Array:
         inside = np.clip(at_s, self.starts[piece], self.ends[piece])
-        total: Array = self.integrals[piece](inside)
-        return total + (at_s - inside)[:, None] * self.splines[piece](inside)
+        beyond = (at_s - inside)[:, None] * self.splines[piece](inside)
+        total: Array = self.integrals[piece](inside) + beyond
+        return total
 
     def _piecewise(self, at_s: Array, home_s: Array, rule: Any) -> Array:
         if len(self.splines) == 1:
