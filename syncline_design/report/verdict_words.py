@@ -188,7 +188,8 @@ def _platform_names(verdict: Json) -> list[str]:
 def _no_design_sentence(verdict: Json) -> str:
     problems = items(verdict, "problems")
     if problems:
-        return f"{len(problems)} problem(s) in the file; nothing was computed."
+        plural = "problem" if len(problems) == 1 else "problems"
+        return f"{len(problems)} {plural} in the file; nothing was computed."
     infeasibility = part(verdict, "infeasibility")
     conflict = [str(r.get("id")) for r in items(part(infeasibility, "conflict"), "requirements")]
     if conflict:
