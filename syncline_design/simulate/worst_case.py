@@ -215,18 +215,19 @@ class _Search:
     def _step(self, point: Array, stride: Array, value: Array, tau_s: Array) -> tuple[Array, Array]:
         """The best of several moves along the ascent direction or the last step, and its |e|."""
         target = self._target(point, value, tau_s)
-        onward = [self._admissible(point + much * stride) for much in _STRIDES]
-        moves = np.stack([*self._moves(point, target), *onward, point])
-        count, size, columns = moves.shape
-        flat = np.moveaxis(moves, 0, 1).reshape(size, count * columns)
+        moves = [point + much * stride for much in _STRIDES]
+        moves += [point + part * (target - point) for part in _MOVES]
+        moves += [*self._single_moves(point, target), point]
+        count, columns = len(moves), point.shape[1]
+        flat = self._admissible(np.concatenate(moves, axis=1))
         found = self.error_m(flat, np.tile(tau_s, count)).reshape(count, columns)
         best = np.nanargmax(found, axis=0)
         column = np.arange(columns)
-        return np.ascontiguousarray(moves[best, :, column].T), found[best, column]
+        return flat[:, best * columns + column], found[best, column]
 
-    def _moves(self, point: Array, target: Array) -> list[Array]:
-        """All blocks some of the way to their targets, and each block alone all of the way."""
-        moves = [self._admissible(point + part * (target - point)) for part in _MOVES]
+    def _single_moves(self, point: Array, target: Array) -> list[Array]:
+        """Each block alone all of the way to its target."""
+        moves = []
         for block in self.blocks:
             move = point.copy()
             move[block.rows] = target[block.rows]
