@@ -118,6 +118,29 @@ def test_a_killed_parent_resumes_and_ends_with_the_same_bytes(plain: Any, tmp_pa
     assert not [pid for pid in workers if Path(f"/proc/{pid}").exists()], "orphaned workers"
 
 
+@needs_proc
+def test_an_interrupt_ends_at_once_and_keeps_what_is_done(plain: Any, tmp_path: Path) -> None:
+    path, wanted = plain
+    store = tmp_path / "store"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "syncline_design.cli", "study", str(path), "--store", str(store)],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    deadline = time.monotonic() + 60
+    while len(list(store.glob("*/*.json"))) < 4 and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process.send_signal(signal.SIGINT)
+    stdout, stderr = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "Traceback" not in stdout + stderr
+    assert "interrupted" in stderr
+    kept = len(list(store.glob("*/*.json")))
+    assert 4 <= kept < 24
+    resumed = run_study(path, StudySettings(workers=2, store=store))
+    assert resumed.reused == kept
+    assert bytes_of(resumed) == wanted
+
+
 def test_unchanged_cases_are_not_computed_again(plain: Any) -> None:
     path, wanted = plain
     again = run_study(path, StudySettings(workers=2))

@@ -22,6 +22,7 @@ from syncline_design.study.summary import (
 )
 
 MOST_ROWS = 200
+MOST_ACROSS, MOST_DOWN = 8, 20  # of tables on the console
 _VERDICT_WORDS = {
     "meets": "meet their requirements",
     "fails": "do not meet them",
@@ -67,12 +68,15 @@ def study_text(result: StudyResult) -> str:
     lines = [f"{shown.mark} {visible(result.study.name)}: {shown.word}."]
     lines += [rule_sentence(result), ""]
     heat = heat_map(summary)
-    if heat is not None:
+    if heat is not None and len(heat.x_labels) <= MOST_ACROSS and len(heat.y_labels) <= MOST_DOWN:
         lines += [plain_table(heat_table(heat, _currency(result))), ""]
+    elif heat is not None:
+        size = f"{len(heat.x_labels)} by {len(heat.y_labels)} values"
+        lines += [f"Least cost over {size}: see --output html: or csv:", ""]
     lines += [plain_table(winners_table(summary)), ""]
-    ends = boundary_table(summary)
+    ends = boundary_table(summary, MOST_DOWN)
     if ends.rows:
-        lines += [plain_table(ends), ""]
+        lines += [plain_table(ends), *([f"  {ends.note}"] if ends.note else []), ""]
     retried = f", {result.retried} done again after a worker died" if result.retried else ""
     lines.append(
         f"{result.computed} cases computed, {result.reused} already there{retried}; "
@@ -129,20 +133,27 @@ def winners_table(summary: Summary) -> Table:
     return table("Which sensor and method wins where, of the cases that meet", heads, rows)
 
 
-def boundary_table(summary: Summary) -> Table:
-    """Where feasibility ends along each factor."""
-    found = boundaries(summary)
+def boundary_table(summary: Summary, most: int = MOST_ROWS) -> Table:
+    """Where feasibility ends along each factor; equal ends are one row."""
+    ends: dict[tuple[str, str, str, str], list[str]] = {}
+    for b in boundaries(summary):
+        fixed = "; ".join(f"{key} = {value}" for key, value in b.fixed)
+        ends.setdefault((b.factor, b.met, b.missed, b.why), []).append(fixed)
     rows = [
-        [
-            Cell(b.factor), Cell(b.met), Cell(b.missed), Cell(b.why),
-            Cell("; ".join(f"{key} = {value}" for key, value in b.fixed)),
-        ]
-        for b in found[:MOST_ROWS]
-    ]  # fmt: skip
-    more = len(found) - MOST_ROWS
+        [*map(Cell, end), Cell(_with_words(fixed), float(len(fixed)))]
+        for end, fixed in list(ends.items())[:most]
+    ]
+    more = len(ends) - most
     note = f"{more} further rows are left out." if more > 0 else ""
     heads = ["Along", "Last value that meets", "Next value", "There", "With"]
     return table("Where feasibility ends", heads, rows, note)
+
+
+def _with_words(fixed: list[str]) -> str:
+    """The combinations that share an end: up to three by name, of more the ends and the number."""
+    if len(fixed) <= 3:
+        return " | ".join(fixed)
+    return f"{len(fixed)} combinations, {fixed[0]} to {fixed[-1]}"
 
 
 def plain_table(shown: Table) -> str:
