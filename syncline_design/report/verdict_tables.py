@@ -37,7 +37,7 @@ def requirements(verdict: Json) -> Table:
         state = status_of(row)
         line = numbers.finite(row.get("line"))
         where = "implied" if row.get("implied") or not line else f"line {line:.0f}"
-        notes = [str(n) for n in (row.get("note"), _interval(row), waiver_text(row)) if n]
+        notes = [str(n) for n in (row.get("note"), _interval(row, verdict), waiver_text(row)) if n]
         rows.append((
             Cell(str(row.get("id"))),
             Cell(state.word, tone=state.tone, mark=state.mark),
@@ -53,12 +53,13 @@ def requirements(verdict: Json) -> Table:
     return table("Requirements", heads, rows)
 
 
-def _interval(row: Json) -> str:
+def _interval(row: Json, verdict: Json) -> str:
     low, high = row.get("low"), row.get("high")
     if numbers.finite(low) is None or numbers.finite(high) is None:
         return ""
     unit = str(row.get("unit") or "")
-    return f"95 % interval {numbers.in_unit(low, unit)} to {numbers.in_unit(high, unit)}"
+    confidence = numbers.percent(part(verdict, "monte_carlo").get("confidence") or 0.95)
+    return f"{confidence} interval {numbers.in_unit(low, unit)} to {numbers.in_unit(high, unit)}"
 
 
 def payload(verdict: Json) -> Table:
@@ -188,7 +189,8 @@ def quantiles(verdict: Json) -> Table:
             Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
             f"{numbers.length(entry.get('low_m'))} to {numbers.length(entry.get('high_m'))}",
         ))  # fmt: skip
-    heads = ("Quantile", "Error #", "95 % confidence interval")
+    confidence = part(verdict, "monte_carlo").get("confidence") or 0.95
+    heads = ("Quantile", "Error #", f"{numbers.percent(confidence)} confidence interval")
     return table("Quantiles of the simulated error", heads, rows)
 
 
