@@ -262,6 +262,8 @@ def _monte_carlo(data: Data) -> list[str]:
     worst = mc.get("worst_case")
     if worst:
         ratio = f"{worst['ratio_to_syncline']:.4f} of the Syncline"
+        if worst.get("bound_m") is not None:
+            ratio += f"; upper bound {_length(worst['bound_m'])}"
         rows.append(["worst case, directions free", _length(worst["value_m"]), ratio])
     return [*lines, *table(rows)]
 
