@@ -213,6 +213,48 @@ def test_a_catalog_figure_can_vary(tmp_path: Path) -> None:
     assert second - first == pytest.approx(5000.50, abs=1e-6)
 
 
+@pytest.mark.parametrize("first", ["platform", "distance"])
+def test_a_platform_and_its_distance_vary_in_any_order(tmp_path: Path, first: str) -> None:
+    lines = {
+        "platform": '  "stages[uav].platform": [uav_fixed_wing, uav_multi_rotor]',
+        "distance": '  "stages[uav].distance": [20 m, 30 m]',
+    }
+    grid = "\n".join(lines[key] for key in sorted(lines, key=lambda key: key != first))
+    path = write(tmp_path, f"study: 1\nname: P\nbase: spec.yaml\ngrid:\n{grid}\n")
+    study = load_study(path)
+    seen = set()
+    for index in range(4):
+        _, settings = study.case(index)
+        platform = study.bases[0].load(settings).spec.stages[0].platform
+        seen.add((platform.use, float(platform.distance or 0)))
+    assert seen == {(p, d) for p in ("uav_fixed_wing", "uav_multi_rotor") for d in (20.0, 30.0)}
+
+
+def test_lists_of_candidates_vary_as_a_whole(tmp_path: Path) -> None:
+    grid = '"timestamping.candidates": [[hardware], [gpio]]'
+    done = run_study(write(tmp_path, f"study: 1\nname: L\nbase: spec.yaml\ngrid: {{{grid}}}\n"))
+    methods = [
+        {role["timestamping"] for role in case.record["design"]["stages"][0]["roles"].values()}
+        for case in done.cases()
+    ]
+    assert methods == [{"hardware"}, {"gpio"}]
+    assert [case.labels["timestamping.candidates"] for case in done.cases()] == [
+        '["hardware"]', '["gpio"]',
+    ]  # fmt: skip
+
+
+def test_a_key_below_a_catalog_id_says_how_to_vary_the_catalog(tmp_path: Path) -> None:
+    grid = '"stages[uav].platform.use.cost": [1 EUR]'
+    with pytest.raises(BadInput, match=r"nothing can be set below.*vary a catalog entry"):
+        load_study(
+            write(
+                tmp_path,
+                f"study: 1\nname: L\nbase: spec.yaml\ngrid: {{{grid}}}\n",
+                SPEC.replace("platform: uav_fixed_wing", "platform: {use: uav_fixed_wing}"),
+            )
+        )
+
+
 def test_monte_carlo_runs_where_a_requirement_asks_for_it(tmp_path: Path) -> None:
     spec = SPEC.replace(
         "stages:",

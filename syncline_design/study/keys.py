@@ -121,7 +121,8 @@ def put(data: Any, path: KeyPath, value: Any) -> Any:
     if isinstance(data, str) and step in PLATFORM_KEYS:
         data = {"use": data}  # `platform: ID`, one key of it overridden
     if not isinstance(data, Mapping | None):
-        raise KeyPathError(f"nothing can be set below {data!r}", "a mapping of keys and values")
+        hint = "catalog.sensors[ID].KEY and the like vary a catalog entry"
+        raise KeyPathError(f"nothing can be set below {data!r}", "a mapping", hint)
     kept = dict(data or {})
     if not rest and step in _EXCLUDES:
         kept.pop(_EXCLUDES[str(step)], None)

@@ -45,8 +45,9 @@ class Base:
     def load(self, settings: Sequence[tuple[str, Any]]) -> LoadedSpec:
         """The spec with these key paths set; BadInput when the combination cannot be."""
         data, catalogs = self.document.data, self.catalogs
-        for key, value in settings:
-            path = self.paths[key]
+        # A whole mapping before its keys: a platform's id must not undo its distance.
+        placed = sorted(((self.paths[key], value) for key, value in settings), key=_depth)
+        for path, value in placed:
             if path[0] == CATALOG:
                 catalogs = override_entry(catalogs, path, value, self.document)
             else:
@@ -88,6 +89,10 @@ class Study:
             rest, place = divmod(rest, len(factor.values))
             chosen.append((factor.key, factor.values[place]))
         return rest, (*reversed(chosen), *drawn)
+
+
+def _depth(setting: tuple[KeyPath, Any]) -> int:
+    return len(setting[0])
 
 
 def load_study(path: str | Path) -> Study:
@@ -304,7 +309,7 @@ def _value_problems(base: Base, key: str, value: Any) -> list[Problem]:
     try:
         data = put(base.document.data, path, value)
     except KeyPathError as error:
-        return [problem_at(base.document, (), error.message, error.expected)]
+        return [problem_at(base.document, (), error.message, error.expected, hint=error.hint)]
     document = _with_data(base.document, data)
     _, found = validate(Spec, document)
     return found + unknown_ids(document, base.catalogs)
