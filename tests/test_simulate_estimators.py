@@ -160,7 +160,7 @@ def test_rays_give_the_distribution_of_a_gaussian_vector() -> None:
     found = Rays(*(x.reshape(16, 1024) for x in flat))
     law = stats.ncx2(3, float(np.sum(m**2)) / s**2)
     for q in (0.2, 0.9, 1.0, 1.7, 3.0):
-        share, density = found.probability(np.full(16, q))
+        share, density = found.probability(q)
         assert share.mean() == pytest.approx(law.cdf((q / s) ** 2), abs=2e-4)
         # a sphere that leaves the mean outside is met by few rays, some of them grazing it
         exact, rough = law.pdf((q / s) ** 2) * 2 * q / s**2, 0.1 if q < 0.97 else 0.02

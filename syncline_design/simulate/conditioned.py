@@ -53,15 +53,14 @@ class Rays:
     b: Array
     c: Array
 
-    def probability(self, q_m: Array) -> tuple[Array, Array]:
-        """(P(|error| <= q), its derivative by q) of each copy, q (copies,).
+    def probability(self, q_m: float) -> tuple[Array, Array]:
+        """(P(|error| <= q), its derivative by q) of each copy, (copies,).
 
         The sphere of radius q cuts a line at s1 <= s2; between them lies half the difference of
         sign(s) P(chi_3 <= |s|).
         """
-        q = q_m[:, None]
         square = self.b * self.b
-        square -= self.a * (self.c - q * q)
+        square -= self.a * (self.c - q_m * q_m)
         hits = square > 0.0
         root = np.sqrt(np.where(hits, square, 1.0))
         ends = np.stack([-root, root])
@@ -85,22 +84,26 @@ class Rays:
         return shares
 
     def quantile(self, quantile: float) -> Array:
-        """The quantile [m] of each copy, (copies,): Newton's method inside a bracket."""
-        spread = np.sqrt(self.c.mean(axis=1) + 3.0 * self.a.mean(axis=1))
-        low, high = np.zeros_like(spread), 40.0 * spread + 1e-300
-        q = spread
-        for _ in range(60):
-            inside, slope = self.probability(q)
-            above = inside >= quantile
-            low, high = np.where(above, low, q), np.where(above, q, high)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = q - (inside - quantile) / slope
-            usable = (step > low) & (step < high)
-            last, q = q, np.where(usable, step, 0.5 * (low + high))
-            if np.all(np.abs(q - last) <= 1e-6 * q):
+        """The quantile [m] of all copies together, as values (copies,) that average to it.
+
+        q solves mean F_c(q) = p, by Newton's method inside a bracket; copy c's value is
+        q + (p - F_c(q)) / f, f the mean density there, so that the values' spread is that of q
+        to first order.  (Solving copy by copy would bias q, as each holds few points.)
+        """
+        q = math.sqrt(float(self.c.mean()) + 3.0 * float(self.a.mean()))
+        low, high = 0.0, 40.0 * q + 1e-300
+        for _ in range(80):
+            shares, slopes = self.probability(q)
+            missing, slope = quantile - float(shares.mean()), float(slopes.mean())
+            low, high = (low, q) if missing <= 0.0 else (q, high)
+            step = missing / slope if slope > 0.0 else math.inf
+            if abs(step) <= 1e-6 * q or high - low <= 1e-12 * high:
                 break
-        found: Array = q
-        return found
+            q = q + step if low < q + step < high else 0.5 * (low + high)
+        if not slope > 0.0:
+            return np.full(shares.shape, q)
+        values: Array = q + (quantile - shares) / slope
+        return values
 
 
 def rays(system: System, settings: SimulationSettings, points: int, group: int) -> Rays:
@@ -138,8 +141,7 @@ def conditioned_monte_carlo(
         quantiles.append(QuantileEstimate(quantile, *_interval(copies, settings.confidence)))
     within = None
     if settings.limit_m is not None:
-        target = np.full(COPIES, settings.limit_m)
-        copies = np.concatenate([group.probability(target)[0] for group in drawn])
+        copies = np.concatenate([group.probability(settings.limit_m)[0] for group in drawn])
         shares = (min(max(x, 0.0), 1.0) for x in _interval(copies, settings.confidence))
         within = ProportionEstimate(settings.limit_m, *shares)
     return MonteCarlo(
@@ -180,7 +182,7 @@ def _effective_samples(drawn: list[Rays], quantiles: tuple[float, ...]) -> int:
     p = 0.95 if 0.95 in quantiles or not quantiles else quantiles[-1]
     found = [group.quantile(p) for group in drawn]
     copies = np.concatenate(found)
-    middle = np.full(COPIES, copies.mean())
+    middle = float(copies.mean())
     density = float(np.mean([group.probability(middle)[1].mean() for group in drawn]))
     error = float(copies.std(ddof=1)) / math.sqrt(copies.shape[0])
     spread = (density * error) ** 2
@@ -192,7 +194,7 @@ def _histogram(group: Rays, bins: int = 60) -> Histogram:
     group = Rays(*(part[:, :64] for part in (group.a, group.b, group.c)))
     top = float(group.quantile(0.9999).mean())
     edges = np.linspace(0.0, top if top > 0.0 else 1.0, bins + 1)
-    share = [float(group.probability(np.full(COPIES, edge))[0].mean()) for edge in edges]
+    share = [float(group.probability(float(edge))[0].mean()) for edge in edges]
     density = np.diff(share) / np.diff(edges)
     return Histogram(tuple(float(e) for e in edges), tuple(float(d) for d in density))
 

@@ -9,6 +9,7 @@ from the tangent of its half, and small angles from their series.
 from __future__ import annotations
 
 import math
+from bisect import bisect_left
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,8 +82,8 @@ def norm(vector: Array) -> Array:
 
 
 def cross(first: Array, second: Array) -> Array:
-    """first x second of (3, n) columns."""
-    out = np.empty(np.broadcast_shapes(first.shape, second.shape))
+    """first x second of (3, n) columns, or (3, k, n) ones, one of which may have k = 1."""
+    out = np.empty(first.shape if first.size >= second.size else second.shape)
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         np.multiply(first[j], second[k], out=out[i])
         out[i] -= first[k] * second[j]
@@ -92,19 +93,30 @@ def cross(first: Array, second: Array) -> Array:
 def series(square: Array, start: int, largest: float) -> Array:
     """sum over k of (-x)^k / (2k + start)!, x = a^2 [rad^2] >= 0, any shape.
 
-    start 1: sin a / a; 2: (1 - cos a) / a^2; 3: (a - sin a) / a^3.  Cut where the first term
-    left out is below 1e-15 of the whole for x up to `largest`.
+    start 1: sin a / a; 2: (1 - cos a) / a^2; 3: (a - sin a) / a^3.  Cut where the first term left
+    out is below 1e-15 of the whole for x up to `largest`, at most _SERIES_LIMIT.
     """
-    terms = 1
-    while largest**terms * math.factorial(start) > _SERIES_ERROR * math.factorial(
-        2 * terms + start
-    ):
-        terms += 1
-    total = np.full_like(square, (-1) ** (terms - 1) / math.factorial(2 * terms - 2 + start))
-    for k in range(terms - 2, -1, -1):
+    terms = 2 + bisect_left(_ENOUGH[start], largest)
+    last, *others = _COEFFICIENTS[start][terms - 1 :: -1]
+    total: Array = square * last
+    for coefficient in others[:-1]:
+        total += coefficient
         total *= square
-        total += (-1) ** k / math.factorial(2 * k + start)
+    total += others[-1]
     return total
+
+
+_COEFFICIENTS = {
+    start: tuple((-1) ** k / math.factorial(2 * k + start) for k in range(12))
+    for start in (1, 2, 3)
+}
+_ENOUGH = {  # largest x for which 2, 3, ... terms are enough
+    start: tuple(
+        (_SERIES_ERROR * math.factorial(2 * terms + start) / math.factorial(start)) ** (1 / terms)
+        for terms in range(2, 11)
+    )
+    for start in (1, 2, 3)
+}
 
 
 def rotation_terms(square: Array, terms: int = 3) -> tuple[Array, ...]:

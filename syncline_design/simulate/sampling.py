@@ -22,7 +22,7 @@ from syncline_design.simulate.draws import RandomSource, generator, stage_draw, 
 from syncline_design.simulate.kernel import norm
 from syncline_design.simulate.settings import SimulationSettings, demand_simulable
 
-JOB = 8192  # samples: what a job works on stays in the second-level cache
+JOB = 16384  # samples: what a job works on stays in the second-level cache
 PLAIN_STREAM = 1  # first word of the stream key, see draws.generator
 Consume = Callable[[int, Array], None]
 
