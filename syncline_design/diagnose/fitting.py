@@ -29,6 +29,7 @@ from syncline_design.effects.base import Array
 NOISE_ROWS = 800  # rows on which the noise is fitted; stretches spread over the whole log
 POLISH_ROWS = 3000
 STRETCH = 80
+WINDOW = 500
 FIRST_TIMES_S = (None, 3.0, 30.0)
 LONG, SHORT = 25, 10  # iterations of a noise fit from scratch, and from a good start
 
@@ -48,19 +49,19 @@ class Data:
         return np.nan_to_num(self.view.error(acting))
 
 
-def stretches(rows: int, most: int = NOISE_ROWS) -> NDArray[np.int64]:
-    """Indices of contiguous stretches spread over a log, `most` rows at most."""
-    if rows <= most:
-        return np.arange(rows)
-    count = most // STRETCH
-    starts = np.linspace(0, rows - STRETCH, count).astype(np.int64)
-    return (starts[:, None] + np.arange(STRETCH)).ravel()
-
-
 def data_of(view: Scene, structure: Structure) -> Data:
     """A scene ready for fitting."""
-    index = stretches(len(view))
+    index = windows(len(view), NOISE_ROWS, STRETCH)
     return Data(view, structure, index, structure.rows(index))
+
+
+def windows(rows: int, most: int, length: int) -> NDArray[np.int64]:
+    """Contiguous windows of rows spread evenly over a log, the first row among them."""
+    if rows <= most:
+        return np.arange(rows)
+    count = max(most // length, 1)
+    starts = np.linspace(0, rows - length, count).astype(np.int64)
+    return np.unique((starts[:, None] + np.arange(length)).ravel())
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,9 +148,20 @@ def fit(
     return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
 
 
+def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:
+    """Data and model on windows of the rows, for tests with many regressors."""
+    index = windows(len(data.view), most, WINDOW)
+    if index.shape[0] == len(data.view):
+        return data, model
+    structure = data.structure.rows(index)
+    fewer = data_of(data.view.part(index), structure)
+    known = precision(structure, model.level)
+    return fewer, replace(model, error=model.error[index], precision=known)
+
+
 def polished(data: Data, model: Model) -> Model:
     """The model with its noise fitted on POLISH_ROWS rows, for the final figures."""
-    index = stretches(len(data.view), POLISH_ROWS)
+    index = windows(len(data.view), POLISH_ROWS, STRETCH)
     fine = replace(data, noise_rows=index, noise_structure=data.structure.rows(index))
     return fit(fine, model.acting, model.opened, start=model.level)
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from syncline_design.diagnose.candidates import slopes
-from syncline_design.diagnose.fitting import Data, Model, inner, inverse_scaled
+from syncline_design.diagnose.fitting import Data, Model, inner, inverse_scaled, thinned
 from syncline_design.diagnose.regimes import covariates, level_axes
 from syncline_design.diagnose.simulation import Scene
 from syncline_design.effects.base import Array
@@ -31,6 +31,7 @@ from syncline_design.effects.kinematics import (
 )
 
 Shifts = NDArray[np.int64]
+MOST_ROWS = 6000  # of a longer log, windows
 SHIFTS = 60
 LOST = 1e-6  # share of a regressor's information below which the model's effects hold it all
 CELLS = 4  # regimes per covariate in which a named effect must have the same parameters
@@ -61,6 +62,7 @@ class Remainder:
 
 def remainder(data: Data, model: Model, rng: np.random.Generator) -> Remainder:
     """Test what a model leaves."""
+    data, model = thinned(data, model, MOST_ROWS)
     residual = model.precision.solve(model.error[:, :, None])[:, :, 0]
     n = len(data.view)
     shifts = rng.integers(max(n // 10, 1), max(n * 9 // 10, 2), SHIFTS)

@@ -14,12 +14,13 @@ from syncline_design.diagnose.candidates import candidates, directed_parts
 from syncline_design.diagnose.expected_noise import structure_of
 from syncline_design.diagnose.figures_data import plots
 from syncline_design.diagnose.findings import findings
-from syncline_design.diagnose.fitting import Data, data_of
+from syncline_design.diagnose.fitting import WINDOW, Data, data_of, windows
 from syncline_design.diagnose.gap import Gap, block_folds, gap, regime_fold
 from syncline_design.diagnose.gross import gross_faults
 from syncline_design.diagnose.identify import unseen
 from syncline_design.diagnose.log import Log
 from syncline_design.diagnose.regimes import (
+    covariates,
     first_disagreement_s,
     strongest,
     where_map,
@@ -32,6 +33,7 @@ from syncline_design.diagnose.simulation import scene
 from syncline_design.diagnose.system import Measured, measured
 from syncline_design.loading import LoadedSpec, load
 
+MOST_ROWS = 20_000  # of a longer log, windows spread over it are worked on
 REMAINDER_SHARE = 0.2  # of the false-alarm rate: for the test of what remains
 
 
@@ -67,7 +69,8 @@ def diagnose_measured(
         settings.exclude_effects,
         inputs.reread,
     )
-    view = scene(inputs.system, log, inputs.known)
+    kept = windows(len(log), MOST_ROWS, WINDOW)
+    view = scene(inputs.system, log.rows(kept), inputs.known)
     parts = directed_parts(view, candidates(view, settings.exclude_effects))
     data = data_of(view, structure_of(view, parts))
     progress("searching", 0.15)
@@ -96,7 +99,7 @@ def diagnose_measured(
         placebo=_placebo(data, search, result, left),
         steps=_stairs(data, result, left),
         unseen=_unseen(data, search, result),
-        log=log_json(inputs.log),
+        log=log_json(inputs.log) | {"fitted": len(view), "motion": _motion_json(data)},
         noise=_noise_json(data, result),
         plots=plots(data, result, cells),
         spec=None if loaded is None else {"name": loaded.spec.name, "file": str(loaded.path)},
@@ -153,6 +156,16 @@ def log_json(log: Log) -> Json:
         "notes": list(log.notes),
         "duration_s": log.duration_s,
         "interval_s": log.interval_s,
+    }
+
+
+def _motion_json(data: Data) -> Json:
+    """How the log moves: 5 and 95 % quantile of every covariate but time and angles."""
+    return {
+        c.name: {"low": float(low), "high": float(high), "unit": c.unit}
+        for c in covariates(data.view)
+        if c.name in ("speed", "turn_rate", "range")
+        for low, high in [np.quantile(c.values, [0.05, 0.95])]
     }
 
 

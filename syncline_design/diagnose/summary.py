@@ -19,7 +19,7 @@ def summary_text(diagnosis: Diagnosis) -> str:
     """Verdict, findings, gap, what remains and what this log could not show."""
     lines = [OPENING[diagnosis.verdict], ""]
     for number, finding in enumerate(diagnosis.findings, 1):
-        lines += _finding_lines(number, finding)
+        lines += _finding_lines(number, finding, diagnosis)
     lines += _gap_lines(diagnosis)
     if diagnosis.unexplained:
         lines += ["", "Where it remains:", *(_cell_line(c) for c in diagnosis.where_after)]
@@ -32,7 +32,7 @@ def summary_text(diagnosis: Diagnosis) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _finding_lines(number: int, finding: Finding) -> list[str]:
+def _finding_lines(number: int, finding: Finding, diagnosis: Diagnosis) -> list[str]:
     where = f"{finding.sensor}, {finding.stage}"
     lines = [
         f"{number}. {finding.sentence}.",
@@ -44,7 +44,11 @@ def _finding_lines(number: int, finding: Finding) -> list[str]:
         lines.append(f"   to separate them: {finding.effect.separated_by}")
     elif finding.excluded:
         names = ", ".join(_name(a) for a in finding.excluded[:3])
-        lines.append(f"   excluded: {names}")
+        varied = ", ".join(
+            f"{name.replace('_', ' ')} varied {m['low']:.3g} to {m['high']:.3g} {m['unit']}"
+            for name, m in diagnosis.log["motion"].items()
+        )
+        lines.append(f"   excluded: {names}; {varied}")
     return lines
 
 
@@ -88,6 +92,8 @@ def _cell_line(cell: Cell) -> str:
 def _log_lines(diagnosis: Diagnosis) -> list[str]:
     log = diagnosis.log
     lines = [f"Log: {log['used']} of {log['rows']} rows used, {log['kind']}."]
+    if log["fitted"] < log["used"]:
+        lines.append(f"  worked on: {log['fitted']} rows, in windows spread over the log")
     lines += [f"  left out: {count} ({reason})" for reason, count in log["rejected"].items()]
     lines += [f"  {note}" for note in log["notes"]]
     return lines
