@@ -16,7 +16,14 @@ import pytest
 
 from study_specs import STUDY, write
 from syncline_design.report.studies import render_study
-from syncline_design.study import Progress, StudyError, StudyResult, StudySettings, run_study
+from syncline_design.study import (
+    Progress,
+    StudyError,
+    StudyResult,
+    StudySettings,
+    StudyStoppedError,
+    run_study,
+)
 from syncline_design.study.case import CaseSettings, canonical, case_keys
 from syncline_design.study.loading import load_study
 from syncline_design.study.pool import MAX_DEATHS, Pool
@@ -47,6 +54,13 @@ def children_of(pid: int) -> list[int]:
         if parent == pid and b"spawn_main" in command:
             found.append(int(folder.name))
     return found
+
+
+def command(path: Path, store: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", "syncline_design.cli", "study", str(path), "--store", str(store)],
+        capture_output=True, text=True, timeout=120, check=False,
+    )  # fmt: skip
 
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs Linux /proc")
@@ -204,7 +218,7 @@ def test_no_room_for_a_case_keeps_the_others(
         written.append(key)
 
     monkeypatch.setattr(Store, "write", full)
-    with pytest.raises(StudyError, match=r"No space left on device.*run again"):
+    with pytest.raises(StudyStoppedError, match=r"No space left on device.*run again"):
         run_study(path, StudySettings(workers=1))
     monkeypatch.undo()
     store = tmp_path / ".syncline-cases"
@@ -220,8 +234,13 @@ def _no_space(*_: Any) -> None:
 def test_a_folder_that_cannot_be_written_is_a_clear_error(tmp_path: Path) -> None:
     path = write(tmp_path)
     (tmp_path / "file").write_text("")
-    with pytest.raises(StudyError, match="cannot keep the results"):
-        run_study(path, StudySettings(store=tmp_path / "file" / "store"))
+    store = tmp_path / "file" / "store"
+    with pytest.raises(StudyStoppedError, match="cannot keep the results"):
+        run_study(path, StudySettings(store=store))
+    done = command(path, store)
+    assert done.returncode == 3
+    assert done.stderr.startswith("syncline-design: ")
+    assert done.stderr.count("\n") == 1
 
 
 def test_a_case_without_verdict_is_tried_again(

@@ -3,7 +3,7 @@
 from syncline_design.study.loading import Study, load_study
 from syncline_design.study.progress import Progress
 from syncline_design.study.result import CaseResult, StudyResult
-from syncline_design.study.run import StudyError, StudySettings, run_study
+from syncline_design.study.run import StudyError, StudySettings, StudyStoppedError, run_study
 
 __all__ = [
     "CaseResult",
@@ -12,6 +12,7 @@ __all__ = [
     "StudyError",
     "StudyResult",
     "StudySettings",
+    "StudyStoppedError",
     "load_study",
     "run_study",
 ]

@@ -9,11 +9,15 @@ from typing import Any
 
 from syncline_design.study.case import CaseSettings, canonical
 from syncline_design.study.loading import Study
-from syncline_design.study.pool import PoolError, Result, encoded_case
+from syncline_design.study.pool import Result, encoded_case
 
 IN_HAND = 8  # cases given to the scheduler per thread of the cluster
 RETRIES = 5
 TIMEOUT = "15s"
+
+
+class ClusterError(Exception):
+    """No cluster to run on: Dask is missing, or no scheduler answers."""
 
 
 def run_on_cluster(
@@ -24,7 +28,7 @@ def run_on_cluster(
     try:
         dask: Any = import_module("distributed")
     except ImportError:
-        raise PoolError(
+        raise ClusterError(
             "Dask is not installed; install syncline-design[cluster], or leave out --scheduler "
             "and --dask to use local processes"
         ) from None
@@ -38,7 +42,7 @@ def run_on_cluster(
         try:
             client = stack.enter_context(dask.Client(target, timeout=TIMEOUT))
         except (OSError, TimeoutError, ValueError) as error:
-            raise PoolError(f"no Dask scheduler answers at {address}: {error}") from None
+            raise ClusterError(f"no Dask scheduler answers at {address}: {error}") from None
         yield from run_with_client(client, study, settings, indices)
 
 

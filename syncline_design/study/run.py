@@ -10,8 +10,9 @@ from datetime import date
 from pathlib import Path
 from typing import Any
 
+from syncline_design.choose.outcome import NoVerdict
 from syncline_design.study.case import CaseSettings, case_keys, is_final
-from syncline_design.study.cluster import run_on_cluster
+from syncline_design.study.cluster import ClusterError, run_on_cluster
 from syncline_design.study.loading import Study, load_study
 from syncline_design.study.pool import Pool, PoolError, Result, encoded_case
 from syncline_design.study.progress import Progress, Report
@@ -23,7 +24,11 @@ FEW_CASES = 8  # as many are done sooner than a worker process starts
 
 
 class StudyError(Exception):
-    """A study could not be run to its end; what it computed so far is kept."""
+    """A study cannot be run as asked: no such cluster, no Dask."""
+
+
+class StudyStoppedError(StudyError, NoVerdict):
+    """A study could not be run to its end (no room, no processes); what is done is kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +68,10 @@ def run_loaded(
     try:
         store.open()
         return run.finish()
-    except (PoolError, StoreError) as error:
+    except ClusterError as error:
         raise StudyError(str(error)) from None
+    except (PoolError, StoreError) as error:
+        raise StudyStoppedError(str(error)) from None
 
 
 @dataclass
