@@ -145,3 +145,16 @@ def test_a_pinned_check_imports_nothing_heavy() -> None:
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True
     )
     assert done.stdout.strip() == "[]"
+
+
+def test_an_interval_without_an_end_is_written_out(tmp_path: Path) -> None:
+    """Few samples leave the upper end of a high quantile open: null in JSON, a word in text."""
+    text = (ROOT / "specs" / "position_track.yaml").read_text(encoding="utf-8")
+    head = text.split("\nmonte_carlo:")[0]
+    spec = tmp_path / "few.yaml"
+    spec.write_text(head + "\nmonte_carlo: {samples: 40}\n", encoding="utf-8")
+    result = run("check", str(spec), "--output", f"json:{tmp_path / 'few.json'}")
+    assert result.returncode in (0, 1), result.stderr
+    data = json.loads((tmp_path / "few.json").read_text(encoding="utf-8"))
+    assert data["monte_carlo"]["quantiles"]["0.997"]["high_m"] is None
+    assert ", unlimited]" in result.stdout

@@ -71,8 +71,9 @@ def _time(value: float | None) -> str:
     return "unlimited" if value is None else format_quantity(value, Dimension.TIME)
 
 
-def _length(value: float) -> str:
-    return format_quantity(value, Dimension.LENGTH)
+def _length(value: float | None) -> str:
+    """A length; null in JSON is one without an end, as of an interval from few samples."""
+    return "unlimited" if value is None else format_quantity(value, Dimension.LENGTH)
 
 
 def _resource(design: Data, key: str, dimension: Dimension) -> str | None:
