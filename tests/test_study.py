@@ -213,6 +213,19 @@ def test_a_catalog_figure_can_vary(tmp_path: Path) -> None:
     assert second - first == pytest.approx(5000.50, abs=1e-6)
 
 
+def test_two_figures_of_one_catalog_entry_vary_together(tmp_path: Path) -> None:
+    study = STUDY.replace(
+        '"stages[uav].distance": [40 m, 60 m, 100 m]',
+        '"catalog.sensors[sbg_apogee].cost": [123 EUR]\n'
+        '  "catalog.sensors[sbg_apogee].mass": [4 kg]',
+    ).replace("[0.15 m, 0.3 m]", "[0.3 m]")
+    loaded = load_study(write(tmp_path, study))
+    entry = loaded.bases[0].load(loaded.case(0)[1]).catalog.sensors["sbg_apogee"]
+    assert (float(entry.cost or 0), float(entry.mass or 0)) == (123.0, 4.0)
+    shipped = load_study(write(tmp_path)).bases[0].catalogs.entries["sensors"]["sbg_apogee"]
+    assert float(shipped.mass) != 4.0
+
+
 @pytest.mark.parametrize("first", ["platform", "distance"])
 def test_a_platform_and_its_distance_vary_in_any_order(tmp_path: Path, first: str) -> None:
     lines = {

@@ -22,12 +22,11 @@ from syncline_design.study.factors import (
     label,
     sample_values,
 )
-from syncline_design.study.keys import CATALOG, KeyPathError, put, resolve, value_at
+from syncline_design.study.keys import CATALOG, KeyPathError, put, resolve
 from syncline_design.study.overrides import override_entry
 from syncline_design.validation import validate
 from syncline_design.values import did_you_mean
 from syncline_design.yaml_reader import Document, KeyPath, Problem, read
-
 
 # Layers that a check cannot import: they show its results.
 ABOVE_CHECKS = ("cli.py", "commands", "diagnose", "report", "reproduce.py", "scaffold.py")
@@ -329,9 +328,3 @@ def engine_sha256() -> str:
         digest.update(file.relative_to(root).as_posix().encode())
         digest.update(b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def base_value(base: Base, key: str) -> Any:
-    """What the base spec itself holds at a key path; None where it leaves it to a default."""
-    path = base.paths[key]
-    return None if path[0] == CATALOG else value_at(base.document.data, path)
