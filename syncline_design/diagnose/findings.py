@@ -15,6 +15,7 @@ from syncline_design.diagnose.noise import NoiseLevel, precision
 from syncline_design.diagnose.scales import figure
 from syncline_design.diagnose.search import SearchResult, Step
 from syncline_design.diagnose.simulation import Acting, Scene
+from syncline_design.diagnose.tails import scaled_remainder, tails_of
 from syncline_design.effects import registry
 from syncline_design.effects.base import Effect
 
@@ -193,6 +194,13 @@ def _stochastic(data: Data, model: Model, opened: Opened, steps: Mapping[Label, 
         value = model.level.size[opened.directed]
         spread = value * _log_spread(data, model, ("size", opened.directed, 0))
         figures = {effect.parameters[0].name: (value, spread)}
+    elif opened.what == "tails":
+        slow = model.precision.slow_part(model.error)
+        found = tails_of(scaled_remainder(data.structure, model.level, model.error, slow))
+        figures = {
+            "degrees_of_freedom": (found.degrees_of_freedom, found.freedom_uncertainty),
+            "outlier_rate": (found.outlier_rate, math.inf),
+        }
     elif opened.what == "factor":
         index = [w.sensor for w in data.structure.white].index(sensor)
         value = model.level.factor[index]

@@ -68,7 +68,7 @@ def windows(rows: int, most: int, length: int) -> NDArray[np.int64]:
 class Opened:
     """A stochastic effect that is part of the model: what it lets the noise do.
 
-    what: "factor", "slow" or "down" of a sensor, or "size" of a directed part.
+    what: "factor", "tails", "slow" or "down" of a sensor, or "size" of a directed part.
     """
 
     candidate: Candidate

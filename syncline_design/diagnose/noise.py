@@ -103,9 +103,9 @@ class Bounds:
     slow: tuple[tuple[float, ...], ...]
 
     def opened(self, structure: Structure, sensor: Sensor, what: str) -> Bounds:
-        """Open the factor ("factor"), all slow variances ("slow") or the down one ("down")."""
+        """Open the factor ("factor", "tails"), all slow variances ("slow") or one ("down")."""
         factor = tuple(
-            OPEN if what == "factor" and w.sensor == sensor else limit
+            OPEN if what in ("factor", "tails") and w.sensor == sensor else limit
             for w, limit in zip(structure.white, self.factor, strict=True)
         )
         slow = tuple(

@@ -41,6 +41,7 @@ from syncline_design.diagnose.fitting import (
 from syncline_design.diagnose.noise import NoiseLevel, as_specified, precision
 from syncline_design.diagnose.settings import DiagnosisSettings
 from syncline_design.diagnose.simulation import Acting
+from syncline_design.diagnose.tails import scaled_remainder, tails_of
 from syncline_design.effects.base import Array
 
 TRIED = 4  # candidates fitted with their own noise per step
@@ -54,6 +55,7 @@ WANDERING = frozenset({"correlated_noise", "height_drift"})
 WANDER_NATS = (
     15.0  # slow noise can take the shape of anything slow, so it has to be that much better
 )
+TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
 LOST = 1e-7  # share of a signature's information below which the model's own effects hold it all
@@ -184,7 +186,23 @@ class Search:
             gain = model.nll - fitted.nll
             if gain > 2.0:
                 trials.append(Trial(one.candidate, fitted, gain, 2 if one.what == "slow" else 1))
+                trials += self.tails_trial(trials[-1])
         return trials
+
+    def tails_trial(self, understated: Trial) -> list[Trial]:
+        """Heavy tails, where the scatter is too large and Student's t describes it much better."""
+        name, sensor, _ = understated.candidate.label
+        tails = [c for c in self.candidates if c.effect.name == "heavy_tails"]
+        if (name, sensor) != ("noise_understated", "position") or not tails:
+            return []
+        model = understated.model
+        slow = model.precision.slow_part(model.error)
+        z = scaled_remainder(self.data.structure, model.level, model.error, slow)
+        gain = tails_of(z).gain
+        if gain < TAILS_NATS:
+            return []
+        opened = (*model.opened[:-1], Opened(tails[0], "tails"))
+        return [Trial(tails[0], replace(model, opened=opened), understated.gain + gain, 2)]
 
     def exchanged(self, model: Model) -> Model:
         """Try every earlier effect's rivals in its place now that there is company."""
