@@ -82,10 +82,17 @@ def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator
         place = (*at, "parameters")
         if parameter.name not in effect.parameters:
             yield _problem(loaded, place, f"missing parameter {parameter.name}", "", names)
-        elif isinstance(effect.parameters[parameter.name], str) != bool(parameter.choices):
+        elif (message := _misfit(effect.parameters[parameter.name], parameter.choices)) is not None:
             wanted = list(parameter.choices) or ["a number"]
             found = str(effect.parameters[parameter.name])
-            yield _problem(loaded, (*place, parameter.name), "wrong kind of value", found, wanted)
+            yield _problem(loaded, (*place, parameter.name), message, found, wanted)
+
+
+def _misfit(value: float | str, choices: tuple[str, ...]) -> str | None:
+    """What is wrong with a parameter's value; choices: the words it may be, none for a number."""
+    if isinstance(value, str) != bool(choices):
+        return "wrong kind of value"
+    return "not one of the choices" if choices and value not in choices else None
 
 
 def _problem(

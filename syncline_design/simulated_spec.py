@@ -9,8 +9,8 @@ from syncline_design.chosen_system import system_of
 from syncline_design.known_effects import effect_entries
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.system import System
-from syncline_design.simulate import SimulationResult, simulate
-from syncline_design.verify import picked_design, simulation_settings
+from syncline_design.simulate import SimulationError, SimulationResult, simulate
+from syncline_design.verify import picked_design, refuse_trajectory, simulation_settings
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,4 +39,9 @@ def simulate_spec(
     settings = replace(simulation_settings(loaded, seed), workers=workers)
     if samples is not None:
         settings = replace(settings, samples=samples)
-    return SimulatedSpec(loaded, system, simulate(system, settings))
+    try:
+        return SimulatedSpec(loaded, system, simulate(system, settings))
+    except SimulationError as error:
+        if loaded.spec.monte_carlo.trajectory is not None:
+            refuse_trajectory(loaded, str(error))
+        raise

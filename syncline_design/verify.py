@@ -262,11 +262,12 @@ def _monte_carlo(
         return cross_check(system, simulation_settings(loaded, settings.seed)), ""
     except SimulationError as error:
         if loaded.spec.monte_carlo.trajectory is not None:
-            _refuse_trajectory(loaded, str(error))
+            refuse_trajectory(loaded, str(error))
         return None, str(error)
 
 
-def _refuse_trajectory(loaded: LoadedSpec, message: str) -> NoReturn:
+def refuse_trajectory(loaded: LoadedSpec, message: str) -> NoReturn:
+    """A trajectory that cannot be flown, as bad input at its place."""
     place = ("monte_carlo", "trajectory")
     line, column = loaded.positions.get(place, (0, 0))
     raise BadInput((Problem(str(loaded.path), line, column, ".".join(place), message),))

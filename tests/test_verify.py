@@ -135,6 +135,10 @@ def test_a_known_latency_raises_tau_and_a_known_bias_the_systematic_part() -> No
         ("{effect: latency, sensor: target, parameters: {latency_s: 2 ms}}", "does not act"),
         ("{effect: latency, sensor: position, parameters: {bias_m: 2 mm}}", "unknown parameter"),
         ("{effect: range_bias, sensor: ranging, parameters: {}}", "missing parameter bias_m"),
+        (
+            "{effect: frame_convention, sensor: position, parameters: {convention: upside_down}}",
+            "not one of the choices",
+        ),
     ],
 )
 def test_an_effect_that_does_not_exist_or_fit_is_refused_at_its_line(
