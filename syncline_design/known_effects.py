@@ -82,10 +82,10 @@ def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator
         place = (*at, "parameters")
         if parameter.name not in effect.parameters:
             yield _problem(loaded, place, f"missing parameter {parameter.name}", "", names)
-        elif (message := _misfit(effect.parameters[parameter.name], parameter.choices)) is not None:
+        elif misfit := _misfit(effect.parameters[parameter.name], parameter.choices):
             wanted = list(parameter.choices) or ["a number"]
             found = str(effect.parameters[parameter.name])
-            yield _problem(loaded, (*place, parameter.name), message, found, wanted)
+            yield _problem(loaded, (*place, parameter.name), misfit, found, wanted)
 
 
 def _misfit(value: float | str, choices: tuple[str, ...]) -> str | None:
