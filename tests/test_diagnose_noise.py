@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2, multivariate_normal
+from syncline_design.diagnose.scores import Gram, clean_threshold, log_p_of
 
 from syncline_design.diagnose.covariance import factored, inverse_3x3
 from syncline_design.diagnose.noise import (
@@ -18,7 +19,6 @@ from syncline_design.diagnose.noise import (
     spec_bounds,
 )
 from syncline_design.diagnose.scales import figure
-from syncline_design.diagnose.search import Gram, clean_threshold, log_p_of
 from syncline_design.diagnose.trajectory import pieces
 from syncline_design.effects.kinematics import gauss_markov
 

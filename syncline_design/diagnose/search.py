@@ -10,11 +10,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 
 import numpy as np
-from scipy.stats import chi2
 
+from syncline_design.diagnose.calibration import refit_factor
 from syncline_design.diagnose.candidates import (
     EDGE,
     STEP_TIMES,
@@ -22,9 +21,7 @@ from syncline_design.diagnose.candidates import (
     Signature,
     candidates,
     commonness,
-    signature,
     signatures,
-    slopes,
     zero_values,
 )
 from syncline_design.diagnose.fitting import (
@@ -33,32 +30,40 @@ from syncline_design.diagnose.fitting import (
     Opened,
     adjusted,
     fit,
-    inner,
-    inverse_scaled,
     polished,
-    solve_scaled,
 )
-from syncline_design.diagnose.noise import NoiseLevel, as_specified, precision
+from syncline_design.diagnose.noise import NoiseLevel, as_specified
+from syncline_design.diagnose.scatter import (
+    directed_index,
+    scatter_candidates,
+    usual_noise_size,
+    with_size,
+)
+from syncline_design.diagnose.scores import (
+    Gram,
+    clean_least,
+    clean_threshold,
+    gram,
+    log_p_of,
+    possible,
+)
 from syncline_design.diagnose.settings import DiagnosisSettings
 from syncline_design.diagnose.simulation import Acting
 from syncline_design.diagnose.tails import scaled_remainder, tails_of
-from syncline_design.effects.base import Array
 
 TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
 WITHIN_NATS, WITHIN_SHARE = 12.0, 0.35  # how far behind the best a candidate may be to be fitted
-DRAWS = 3000  # clean scores drawn for the distribution of the largest
 MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
 SCATTER_SHARE = 0.2  # for effects that only scatter; the rest is the remainder test's
-RIDGE = 1e-8
 WANDERING = frozenset({"correlated_noise", "height_drift"})
 WANDER_NATS = (
     15.0  # slow noise can take the shape of anything slow, so it has to be that much better
 )
 TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
+NEAR = 2.0  # log p within this factor of the threshold is checked on simulated logs
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
-LOST = 1e-7  # share of a signature's information below which the model's own effects hold it all
 AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
@@ -123,6 +128,10 @@ class Search:
             trial = self.best(model, scores)
             if trial is None or trial.log_p > threshold:
                 break
+            if trial.log_p > NEAR * threshold:
+                threshold *= self.refit_factor(model, scores)
+                if trial.log_p > threshold:
+                    break
             model = self.exchanged(trial.model)
             steps.append(Step(trial.candidate.label, trial.gain, trial.log_p, threshold, model))
             self.progress(len(steps) / self.settings.max_effects)
@@ -132,6 +141,16 @@ class Search:
     def threshold(self, scores: Gram) -> float:
         """log p that the best candidate of a clean log falls below at the stated rate."""
         return clean_threshold(scores, MEAN_SHARE * self.settings.false_alarm_rate, self.rng)
+
+    def refit_factor(self, model: Model, scores: Gram) -> float:
+        """By how much refitted noise moves the threshold, from simulated clean logs."""
+        free = self.free_signatures(model)
+
+        def gains(clean: Model) -> list[float]:
+            return [g for g, _ in gram(self.data, clean, free, clean.level).gains()]
+
+        expected = float(np.mean(clean_least(scores, self.rng)))
+        return refit_factor(self.data, model, free, self.rng, gains, log_p_of, expected)
 
     def free_signatures(self, model: Model) -> list[Signature]:
         """Signatures of what the model does not hold yet."""
@@ -152,7 +171,7 @@ class Search:
         for level in ladder(self.data, model):
             seen = scores if level is model.level else gram(self.data, model, free, level)
             for s, (gain, values) in zip(free, seen.gains(), strict=True):
-                if not _possible(s, values):
+                if not possible(s, values):
                     continue
                 total = gain - seen.nll - 2.0 * s.columns.shape[2] - 4.0 * len(s.at)
                 known = best.get(s.candidate.label)
@@ -172,7 +191,7 @@ class Search:
         if found.candidate.effect.kind == "stochastic":
             directed = directed_index(self.data, found.candidate)
             opened = (*opened, Opened(found.candidate, "size", directed))
-            level = _with_size(level, directed, 0.3 * _usual_size(self.data, directed))
+            level = with_size(level, directed, 0.3 * usual_noise_size(self.data, directed))
         fitted = fit(self.data, (*model.acting, start), opened, start=level)
         fitted = located(self.data, fitted) if found.at else fitted
         freedom = found.columns.shape[2] + len(found.at) + (len(opened) - len(model.opened))
@@ -237,90 +256,6 @@ class Search:
         return model
 
 
-@dataclass(frozen=True, slots=True)
-class Gram:
-    """Scores of all signatures: g = X' C^-1 e and M = X' C^-1 X, freed of the model's effects."""
-
-    score: Array
-    normal: Array
-    groups: tuple[slice, ...]
-    nll: float
-
-    def gains(self) -> list[tuple[float, Array]]:
-        """NLL saved [nat] by each signature alone, and its parameters, to first order."""
-        result = []
-        for g in self.groups:
-            values = solve_scaled(self.normal[g, g], self.score[g])
-            result.append((0.5 * float(self.score[g] @ values), values))
-        return result
-
-
-def _possible(found: Signature, values: Array) -> bool:
-    """Whether first-order parameters are at most twice what the effect can have."""
-    slopes_of = found.candidate.effect.slopes()
-    return all(abs(v) <= 2.0 * p.high for v, p in zip(values, slopes_of, strict=True))
-
-
-def gram(data: Data, model: Model, found: Sequence[Signature], level: NoiseLevel) -> Gram:
-    """Scores of signatures under a noise level."""
-    own = np.nan_to_num(slopes(data.view, model.acting))
-    width = own.shape[2]
-    groups, at = [], 0
-    for s in found:
-        groups.append(slice(at, at + s.columns.shape[2]))
-        at = groups[-1].stop
-    columns = np.concatenate([own, *(np.nan_to_num(s.columns) for s in found)], axis=2)
-    known = model.precision if level is model.level else precision(data.structure, level)
-    weighted = known.solve(columns)
-    normal = inner(columns, weighted)
-    score = inner(weighted, model.error[:, :, None])[:, 0]
-    if width:
-        inverse = inverse_scaled(normal[:width, :width])
-        cross = normal[:width, width:]
-        score = score[width:] - cross.T @ inverse @ score[:width]
-        whole = np.diag(normal)[width:]
-        normal = normal[width:, width:] - cross.T @ inverse @ cross
-        lost = np.diag(normal) < LOST * whole  # the model's own effects can do all of it
-        score[lost], normal[lost], normal[:, lost] = 0.0, 0.0, 0.0
-    nll = known.negative_log_likelihood(model.error)
-    return Gram(score, normal, tuple(groups), nll)
-
-
-def clean_threshold(scores: Gram, rate: float, rng: np.random.Generator) -> float:
-    """Quantile of the least log p over all signatures when there is nothing but noise.
-
-    g is normal with covariance M when the model is right, so the least p over all (correlated)
-    candidates is drawn without simulating a log.
-    """
-    scale = np.sqrt(np.diag(scores.normal))
-    scale[scale == 0.0] = 1.0
-    correlation = scores.normal / scale[:, None] / scale
-    values, vectors = np.linalg.eigh(correlation)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    draws = root @ rng.standard_normal((root.shape[1], DRAWS))
-    least = np.zeros(DRAWS)
-    for g in scores.groups:
-        inverse = np.linalg.pinv(correlation[g, g], rcond=RIDGE)
-        squares = np.sum(draws[g] * (inverse @ draws[g]), axis=0)
-        least = np.minimum(least, _log_p(squares, g.stop - g.start))
-    return float(np.quantile(least, rate))
-
-
-_GRID = np.linspace(0.0, 80.0, 401)
-
-
-@cache
-def _log_p_grid(freedom: int) -> Array:
-    grid: Array = chi2.logsf(_GRID, freedom)
-    return grid
-
-
-def _log_p(squares: Array, freedom: int) -> Array:
-    """log of the upper tail of chi-square, by interpolation (it is nearly straight)."""
-    log_p: Array = np.interp(squares, _GRID, _log_p_grid(freedom))
-    return log_p
-
-
 def clearly_better(new: Model, old: Model) -> bool:
     """Whether another effect in the place of one fits better by more than its freedom and luck."""
     extra = len(new.covariance) - len(old.covariance)
@@ -353,15 +288,6 @@ def preferred(trials: Sequence[Trial]) -> Trial | None:
     return min(close, key=lambda t: (commonness(t.candidate), t.log_p, t.candidate.label))
 
 
-def log_p_of(statistic: float, freedom: int) -> float:
-    """log of the upper tail of chi-square, by its asymptote where the library's underflows."""
-    found = float(chi2.logsf(max(statistic, 0.0), freedom))
-    if math.isfinite(found):
-        return found
-    half = 0.5 * statistic
-    return -half + (0.5 * freedom - 1.0) * math.log(half) - math.lgamma(0.5 * freedom)
-
-
 def plausible(model: Model) -> bool:
     """Whether every fitted parameter is of a size that its effect can have."""
     for one in model.acting:
@@ -379,11 +305,6 @@ def _mean_and_scatter_agree(model: Model, opened: Opened) -> bool:
             value = one.values[one.effect.parameters[0].name]
             return abs(model.level.size[opened.directed] - value) < AGREE * value
     return True
-
-
-def directed_index(data: Data, candidate: Candidate) -> int:
-    """Which directed part of the noise structure is this candidate's."""
-    return [d.key for d in data.structure.directed].index(candidate.key)
 
 
 def located(data: Data, model: Model) -> Model:
@@ -411,83 +332,6 @@ def refitted(data: Data, acting: tuple[Acting, ...], like: Model) -> Model:
     return replace(like, acting=now, error=error, covariance=covariance, nll=nll)
 
 
-def scatter_candidates(
-    data: Data, found: Sequence[Candidate], model: Model, least: float
-) -> list[tuple[Opened, NoiseLevel]]:
-    """Stochastic effects worth a fit, each with a noise level to start from.
-
-    Worth a fit is what lowers the NLL when some of it is simply put in.
-    """
-    result = []
-    least = max(1.0, least * len(data.noise_rows) / len(data.view))
-    error = model.error[data.noise_rows]
-    base = precision(data.noise_structure, model.level).negative_log_likelihood(error)
-    for candidate in found:
-        if candidate.label in model.labels or candidate.effect.sensitivity is not None:
-            continue
-        for opened, level in _put_in(data, candidate, model):
-            found_nll = precision(data.noise_structure, level).negative_log_likelihood(error)
-            if found_nll < base - least:
-                result.append((opened, level))
-                break
-    return result
-
-
-def _put_in(data: Data, candidate: Candidate, model: Model) -> list[tuple[Opened, NoiseLevel]]:
-    """Noise levels with a moderate, then a large share of a stochastic effect."""
-    level, name = model.level, candidate.effect.name
-    sensor = (data.view.system.stages[candidate.stage].name, candidate.sensor)
-    if name == "noise_understated":
-        return [
-            (Opened(candidate, "factor"), _times_factor(data, level, sensor, k))
-            for k in (1.15, 2.0)
-        ]
-    if name in ("correlated_noise", "height_drift"):
-        what = "slow" if name == "correlated_noise" else "down"
-        return [
-            (Opened(candidate, what), _times_slow(data, level, sensor, what, k)) for k in (1.5, 6.0)
-        ]
-    if name == "timestamp_jitter":
-        index = directed_index(data, candidate)
-        unit = _usual_size(data, index)
-        return [
-            (Opened(candidate, "size", index), _with_size(level, index, k * unit))
-            for k in (0.3, 1.0)
-        ]
-    return []
-
-
-def _times_factor(data: Data, level: NoiseLevel, sensor: tuple[str, str], by: float) -> NoiseLevel:
-    pairs = zip(data.structure.white, level.factor, strict=True)
-    return replace(level, factor=tuple(f * by if w.sensor == sensor else f for w, f in pairs))
-
-
-def _times_slow(
-    data: Data, level: NoiseLevel, sensor: tuple[str, str], what: str, by: float
-) -> NoiseLevel:
-    slow = tuple(
-        tuple(
-            max(v, 0.5) * by if part.sensor == sensor and (what == "slow" or k == 2) else v
-            for k, v in enumerate(values)
-        )
-        for part, values in zip(data.structure.slow, level.slow, strict=True)
-    )
-    return replace(level, slow=slow)
-
-
-def _usual_size(data: Data, index: int) -> float:
-    """Size at which a directed part has the variance of the white noise, in the median row."""
-    direction = data.noise_structure.directed[index].direction
-    own = float(np.median(np.sum(direction**2, axis=(1, 2))))
-    white = sum(np.einsum("nii->n", w.covariance) for w in data.noise_structure.white)
-    return float(np.sqrt(np.median(white) / max(own, 1e-300)))
-
-
-def _with_size(level: NoiseLevel, index: int, size: float) -> NoiseLevel:
-    sizes = tuple(size if k == index else s for k, s in enumerate(level.size))
-    return replace(level, size=sizes)
-
-
 def start_search(
     data: Data, settings: DiagnosisSettings, progress: Callable[[float], None]
 ) -> Search:
@@ -496,9 +340,3 @@ def start_search(
     rng = np.random.Generator(np.random.Philox(settings.seed))
     shown = signatures(data.view, found)
     return Search(data, settings, rng, found, shown, progress)
-
-
-def signature_of(data: Data, one: Acting) -> Array:
-    """Columns of one acting effect where it stands."""
-    at = {p.name: one.values[p.name] for p in one.effect.parameters if p.located}
-    return signature(data.view, Candidate(one.effect, one.sensor, one.stage), at)
