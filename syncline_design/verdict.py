@@ -7,12 +7,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from syncline_design import __version__
 from syncline_design.design_space import Design
+from syncline_design.design_space import Problem as DesignProblem
+from syncline_design.known_effects import describe
+from syncline_design.loading import LoadedSpec, Problem
 from syncline_design.model.budget import Budget, LeverArm
 from syncline_design.model.system import System
 from syncline_design.recheck import Recheck
+from syncline_design.resolution import platform_of
 from syncline_design.simulate import MonteCarlo
 
+Json = dict[str, Any]
 SCHEMA = "syncline-design/verdict/v1"
 Status = Literal["pass", "fail", "indeterminate"]
 Word = Literal["meets", "fails", "infeasible", "indeterminate"]
@@ -50,10 +56,10 @@ class RequirementResult:
         """Whether a waiver in force covers this requirement."""
         return self.waiver is not None and not self.waiver["expired"]
 
-    def to_json(self) -> dict[str, Any]:
+    def to_json(self) -> Json:
         """The entry under `requirements`."""
         margin = None if self.value is None else self.limit - self.value
-        data: dict[str, Any] = {
+        data: Json = {
             "id": self.id,
             "kind": self.kind,
             "status": self.status,
@@ -109,7 +115,7 @@ class Verified:
         return word_of(self.requirements)
 
 
-def syncline_json(budget: Budget, model: str, total_m: float) -> dict[str, Any]:
+def syncline_json(budget: Budget, model: str, total_m: float) -> Json:
     """The `syncline` key; total_m is the rechecked total of the spec's own model."""
     per_sensor = model == "per_sensor"
     ledger = budget.ledger_per_sensor if per_sensor else budget.ledger
@@ -153,10 +159,99 @@ def syncline_json(budget: Budget, model: str, total_m: float) -> dict[str, Any]:
     }
 
 
-def _lever_arm_json(lever_arm: LeverArm, per_sensor: bool) -> dict[str, Any]:
+def _lever_arm_json(lever_arm: LeverArm, per_sensor: bool) -> Json:
     return {
         "tau_crit_s": finite(lever_arm.tau_crit_s),
         "total_m": lever_arm.total_per_sensor_m if per_sensor else lever_arm.total_m,
         "sync_rate_mps": lever_arm.sync_rate_mps,
         "differs": lever_arm.differs,
+    }
+
+
+def frame(loaded: LoadedSpec, problem: DesignProblem, word: str, seed: int) -> Json:
+    """What every verdict holds, with or without a design."""
+    spec = loaded.spec
+    stages = []
+    for stage in spec.stages:
+        platform = platform_of(stage.platform, loaded.catalog)
+        identity = stage.platform.use or stage.platform.name or stage.name
+        stages.append(
+            {
+                "name": stage.name,
+                "vehicle": stage.vehicle_name,
+                "platform": {
+                    "id": identity,
+                    "name": platform.name or identity,
+                    "v_max_mps": float(platform.v_max),
+                    "omega_max_radps": float(platform.omega_max),
+                    "distance_m": float(platform.distance),
+                    "baseline_m": float(platform.baseline),
+                },
+            }
+        )
+    return {
+        "schema": SCHEMA,
+        "verdict": word,
+        "spec": {
+            "name": spec.name,
+            "file": str(loaded.path),
+            "currency": spec.currency,
+            "sync_model": spec.sync_model,
+            "objective": spec.objective,
+            "coverage_factor": float(spec.coverage_factor),
+            "open_roles": [
+                f"{table.stage_name}.{table.role}"
+                for table in problem.roles
+                if len(table.options) + len(table.excluded) > 1
+            ],
+            "combinations": str(problem.combinations),
+            "stages": stages,
+        },
+        "requirements": [],
+        "design": None,
+        "syncline": None,
+        "monte_carlo": None,
+        "warnings": [],
+        "provenance": _provenance(loaded, seed),
+    }
+
+
+def _provenance(loaded: LoadedSpec, seed: int) -> Json:
+    import platform
+
+    import numpy as np
+
+    return {
+        "version": __version__,
+        "spec_sha256": loaded.spec_sha256,
+        "catalogs_sha256": loaded.catalogs_sha256,
+        "seed": seed,
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+    }
+
+
+def effects_json(system: System) -> list[Json]:
+    return [
+        {
+            "effect": entry.effect,
+            "sensor": entry.sensor,
+            "stage": entry.stage,
+            "parameters": dict(entry.parameters),
+            "sentence": describe(entry),
+        }
+        for entry in system.effects
+    ]
+
+
+def problem_json(problem: Problem) -> Json:
+    wanted = f"expected {problem.expected}" if problem.expected else ""
+    found = f"found {problem.found}" if problem.found else ""
+    parts = (problem.message, wanted, found, problem.hint)
+    return {
+        "file": problem.file,
+        "line": problem.line,
+        "column": problem.column,
+        "path": problem.path,
+        "message": "; ".join(part for part in parts if part),
     }

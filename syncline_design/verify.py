@@ -8,19 +8,17 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from syncline_design import __version__
 from syncline_design.cautions import cautions
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
 from syncline_design.design_space import Problem as DesignProblem
-from syncline_design.known_effects import describe, effect_entries, known_of
+from syncline_design.known_effects import effect_entries, known_of
 from syncline_design.loading import BadInput, LoadedSpec, Problem, load
 from syncline_design.model.budget import budget
 from syncline_design.model.system import System
 from syncline_design.problem import build_problem, selection_of, sole_design
 from syncline_design.recheck import Recheck, recheck
-from syncline_design.resolution import platform_of
 from syncline_design.simulate import (
     Decision,
     MonteCarlo,
@@ -37,6 +35,9 @@ from syncline_design.verdict import (
     RequirementResult,
     Status,
     Verified,
+    effects_json,
+    frame,
+    problem_json,
     syncline_json,
 )
 
@@ -97,22 +98,9 @@ def _check_or_refuse(path: Path, settings: CheckSettings) -> Json:
             "schema": SCHEMA,
             "verdict": "refused",
             "file": str(path),
-            "problems": [_problem_json(problem) for problem in error.problems],
+            "problems": [problem_json(problem) for problem in error.problems],
             "text": str(error),
         }
-
-
-def _problem_json(problem: Problem) -> Json:
-    wanted = f"expected {problem.expected}" if problem.expected else ""
-    found = f"found {problem.found}" if problem.found else ""
-    parts = (problem.message, wanted, found, problem.hint)
-    return {
-        "file": problem.file,
-        "line": problem.line,
-        "column": problem.column,
-        "path": problem.path,
-        "message": "; ".join(part for part in parts if part),
-    }
 
 
 def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
@@ -178,7 +166,7 @@ def _infeasible_json(loaded: LoadedSpec, problem: DesignProblem, settings: Check
     found = explain(
         loaded, problem, lambda spec: build_problem(spec, known.extra_tau_s, known.systematic)
     )
-    data = _frame(loaded, problem, "infeasible", settings)
+    data = frame(loaded, problem, "infeasible", settings.seed)
     data["infeasibility"] = found.to_json() | {"text": found.lines()}
     conflict = {member.id for member in found.conflict}
     data["requirements"] = [
@@ -368,91 +356,15 @@ def _verdict_json(
 ) -> Json:
     entries = used_entries(loaded, problem, verified.design)
     model = loaded.spec.sync_model
-    data = _frame(loaded, problem, verified.word, settings)
+    data = frame(loaded, problem, verified.word, settings.seed)
     data["requirements"] = [r.to_json() for r in verified.requirements]
     data["design"] = design_json(loaded, problem, verified.design, verified.figures)
     data["syncline"] = syncline_json(verified.figures, model, float(verified.exact.total_m))
     data["monte_carlo"] = None if verified.monte_carlo is None else verified.monte_carlo.to_json()
     data["assumptions"] = assumptions(entries)
     data["sources"] = sources(entries)
-    data["effects"] = _effects_json(verified.system)
+    data["effects"] = effects_json(verified.system)
     data["warnings"] = cautions(loaded, verified, data["assumptions"])
     if choice:
         data["choice"] = choice
     return data
-
-
-def _effects_json(system: System) -> list[Json]:
-    return [
-        {
-            "effect": entry.effect,
-            "sensor": entry.sensor,
-            "stage": entry.stage,
-            "parameters": dict(entry.parameters),
-            "sentence": describe(entry),
-        }
-        for entry in system.effects
-    ]
-
-
-def _frame(loaded: LoadedSpec, problem: DesignProblem, word: str, settings: CheckSettings) -> Json:
-    """What every verdict holds, with or without a design."""
-    spec = loaded.spec
-    stages = []
-    for stage in spec.stages:
-        platform = platform_of(stage.platform, loaded.catalog)
-        identity = stage.platform.use or stage.platform.name or stage.name
-        stages.append(
-            {
-                "name": stage.name,
-                "vehicle": stage.vehicle_name,
-                "platform": {
-                    "id": identity,
-                    "name": platform.name or identity,
-                    "v_max_mps": float(platform.v_max),
-                    "omega_max_radps": float(platform.omega_max),
-                    "distance_m": float(platform.distance),
-                    "baseline_m": float(platform.baseline),
-                },
-            }
-        )
-    return {
-        "schema": SCHEMA,
-        "verdict": word,
-        "spec": {
-            "name": spec.name,
-            "file": str(loaded.path),
-            "currency": spec.currency,
-            "sync_model": spec.sync_model,
-            "objective": spec.objective,
-            "coverage_factor": float(spec.coverage_factor),
-            "open_roles": [
-                f"{table.stage_name}.{table.role}"
-                for table in problem.roles
-                if len(table.options) + len(table.excluded) > 1
-            ],
-            "combinations": str(problem.combinations),
-            "stages": stages,
-        },
-        "requirements": [],
-        "design": None,
-        "syncline": None,
-        "monte_carlo": None,
-        "warnings": [],
-        "provenance": _provenance(loaded, settings),
-    }
-
-
-def _provenance(loaded: LoadedSpec, settings: CheckSettings) -> Json:
-    import platform
-
-    import numpy as np
-
-    return {
-        "version": __version__,
-        "spec_sha256": loaded.spec_sha256,
-        "catalogs_sha256": loaded.catalogs_sha256,
-        "seed": settings.seed,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
