@@ -9,6 +9,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,17 @@ def command(path: Path, store: Path) -> subprocess.CompletedProcess[str]:
 needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="needs Linux /proc")
 
 
+# Sources that change while the tests run would be another program, with other cases.
+FIXED = "from syncline_design.study import case\ncase.engine_sha256 = lambda: 'fixed'\n"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def _fixed_program() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("syncline_design.study.case.engine_sha256", lambda: "fixed")
+        yield
+
+
 @pytest.fixture(scope="module")
 def plain(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, str | bytes]]:
     """The study run in one process without any fault: what every other way has to equal."""
@@ -104,7 +116,7 @@ def test_a_killed_parent_resumes_and_ends_with_the_same_bytes(plain: Any, tmp_pa
     path, wanted = plain
     store = tmp_path / "store"
     script = (
-        "import sys\n"
+        f"import sys\n{FIXED}"
         "from pathlib import Path\n"
         "from syncline_design.study import StudySettings, run_study\n"
         "if __name__ == '__main__':\n"
@@ -136,8 +148,11 @@ def test_a_killed_parent_resumes_and_ends_with_the_same_bytes(plain: Any, tmp_pa
 def test_an_interrupt_ends_at_once_and_keeps_what_is_done(plain: Any, tmp_path: Path) -> None:
     path, wanted = plain
     store = tmp_path / "store"
+    script = tmp_path / "command.py"
+    start = "from syncline_design.cli import main\nif __name__ == '__main__':\n    main()\n"
+    script.write_text(FIXED + start, encoding="utf-8")
     process = subprocess.Popen(
-        [sys.executable, "-m", "syncline_design.cli", "study", str(path), "--store", str(store)],
+        [sys.executable, str(script), "study", str(path), "--store", str(store)],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     deadline = time.monotonic() + 60
