@@ -79,7 +79,7 @@ def _least_log_p(
     best = int(np.argmin(scored))
     columns = np.concatenate([own, np.nan_to_num(free[best].columns)], axis=2)
     after = _refitted(data, clean, _without(clean, columns, error))
-    gain = max(clean.nll - after.nll, found[best])
+    gain = max(clean.nll - after.nll, 0.0)
     return log_p(2.0 * gain, freedoms[best])
 
 
