@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
+from syncline_design import __version__
 from syncline_design.choice_data import designs_json, excluded_json, front_json, proof_json
 from syncline_design.choose import presentation
 from syncline_design.choose.decide import best
@@ -28,6 +29,7 @@ from syncline_design.problem import build_problem, selection_of
 from syncline_design.spec_writer import PinnedRole, pinned_spec_text
 from syncline_design.units import Dimension, format_quantity
 from syncline_design.verify import CheckSettings, verify
+from syncline_design.yaml_reader import printable
 
 SCHEMA = "syncline-design/optimization/v1"
 Json = dict[str, Any]
@@ -127,6 +129,12 @@ def optimisation_json(found: Optimisation) -> Json:
         "combinations": str(problem.combinations),
         "designs": designs_json(loaded, problem, found.designs, known),
         "excluded": excluded_json(problem),
+        "provenance": {
+            "version": __version__,
+            "spec_sha256": loaded.spec_sha256,
+            "catalogs_sha256": loaded.catalogs_sha256,
+            "seed": found.settings.seed,
+        },
     }
     if found.exit_code == 3:
         data["verdict"] = "indeterminate"
@@ -161,7 +169,8 @@ def optimisation_text(found: Optimisation) -> str:
             ["How far each term may grow:", *presentation.slack_table(found.hinges.slack)]
         )
         blocks.append([found.hinges.tolerance.text, *_measure_lines(found.hinges)])
-    return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+    shown = ["\n".join(printable(line, len(line)) for line in block) for block in blocks]
+    return "\n\n".join(shown) + "\n"
 
 
 def _proof_line(found: Optimisation) -> str:

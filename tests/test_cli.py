@@ -158,3 +158,39 @@ def test_an_interval_without_an_end_is_written_out(tmp_path: Path) -> None:
     data = json.loads((tmp_path / "few.json").read_text(encoding="utf-8"))
     assert data["monte_carlo"]["quantiles"]["0.997"]["high_m"] is None
     assert ", unlimited]" in result.stdout
+
+
+def test_no_output_takes_the_place_of_a_file_that_is_read(tmp_path: Path) -> None:
+    spec, other = tmp_path / "mine.yaml", tmp_path / "catalog.yaml"
+    text = (SPECS / "position_track.yaml").read_text("utf-8")
+    spec.write_text(text, "utf-8")
+    other.write_text("sensors: {}\n", "utf-8")
+    (tmp_path / "link.json").symlink_to(spec)
+    for arguments, words in (
+        (("check", str(spec), "--output", f"json:{spec}"), "is read by this command"),
+        (("check", str(spec), "--output", f"json:{tmp_path / 'link.json'}"), "is read by"),
+        (("simulate", str(spec), "--output", f"json:{other}"), "a YAML file is there"),
+        (("optimize", str(spec), "--write-design", str(spec)), "is the spec itself"),
+    ):
+        done = run(*arguments)
+        assert done.returncode == 2, arguments
+        assert words in done.stderr
+        assert done.stdout == ""
+    assert spec.read_text("utf-8") == text
+    assert other.read_text("utf-8") == "sensors: {}\n"
+
+
+@pytest.mark.parametrize("command", ["check", "optimize", "simulate"])
+def test_names_cannot_start_a_line_nor_colour_it(command: str, tmp_path: Path) -> None:
+    evil = '"a\\n::error::pwn \\e[31m"'
+    text = (SPECS / "position_track.yaml").read_text("utf-8")
+    text = text.replace("name: USV track against a total station", f"name: {evil}")
+    text = text.replace("- name: usv", f"- name: {evil}").replace("ACC-1,", f"{evil},")
+    assert text.count(evil) == 3
+    spec = tmp_path / "evil.yaml"
+    spec.write_text(text + "monte_carlo: {samples: 200}\n", "utf-8")
+    done = run(command, str(spec))
+    assert done.returncode == 0, done.stderr
+    assert "pwn" in done.stdout
+    assert "\x1b" not in done.stdout
+    assert not any(line.lstrip().startswith("::") for line in done.stdout.splitlines())

@@ -43,7 +43,7 @@ def choose(
     if method == "auto":
         return _auto(problem, deadline)
     if method == "enumerate":
-        return _outcome(problem, best_by_enumeration(problem), "enumerate")
+        return _outcome(problem, best_by_enumeration(problem, deadline), "enumerate")
     if method == "milp":
         return _by_milp(problem, deadline)
     return _outcome(problem, best_by_front(problem, deadline), "front")

@@ -6,14 +6,17 @@ import itertools
 from collections.abc import Iterator
 
 from syncline_design.choose.evaluate import Evaluation, broken, error_key, evaluate, rank
-from syncline_design.choose.outcome import FrontPoint, TooLarge
+from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.design_space import Design, Problem, ResourceName
 
 MOST_COMBINATIONS = 300_000
 
 
-def all_designs(problem: Problem) -> Iterator[tuple[Design, Evaluation]]:
-    """Every design with what it costs and reaches."""
+def all_designs(
+    problem: Problem, deadline: Deadline | None = None
+) -> Iterator[tuple[Design, Evaluation]]:
+    """Every design with what it costs and reaches; NoVerdict after the deadline."""
+    end = deadline or Deadline()
     if problem.combinations > MOST_COMBINATIONS:
         raise TooLarge(
             f"{problem.combinations:.3g} combinations are too many to enumerate "
@@ -22,16 +25,17 @@ def all_designs(problem: Problem) -> Iterator[tuple[Design, Evaluation]]:
     option_ranges = [range(len(role.options)) for role in problem.roles]
     clock_ranges = [range(len(vehicle.clocks)) for vehicle in problem.vehicles]
     for options in itertools.product(*option_ranges):
+        end.check()
         for clocks in itertools.product(*clock_ranges):
             design = Design(options, clocks)
             yield design, evaluate(problem, design)
 
 
-def best_by_enumeration(problem: Problem) -> Design | None:
+def best_by_enumeration(problem: Problem, deadline: Deadline | None = None) -> Design | None:
     """The first design, in the documented order, that meets every requirement."""
     feasible = [
         (rank(problem, design, found), design)
-        for design, found in all_designs(problem)
+        for design, found in all_designs(problem, deadline)
         if not broken(problem, found)
     ]
     return min(feasible, key=lambda entry: entry[0])[1] if feasible else None

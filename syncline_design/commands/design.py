@@ -20,6 +20,7 @@ from syncline_design.commands.shared import (
     emit,
     guarded,
     output_targets,
+    refuse,
     road,
 )
 
@@ -42,7 +43,7 @@ def check(
     from syncline_design.report.write import STDOUT
     from syncline_design.verify import CheckSettings, check_files, exit_code
 
-    targets = output_targets(output, CHECK_FORMATS)
+    targets = output_targets(output, CHECK_FORMATS, spec)
     settings = CheckSettings(seed=seed, method=road(method), time_limit_s=time_limit)
     verdicts = check_files(spec, settings)
     refused = [verdict for verdict in verdicts if verdict["verdict"] == "refused"]
@@ -77,7 +78,12 @@ def optimize(
     from syncline_design.optimisation import OptimizeSettings, optimisation_text, optimize
     from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
 
-    targets = output_targets(output, OPTIMIZE_FORMATS)
+    targets = output_targets(output, OPTIMIZE_FORMATS, [spec, *_given(write_design)])
+    if write_design is not None and write_design.resolve() == spec.resolve():
+        refuse(
+            f"syncline-design: --write-design {write_design}: is the spec itself, whose open "
+            "choices would be lost; give another name"
+        )
     loaded = load(spec)
     settings = OptimizeSettings(
         best, pareto, resource, road(method), time_limit_s=time_limit, seed=seed
@@ -87,6 +93,10 @@ def optimize(
         _write_design(found, write_design)
     emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
     return found.exit_code
+
+
+def _given(path: Path | None) -> list[Path]:
+    return [] if path is None else [path]
 
 
 def _write_design(found: Any, path: Path) -> None:
@@ -123,7 +133,7 @@ def study(
     from syncline_design.study import StudySettings, run_study
 
     wanted = [*(output or ()), *([f"{output_format}:-"] if output_format else ())]
-    targets = output_targets(wanted, STUDY_FORMATS)
+    targets = output_targets(wanted, STUDY_FORMATS, [study_file])
     settings = StudySettings(seed, workers, store, scheduler, dask)
     with _study_progress(quiet) as progress:
         result = run_study(study_file, settings, progress)
@@ -156,7 +166,7 @@ def diff(
     from syncline_design.report.differences import DIFF_FORMATS, diff_text, render_diff
     from syncline_design.verify import CheckSettings
 
-    targets = output_targets(output, DIFF_FORMATS)
+    targets = output_targets(output, DIFF_FORMATS, [old, new])
     data = compare(old, new, CheckSettings(seed=seed))
     emit(diff_text(data), targets, lambda name: render_diff(name, data), quiet=quiet)
     return int(data["exit_code"])

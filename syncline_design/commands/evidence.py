@@ -37,13 +37,14 @@ def simulate(
     """Simulate the nonlinear chain against the Syncline over a grid of tau."""
     from syncline_design.loading import load
     from syncline_design.report.simulations import SIMULATE_FORMATS, render_simulate
+    from syncline_design.report.text import visible
     from syncline_design.simulate.summary import summary_text
     from syncline_design.simulated_spec import simulate_spec
 
-    targets = output_targets(output, SIMULATE_FORMATS)
+    targets = output_targets(output, SIMULATE_FORMATS, [spec])
     loaded = load(spec)
     run = simulate_spec(loaded, seed=seed, samples=samples, workers=workers)
-    text = f"{loaded.spec.name} ({spec})\n\n{summary_text(run.result, run.system)}"
+    text = f"{visible(loaded.spec.name)} ({spec})\n\n{summary_text(run.result, run.system)}"
     emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
     return 0
 
@@ -72,8 +73,10 @@ def diagnose(
     from syncline_design.diagnose import diagnose as diagnose_log
     from syncline_design.loading import load
     from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
+    from syncline_design.report.text import visible
 
-    targets = output_targets(output, DIAGNOSE_FORMATS)
+    reads = [spec, *(log or ()), *([] if write_spec is None else [write_spec])]
+    targets = output_targets(output, DIAGNOSE_FORMATS, reads)
     loaded = load(spec)
     settings = DiagnosisSettings(
         seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects
@@ -81,7 +84,7 @@ def diagnose(
     with _progress(quiet) as progress:
         found = diagnose_log(as_measured(loaded), log or (), settings, progress)
         means = meaning(loaded, found, seed)
-    data, text = found.to_json(), f"{loaded.spec.name} ({spec})\n\n{summary_text(found)}"
+    data, text = found.to_json(), f"{visible(loaded.spec.name)} ({spec})\n\n{summary_text(found)}"
     if means is not None:
         data["design"] = means.to_json()
         text += "\nWhat it means for the design:\n" + "".join(f"  {x}\n" for x in means.lines)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
 
@@ -90,12 +90,15 @@ def refuse_unexpected(error: Exception) -> NoReturn:
     )
 
 
-def output_targets(output: list[str] | None, formats: tuple[str, ...]) -> list[Target]:
+def output_targets(
+    output: list[str] | None, formats: tuple[str, ...], reads: Sequence[Path] = ()
+) -> list[Target]:
+    """Where results go; refused where one would overwrite a file that the command reads."""
     from syncline_design.report.write import OutputError, check_targets, parse_target
 
     try:
         targets = [parse_target(text, formats) for text in output or ()]
-        check_targets(targets)
+        check_targets(targets, reads)
     except OutputError as error:
         refuse(f"syncline-design: {error}")
     return targets

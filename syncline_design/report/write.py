@@ -45,8 +45,13 @@ def parse_target(argument: str, known: Sequence[str]) -> Target:
     return Target(name, path if separator else STDOUT)
 
 
-def check_targets(targets: Sequence[Target]) -> None:
-    """Refuse, before anything is computed, targets that cannot be written or that collide."""
+def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None:
+    """Refuse, before anything is computed, targets that cannot be written or that collide.
+
+    reads: files that the command reads; no result may take the place of one of them, nor of any
+    YAML file, which would be a spec or a catalog.
+    """
+    inputs = {os.path.realpath(path) for path in reads}
     seen: set[str] = set()
     for target in targets:
         key = STDOUT if target.path == STDOUT else os.path.realpath(target.path)
@@ -54,8 +59,21 @@ def check_targets(targets: Sequence[Target]) -> None:
             where = "standard output" if key == STDOUT else target.path
             raise OutputError(f"two outputs go to {where}; give each its own path")
         seen.add(key)
+        _keep_inputs(target, key, inputs)
         if target.path != STDOUT:
             _check_writable(Path(target.path))
+
+
+def _keep_inputs(target: Target, key: str, inputs: set[str]) -> None:
+    if target.path == STDOUT:
+        return
+    if key in inputs:
+        raise OutputError(f"{target.path}: is read by this command; write the result elsewhere")
+    if key.endswith((".yaml", ".yml")) and Path(key).is_file():
+        raise OutputError(
+            f"{target.path}: a YAML file is there, perhaps a spec or a catalog; "
+            f"write {target.format} elsewhere"
+        )
 
 
 def _check_writable(path: Path) -> None:
