@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -23,9 +21,6 @@ from syncline_design.commands.shared import (
     refuse,
     road,
 )
-
-if TYPE_CHECKING:
-    from syncline_design.study import Progress
 
 
 @guarded
@@ -128,6 +123,7 @@ def study(
     dask: Annotated[bool, typer.Option("--dask", help="Run on a local Dask cluster.")] = False,
 ) -> int:
     """Sweep specs over grids or samples of their keys; a stopped study resumes."""
+    from syncline_design.report.progress_line import ProgressLine
     from syncline_design.report.studies import STUDY_FORMATS, render_study
     from syncline_design.report.study_words import study_text
     from syncline_design.study import StudySettings, run_study
@@ -135,22 +131,9 @@ def study(
     wanted = [*(output or ()), *([f"{output_format}:-"] if output_format else ())]
     targets = output_targets(wanted, STUDY_FORMATS, [study_file])
     settings = StudySettings(seed, workers, store, scheduler, dask)
-    with _study_progress(quiet) as progress:
-        result = run_study(study_file, settings, progress)
+    result = run_study(study_file, settings, None if quiet else ProgressLine())
     emit(study_text(result), targets, lambda name: render_study(name, result), quiet=quiet)
     return result.exit_code
-
-
-@contextmanager
-def _study_progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """One line on standard error, rewritten in place, where that is a terminal."""
-    from syncline_design.report.study_words import progress_text
-
-    if quiet or not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    yield lambda now: print(f"\r\033[K{progress_text(now)}", end="", file=sys.stderr, flush=True)
-    print("\r\033[K", end="", file=sys.stderr, flush=True)
 
 
 @guarded
