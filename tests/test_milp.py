@@ -139,7 +139,7 @@ def test_missing_solver_is_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_time_limit_is_no_verdict() -> None:
     rng = random.Random(1)
     roles = [
-        [option(f"s{i}", 10 ** rng.uniform(-2, 1), rng.uniform(0, 1e-3), rng.randint(1, 10**6))
+        [option(f"s{i}", 10 ** rng.uniform(-2, 1), 1e-4 * (i % 6), rng.randint(1, 10**6))
          for i in range(400)]
         for _ in range(3)
     ]  # fmt: skip
@@ -148,6 +148,26 @@ def test_time_limit_is_no_verdict() -> None:
         choose(problem, "milp", time_limit_s=0.05)
     with pytest.raises(NoVerdict, match="time limit"):
         choose(problem, "front", time_limit_s=0.0)
+
+
+def test_too_many_timestamp_errors_are_refused_at_once() -> None:
+    roles = [[option(f"s{i}", 1.0, 1e-6 * i, i) for i in range(150)] for _ in range(3)]
+    problem = one_stage(roles, Limits(3.0, 4.0), 1.0, 1.0)
+    with pytest.raises(NoVerdict, match="too many for the MILP"):
+        best_by_milp(problem, Deadline())
+
+
+def test_presolve_that_undoes_itself_wrongly_is_left_out() -> None:
+    """HiGHS 1.15.1 ends in an error here ("untransformed violations"), without presolve not."""
+    rng = random.Random(200466)
+    problem = random_problem(rng, 30)
+    errors = [found.error_m for _, found in all_designs(problem)]
+    problem = with_random_limits(rng, problem, errors)
+    found, expected = best_by_milp(problem, Deadline()), best_by_enumeration(problem)
+    assert found is not None
+    assert expected is not None
+    totals = [evaluate(problem, design).error_m for design in (found, expected)]
+    assert totals[0] == totals[1]
 
 
 def test_values_left_by_an_unfinished_solve_are_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:

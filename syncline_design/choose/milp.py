@@ -25,9 +25,13 @@ from syncline_design.design_space import Design, Pair, Problem, ResourceName
 
 LEAST_HIGHSPY = (1, 15)
 MOST_CUTS = 40
-OPTIONS = {"mip_rel_gap": 0.0, "mip_abs_gap": 0.0, "threads": 1, "random_seed": 1}
-OPTIONS |= {"mip_feasibility_tolerance": 1e-9, "primal_feasibility_tolerance": 1e-9}
-OPTIONS |= {"dual_feasibility_tolerance": 1e-9}
+MOST_DEMANDS = 10_000
+OPTIONS: dict[str, Any] = {"mip_rel_gap": 0.0, "mip_abs_gap": 0.0, "threads": 1, "random_seed": 1}
+TIGHT = {
+    "mip_feasibility_tolerance": 1e-9,
+    "primal_feasibility_tolerance": 1e-9,
+    "dual_feasibility_tolerance": 1e-9,
+}
 ERROR_STEPS = 1e6  # the error objective counts millionths of a typical error
 
 _SUNG: list[bool] = []  # whether the canary has been solved rightly in this process
@@ -39,7 +43,7 @@ def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
         return None
     solver = _Solver(deadline)
     solver.demand_canary()
-    model = _Model(problem, solver.cp)
+    model = _Model(problem, solver.cp, deadline)
     first = model.solve(solver, model.objective())
     if first is None or problem.objective == "error":
         return first
@@ -72,19 +76,25 @@ class _Solver:
     def run(self, problem: Any) -> str:
         """Solve; anything but a proven optimum or infeasibility is no verdict."""
         self.deadline.check()
-        options: dict[str, Any] = dict(OPTIONS)
-        left = self.deadline.left_s()
-        if left is not None:
-            options["time_limit"] = left
         try:
-            problem.solve(solver=self.cp.HIGHS, **options)
-        except self.cp.error.SolverError as error:
-            raise NoVerdict(f"the MILP solver stopped without an answer: {error}") from None
+            self._solve(problem, OPTIONS | TIGHT)
+        except self.cp.error.SolverError:
+            # Now and then the presolve of HiGHS 1.15.1 undoes itself wrongly: it notices, and ends
+            # in an error ("untransformed violations").  Without presolve it finds the optimum.
+            try:
+                self._solve(problem, OPTIONS | TIGHT | {"presolve": "off"})
+            except self.cp.error.SolverError as error:
+                raise NoVerdict(f"the MILP solver stopped without an answer: {error}") from None
         status = str(problem.status)
         if status not in ("optimal", "infeasible"):
             self.deadline.check()
             raise NoVerdict(f"the MILP solver ended without a proof (status {status})")
         return status
+
+    def _solve(self, problem: Any, options: dict[str, Any]) -> None:
+        left = self.deadline.left_s()
+        limit = {} if left is None else {"time_limit": left}
+        problem.solve(solver=self.cp.HIGHS, **options, **limit)
 
     def demand_canary(self) -> None:
         """min 2 x + 3 z, x + z >= 4.5, z whole: 9; HiGHS 1.14 says 15 (highs-js issue 53).
@@ -122,6 +132,7 @@ class _Model:
 
     problem: Problem
     cp: Any
+    deadline: Deadline
     tables: Tables = field(init=False)
     rows: list[Any] = field(init=False, default_factory=list)
 
@@ -139,6 +150,7 @@ class _Model:
             for k in range(len(self.tables.tracked))
         }
         self.classes = [list(_classes(self.tables, r)) for r in range(len(self.x))]
+        self._demand_size()
         self.demands = list(self._demands())
         self.ceilings = sorted({bound for bound, _ in self.demands} | {0.0})
         self.z = cp.Variable(len(self.ceilings), boolean=True)
@@ -148,6 +160,7 @@ class _Model:
     def _add_rows(self) -> None:
         place = {bound: k for k, bound in enumerate(self.ceilings)}
         for bound, members in self.demands:
+            self.deadline.check()
             if place[bound]:
                 at_least = self.cp.sum(self.z[place[bound] :])
                 self.rows.append(sum(members) - (len(members) - 1) <= at_least)
@@ -159,6 +172,19 @@ class _Model:
             if budget is not None:
                 amount = max(1, scale.whole(budget))
                 self.rows.append(self._amount(k, 1.0 / amount) <= scale.whole(budget) / amount)
+
+    def _demand_size(self) -> None:
+        """Refuse what would take longer to write down than to solve otherwise."""
+        count = sum(
+            len(self.classes[p.role])
+            * (1 if p.reference is None else len(self.classes[p.reference]))
+            for p in self.problem.pairs
+        )
+        if count > MOST_DEMANDS:
+            raise NoVerdict(
+                f"{count} pairs of different timestamp errors are too many for the MILP "
+                f"(at most {MOST_DEMANDS})"
+            )
 
     def _demands(self) -> Iterator[tuple[float, list[Any]]]:
         """(pair bound, binaries that are all 1 where it applies)."""
