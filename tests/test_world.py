@@ -326,6 +326,9 @@ def test_conventions_are_what_they_are_called() -> None:
     np.testing.assert_array_equal(enu["position_down_m"], -plain["position_down_m"])
     radians = with_convention("attitude", "radians")
     np.testing.assert_allclose(radians["roll_deg"], np.radians(plain["roll_deg"]), atol=1e-12)
+    noisy = make_log(run, (hidden("frame_convention", "attitude", convention="radians"),)).columns
+    spread = np.std(np.degrees(noisy["roll_deg"]) - plain["roll_deg"])  # noise before the mistake
+    assert spread == pytest.approx(0.03, rel=0.2)
     sign = with_convention("ranging", "elevation_sign")
     np.testing.assert_array_equal(sign["elevation_deg"], -plain["elevation_deg"])
 

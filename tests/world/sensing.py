@@ -61,7 +61,7 @@ def read_position(carrier: Carrier, faults: Faults, stamps_s: Array) -> Array:
         # heave is read where the sensor sits, relative to its own level at rest
         turned = carrier.path.rotation(when).apply(faults.heave_sensor_moved_m)
         place[:, 2] += turned[:, 2] - faults.heave_sensor_moved_m[2]
-    return _position_convention(place, faults.convention.get("position"))
+    return np.asarray(place)
 
 
 def _position_convention(place: Array, convention: str | None) -> Array:
@@ -84,7 +84,7 @@ def read_attitude(carrier: Carrier, faults: Faults, stamps_s: Array) -> Array:
     yaw = carrier.path.euler(when)[:, 0]
     for added in faults.yaw_added:
         euler[:, 0] += added(stamps_s, yaw)
-    return _attitude_convention(euler, faults.convention.get("attitude"))
+    return np.asarray(euler)
 
 
 def _leaning(true: Rotation, acceleration: Array, gain: float) -> Rotation:
@@ -145,8 +145,7 @@ def _sight(
     azimuth = np.arctan2(seen[:, 1], seen[:, 0]) + faults.azimuth_bias_rad
     elevation = np.arcsin(-seen[:, 2] / reach) + faults.elevation_bias_rad
     added = sum((add(stamps_s, reach) for add in faults.range_added), np.zeros_like(reach))
-    polar = np.column_stack([reach + added, azimuth, elevation])
-    return _ranging_convention(polar, faults.convention.get("ranging"))
+    return np.column_stack([reach + added, azimuth, elevation])
 
 
 def _ranging_convention(polar: Array, convention: str | None) -> Array:
@@ -174,6 +173,17 @@ def read_all(run: Scenario, faults: tuple[Faults, ...]) -> tuple[Reading, ...]:
             polar = read_ranging(carrier, fault, run.stamps_s, points)
         readings.append(Reading(antenna, read_attitude(carrier, fault, run.stamps_s), polar))
     return tuple(readings)
+
+
+def as_written(reading: Reading, faults: Faults) -> Reading:
+    """The readings as the log's columns hold them, in whatever convention that is."""
+    antenna, polar = reading.antenna_m, reading.polar
+    if antenna is not None:
+        antenna = _position_convention(antenna, faults.convention.get("position"))
+    if polar is not None:
+        polar = _ranging_convention(polar, faults.convention.get("ranging"))
+    euler = _attitude_convention(reading.euler_rad, faults.convention.get("attitude"))
+    return Reading(antenna, euler, polar)
 
 
 def _sighted_points(run: Scenario, faults: tuple[Faults, ...], index: int) -> Array:

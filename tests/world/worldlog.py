@@ -14,7 +14,7 @@ from tests.world.geodesy import to_geodetic
 from tests.world.hidden import Hidden, placed
 from tests.world.noise import Noise, disturb
 from tests.world.scenarios import Carrier, Scenario
-from tests.world.sensing import Reading, listed_truth, read_all
+from tests.world.sensing import Reading, as_written, listed_truth, read_all
 from tests.world.trajectory import Array
 
 DEGREE = np.pi / 180.0
@@ -152,7 +152,7 @@ def make_log(run: Scenario, effects: Sequence[Hidden] = (), noise: Noise | None 
     faults = all_faults(run, tuple(effects))
     clean = read_all(run, faults)
     readings = tuple(
-        disturb(run, stage, reading, fault, noise)
+        as_written(disturb(run, stage, reading, fault, noise), fault)
         for stage, (reading, fault) in enumerate(zip(clean, faults, strict=True))
     )
     listed = listed_truth(run, faults[-1])
