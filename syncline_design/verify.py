@@ -168,7 +168,7 @@ def _infeasible_json(loaded: LoadedSpec, problem: DesignProblem, settings: Check
     )
     data = frame(loaded, problem, "infeasible", settings.seed)
     data["infeasibility"] = found.to_json() | {"text": found.lines()}
-    conflict = {member.id for member in found.conflict}
+    conflict = {m.id for members in (found.conflict, *found.further) for m in members}
     data["requirements"] = [
         _placed(loaded, index, one, _unmet(loaded, one, one.id in conflict), settings).to_json()
         for index, one in enumerate(loaded.spec.requirements)

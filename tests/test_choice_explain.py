@@ -87,6 +87,40 @@ def test_each_member_of_the_conflict_left_out_makes_it_feasible(tmp_path: Path) 
     assert not is_feasible(with_limits(problem, limits))
 
 
+def with_mass(folder: Path, mass: str, **changes: str) -> LoadedSpec:
+    text = spec(folder, **changes).text.replace("limit: 10 kg", f"limit: {mass}")
+    return load_text(text, folder / "spec.yaml")
+
+
+def test_two_conflicts_are_both_named_and_lifted_together(tmp_path: Path) -> None:
+    """Neither budget alone is the reason, so no single change helps; both do, and less does not."""
+    found = explained(with_mass(tmp_path, "2 kg", cost="20000 EUR"))
+    conflicts = [{m.id for m in members} for members in (found.conflict, *found.further)]
+    assert sorted(conflicts, key=str) == [{"COST"}, {"MASS"}]
+    assert found.fixes == ()
+    (together,) = found.joint
+    changed = {fix.requirement: fix.after for fix in together}
+    cost, mass = changed["COST"], changed["MASS"]
+    assert cost is not None
+    assert mass is not None
+    for less_cost, less_mass, expected in (
+        (0.0, 0.0, Choice), (1.0, 0.0, Infeasible), (0.0, 0.02, Infeasible),
+    ):  # fmt: skip
+        other = with_mass(tmp_path, f"{mass - less_mass!r} kg", cost=f"{cost - less_cost!r} EUR")
+        assert isinstance(choose(build_problem(other)), expected)
+    text = "\n".join(found.lines())
+    assert "Apart from that, " in text
+    assert " and ".join(fix.text for fix in together) in text
+
+
+def test_a_remedy_says_that_a_simulated_requirement_is_still_to_be_met(tmp_path: Path) -> None:
+    text = spec(tmp_path, cost="40000 EUR").text.replace(
+        "stages:\n", "  - {id: MC, kind: monte_carlo, quantile: 0.95, limit: 1 m}\nstages:\n"
+    )
+    found = explained(load_text(text, tmp_path / "spec.yaml"))
+    assert found.lines()[-1] == "Then MC has still to be met by simulation."
+
+
 def test_fixes_are_the_smallest_and_each_holds(tmp_path: Path) -> None:
     """The remedy makes the spec feasible, and a slightly smaller one does not."""
     found = explained(spec(tmp_path, cost="40000 EUR"))

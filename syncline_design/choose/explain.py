@@ -4,7 +4,7 @@ cannot hold together, and the smallest single changes that help."""
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +15,7 @@ from syncline_design.choose.fixes import (
     platform_fixes,
     requirement_fixes,
 )
+from syncline_design.choose.joint import joint_fixes
 from syncline_design.choose.outcome import NoVerdict
 from syncline_design.choose.variations import Build
 from syncline_design.design_space import Limits, Problem, RoleTable, with_limits
@@ -63,20 +64,29 @@ class ConflictMember:
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Why a spec is infeasible.  minimal: proven that any one of the conflict left out helps."""
+    """Why a spec is infeasible.  minimal: proven that any one of the conflict left out helps.
+
+    further: conflicts that remain once the first is lifted; where there are any, no single change
+    helps and `joint` holds changes that help together.  simulated: ids of Monte Carlo requirements,
+    which a changed spec still has to meet.
+    """
 
     gaps: tuple[RoleGap, ...]
     conflict: tuple[ConflictMember, ...]
     minimal: bool
     fixes: tuple[Fix, ...]
+    further: tuple[tuple[ConflictMember, ...], ...] = ()
+    joint: tuple[tuple[Fix, ...], ...] = ()
+    simulated: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The value of `infeasibility`."""
-        members = [{"id": m.id, "kind": m.kind, "line": m.line} for m in self.conflict]
         return {
             "roles_without_options": [gap.to_json() for gap in self.gaps],
-            "conflict": {"requirements": members, "minimal": self.minimal},
+            "conflict": {"requirements": _members_json(self.conflict), "minimal": self.minimal},
+            "further_conflicts": [_members_json(one) for one in self.further],
             "fixes": [fix.to_json() for fix in self.fixes],
+            "joint_fixes": [[fix.to_json() for fix in together] for together in self.joint],
         }
 
     def lines(self) -> list[str]:
@@ -84,22 +94,37 @@ class Explanation:
         out = ["No design meets this spec."]
         out += [f"  {gap.text}" for gap in self.gaps]
         if self.conflict:
-            out.append(f"  {self._conflict_text()}")
+            out.append(f"  {_conflict_text(self.conflict, self.minimal, bool(self.further))}")
+        out += [f"  Apart from that, {_conflict_text(one, True, True)}" for one in self.further]
         if self.fixes:
             out.append("Any one of these changes makes it feasible (each solved again):")
             out += [f"  - {fix.text}" for fix in self.fixes]
         else:
             out.append("No single change of a requirement, platform or method makes it feasible.")
+        if self.joint:
+            out.append("Changes that do so together (solved again):")
+            out += ["  - " + " and ".join(f.text for f in together) for together in self.joint]
+        if self.simulated and (self.fixes or self.joint):
+            out.append(f"Then {_listed(self.simulated)} has still to be met by simulation.")
         return out
 
-    def _conflict_text(self) -> str:
-        names = [member.words for member in self.conflict]
-        if len(names) == 1:
-            return f"{names[0]} alone cannot be met by any combination of the candidates."
-        joined = ", ".join(names[:-1]) + " and " + names[-1]
-        if not self.minimal:
-            return f"{joined} cannot all hold together (a smaller set was not ruled out)."
-        return f"{joined} cannot hold together; without any one of them a design exists."
+
+def _conflict_text(members: Sequence[ConflictMember], minimal: bool, more: bool) -> str:
+    names = [member.words for member in members]
+    if len(names) == 1:
+        return f"{names[0]} alone cannot be met by any combination of the candidates."
+    if not minimal:
+        return f"{_listed(names)} cannot all hold together (a smaller set was not ruled out)."
+    ending = "" if more else "; without any one of them a design exists"
+    return f"{_listed(names)} cannot hold together{ending}."
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
+
+
+def _members_json(members: Sequence[ConflictMember]) -> list[dict[str, Any]]:
+    return [{"id": m.id, "kind": m.kind, "line": m.line} for m in members]
 
 
 def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) -> Explanation:
@@ -109,7 +134,12 @@ def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) 
     """
     gaps = tuple(_gap(table, problem.limits.sync) for table in problem.roles if not table.options)
     conflict, minimal = _conflict(problem)
-    members = tuple(_member(loaded, problem, kind) for kind in conflict)
+    further = _further(problem, conflict)
+    members, *others = (
+        tuple(_member(loaded, problem, kind) for kind in kinds)
+        for kind_sets in ((conflict,), further)
+        for kinds in kind_sets
+    )
     fixes: list[Fix] = []
     sources: tuple[Callable[[], Any], ...] = (
         lambda: requirement_fixes(loaded, problem),
@@ -121,7 +151,26 @@ def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) 
             fixes += source()
         except NoVerdict:  # a remedy that cannot be proven is not offered
             continue
-    return Explanation(gaps, members, minimal, tuple(fixes))
+    joint = joint_fixes(loaded, problem, (conflict, *further)) if further and not fixes else ()
+    simulated = tuple(r.id for r in loaded.spec.requirements if r.kind == "monte_carlo")
+    return Explanation(gaps, members, minimal, tuple(fixes), tuple(others), joint, simulated)
+
+
+def _further(problem: Problem, first: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+    """Conflicts that remain, one after the other, once those before them are lifted."""
+    found: list[tuple[str, ...]] = []
+    lifted = list(first)
+    while lifted:
+        rest = with_limits(problem, _without(problem.limits, lifted))
+        try:
+            conflict = () if is_feasible(rest) else _conflict(rest)[0]
+        except NoVerdict:
+            break
+        if not conflict:
+            break
+        found.append(conflict)
+        lifted += conflict
+    return tuple(found)
 
 
 def _gap(table: RoleTable, sync_limit: float) -> RoleGap:

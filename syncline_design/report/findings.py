@@ -54,8 +54,8 @@ def findings(verdict: Json) -> list[Finding]:
     """Every requirement, problem, reason of infeasibility and warning of a verdict."""
     file = spec_file(verdict)
     found = [_problem(entry, file) for entry in items(verdict, "problems")]
-    conflict = _conflict_ids(verdict)
-    found += [_requirement(row, file, verdict, conflict) for row in items(verdict, "requirements")]
+    rows = items(verdict, "requirements")
+    found += [_requirement(row, file, verdict, _conflict_of(row, verdict)) for row in rows]
     if verdict.get("verdict") in ("infeasible", "indeterminate") and not found_failure(found):
         found.insert(0, _no_design(verdict, file))
     found += [
@@ -98,9 +98,17 @@ def _requirement(row: Json, file: str, verdict: Json, conflict: list[str]) -> Fi
                    _place(row, "column"), message, waiver_text(row))  # fmt: skip
 
 
-def _conflict_ids(verdict: Json) -> list[str]:
-    conflict = part(part(verdict, "infeasibility"), "conflict")
-    return [str(entry.get("id")) for entry in items(conflict, "requirements")]
+def _conflict_of(row: Json, verdict: Json) -> list[str]:
+    """Ids of the conflict that a requirement is part of; empty where it is in none."""
+    why = part(verdict, "infeasibility")
+    further = why.get("further_conflicts")
+    conflicts = [items(part(why, "conflict"), "requirements")]
+    conflicts += further if isinstance(further, list) else []
+    for members in conflicts:
+        ids = [str(entry.get("id")) for entry in members]
+        if str(row.get("id")) in ids:
+            return ids
+    return []
 
 
 def _conflict_text(row: Json, others: list[str], verdict: Json) -> str:
@@ -111,7 +119,11 @@ def _conflict_text(row: Json, others: list[str], verdict: Json) -> str:
 
 def _fixes(verdict: Json) -> str:
     texts = [str(entry.get("text")) for entry in items(part(verdict, "infeasibility"), "fixes")]
-    return f" Either of these would do: {'; '.join(texts)}." if texts else ""
+    if texts:
+        return f" Either of these would do: {'; '.join(texts)}."
+    joint = part(verdict, "infeasibility").get("joint_fixes")
+    sets = [" and ".join(str(f.get("text")) for f in fixes) for fixes in joint or ()]
+    return f" Together these would do: {'; or '.join(sets)}." if sets else ""
 
 
 def requirement_sentence(row: Json) -> str:
