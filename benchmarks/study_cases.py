@@ -255,10 +255,10 @@ def lengths(seed: int) -> Iterator[Case]:
         yield replace(base, group="1 h at 10 Hz", duration_s=3600.0)
 
 
-def full(seeds: int) -> list[Case]:
+def full(seeds: int, first: int = 100) -> list[Case]:
     """Every case, seed by seed, so that a part of the study is a fair sample of it."""
     cases: list[Case] = []
-    for seed in range(100, 100 + seeds):
+    for seed in range(first, first + seeds):
         for part in (clean, others, constant_speed, deleted, families, lengths):
             cases.extend(part(seed))
         for times in (10.0, 3.0):
