@@ -226,7 +226,8 @@ def _refuse_characters(text: str, builder: _Builder) -> None:
         kind = "a bidirectional override" if re.match(f"[{_BIDI}]", match[0]) else "a character"
         builder.refuse(
             (), (line, column), f"{kind} that does not show (U+{ord(match[0]):04X})",
-            hint="delete it, or escape it in a quoted text",
+            hint="delete it"
+            + ("" if _VALUE_REFUSED.match(match[0]) else ", or escape it in a quoted text"),
         )  # fmt: skip
         if len(builder.problems) >= 20:
             break

@@ -178,3 +178,14 @@ def test_paths_are_shown_as_people_write_them() -> None:
     assert show_path(("stages", 0, "position", "sensor")) == "stages[0].position.sensor"
     assert show_path(()) == ""
     assert "\n" not in show_path(("a\nb", "c"))
+
+
+@pytest.mark.parametrize(
+    ("character", "escapable"), [("\x07", True), ("\0", False), ("\u202e", False)]
+)
+def test_a_hint_to_escape_is_given_only_where_the_escape_is_read(
+    character: str, escapable: bool
+) -> None:
+    (raw,) = parse(f"name: 'a{character}b'\n", "x.yaml").problems
+    escaped = parse(f'name: "a\\u{ord(character):04x}b"\n', "x.yaml").problems
+    assert ("escape it" in raw.hint) == escapable == (not escaped)
