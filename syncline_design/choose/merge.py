@@ -27,6 +27,8 @@ from syncline_design.choose.pareto import (
 from syncline_design.choose.safety import Safety, TimingClass
 from syncline_design.design_space import Problem, VehicleTable
 
+FEW = 64  # partial designs that are not worth comparing with one another
+
 
 @dataclass(frozen=True, slots=True)
 class Ceiling:
@@ -238,7 +240,9 @@ class Merge:
         if self.ceiling is not None and len(rows):
             below = self._below_ceiling(labels, role)
             rows, labels = rows[below], labels.take(below)
-        return rows[undominated(self._columns(labels, role, timing))] if len(rows) else rows
+        if len(rows) <= FEW:
+            return rows
+        return rows[undominated(self._columns(labels, role, timing))]
 
     def _columns(self, labels: Labels, role: int, timing: TimingClass) -> Columns:
         total = labels.error + (labels.sync if self.per_sensor else self.rate * labels.bound)
