@@ -194,3 +194,17 @@ def test_names_cannot_start_a_line_nor_colour_it(command: str, tmp_path: Path) -
     assert "pwn" in done.stdout
     assert "\x1b" not in done.stdout
     assert not any(line.lstrip().startswith("::") for line in done.stdout.splitlines())
+
+
+def test_a_design_is_not_written_where_its_catalogs_are_missing(tmp_path: Path) -> None:
+    text = (SPECS / "position_track.yaml").read_text("utf-8")
+    (tmp_path / "own.yaml").write_text("sensors: {}\n", "utf-8")
+    (tmp_path / "elsewhere").mkdir()
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(text + "catalogs: [own.yaml]\n", "utf-8")
+    done = run("optimize", str(spec), "--write-design", str(tmp_path / "elsewhere" / "p.yaml"))
+    assert done.returncode == 2
+    assert "write the design beside the spec" in done.stderr
+    assert list((tmp_path / "elsewhere").iterdir()) == []
+    assert run("optimize", str(spec), "--write-design", str(tmp_path / "p.yaml")).returncode == 0
+    assert run("check", str(tmp_path / "p.yaml")).returncode == 0

@@ -80,6 +80,12 @@ def optimize(
             "choices would be lost; give another name"
         )
     loaded = load(spec)
+    for name in loaded.spec.catalogs if write_design is not None else ():
+        if write_design is not None and not (write_design.parent / name).exists():
+            refuse(
+                f"syncline-design: --write-design {write_design}: the spec draws in {name}, which "
+                "is not in that folder; write the design beside the spec"
+            )
     settings = OptimizeSettings(
         best, pareto, resource, road(method), time_limit_s=time_limit, seed=seed
     )
