@@ -14,15 +14,13 @@ from syncline_design.diagnose.identify import Comparison, compare
 from syncline_design.diagnose.noise import NoiseLevel, precision
 from syncline_design.diagnose.scales import figure
 from syncline_design.diagnose.search import SearchResult, Step
-from syncline_design.diagnose.simulation import Acting, Scene
+from syncline_design.diagnose.simulation import Scene
 from syncline_design.diagnose.tails import scaled_remainder, tails_of
-from syncline_design.effects import registry
 from syncline_design.effects.base import Effect
 
 Label = tuple[str, str, int]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
-WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,31 +110,7 @@ def _deterministic(
             at += 1
         figures[p.name] = Figure(float(one.values[p.name]), spread, p.unit)
     compared = compare(data, model, index, signatures)  # type: ignore[arg-type]
-    whole = _whole_seconds(one, figures)
-    if whole is not None:
-        return _as_slip(_finding(data.view, one.effect, one.label, figures, compared, steps), whole)
     return _finding(data.view, one.effect, one.label, figures, compared, steps)
-
-
-def _whole_seconds(one: Acting, figures: Mapping[str, Figure]) -> float | None:
-    """The number of seconds if a position latency is one of whole seconds."""
-    if one.label[:2] != ("latency", "position"):
-        return None
-    latency = figures["latency_s"]
-    seconds = float(round(float(latency.value)))
-    reach = max(3.0 * (latency.standard_uncertainty or 0.0), WHOLE_S)
-    return seconds if seconds and abs(float(latency.value) - seconds) < reach else None
-
-
-def _as_slip(latency: Finding, seconds: float) -> Finding:
-    """A latency of whole seconds as what it is in practice: two time scales."""
-    alias = AliasFigure("latency", latency.sensor, latency.stage, 1.0, 0.0)
-    return replace(
-        latency,
-        effect=registry()["integer_second_slip"],
-        parameters={"seconds": Figure(seconds, None, "s")},
-        aliases=(alias, *latency.aliases),
-    )
 
 
 def _finding(

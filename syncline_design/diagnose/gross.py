@@ -25,8 +25,10 @@ FALLS_TO = 1.0 / 3.0
 FAR_FROM_NOISE = 4.0  # times the expected size
 MOST = 3  # gross faults at once
 ROWS = 3000
-LEAST_SLIP = 3  # a shorter one is found as a latency first, which may be no whole number
-SECONDS = tuple(k for k in range(-18, 19) if abs(k) >= LEAST_SLIP)
+WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
+SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of seconds
+NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
+SECONDS = tuple(k for k in range(-18, 19) if k)
 DEGREE = np.pi / 180.0
 
 
@@ -148,9 +150,26 @@ def gross_faults(
         best, _, one = min(sizes, key=lambda entry: entry[:2], default=(size, 0, None))
         if one is None or not best < FALLS_TO * size:
             break
+        if _is_short_slip(one) and not best < NEARLY_NOISE * expected_m:
+            break
         found.append(Gross(one, size / max(best, 1e-300)))
         log = mended(log, one, reread)
     return tuple(found), log
+
+
+def _is_short_slip(one: Acting) -> bool:
+    return (
+        one.effect.name == "integer_second_slip" and abs(float(one.values["seconds"])) <= SHORT_SLIP
+    )
+
+
+def whole_seconds(latency_s: float, uncertainty_s: float) -> Acting | None:
+    """The slip that a position latency of whole seconds is: two time scales, in practice."""
+    seconds = float(round(latency_s))
+    near = abs(latency_s - seconds) < max(3.0 * uncertainty_s, WHOLE_S)
+    if not seconds or not near:
+        return None
+    return acting("integer_second_slip", "position", 0, {"seconds": seconds})
 
 
 Trials = list[tuple[Acting, Callable[[], Array]]]

@@ -16,7 +16,7 @@ from syncline_design.diagnose.figures_data import plots
 from syncline_design.diagnose.findings import findings
 from syncline_design.diagnose.fitting import WINDOW, Data, data_of, windows
 from syncline_design.diagnose.gap import Gap, block_folds, gap, regime_fold
-from syncline_design.diagnose.gross import gross_faults
+from syncline_design.diagnose.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnose.identify import unseen
 from syncline_design.diagnose.log import Log
 from syncline_design.diagnose.regimes import (
@@ -29,7 +29,7 @@ from syncline_design.diagnose.remainder import remainder
 from syncline_design.diagnose.result import Diagnosis, Json, Stairs, Verdict
 from syncline_design.diagnose.search import Search, SearchResult, start_search
 from syncline_design.diagnose.settings import DiagnosisSettings, Progress, silent
-from syncline_design.diagnose.simulation import scene
+from syncline_design.diagnose.simulation import Acting, scene
 from syncline_design.diagnose.system import Measured, measured
 from syncline_design.loading import LoadedSpec, load
 
@@ -69,13 +69,14 @@ def diagnose_measured(
         settings.exclude_effects,
         inputs.reread,
     )
-    kept = windows(len(log), MOST_ROWS, WINDOW)
-    view = scene(inputs.system, log.rows(kept), inputs.known)
-    parts = directed_parts(view, candidates(view, settings.exclude_effects))
-    data = data_of(view, structure_of(view, parts))
-    progress("searching", 0.15)
-    search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
-    result = search.run()
+    data, search, result = _searched(inputs, log, settings, progress)
+    slip = _slip(result)
+    if slip is not None and slip.effect.name not in settings.exclude_effects:
+        before = usual_size(result.base.error)
+        faults = (*faults, Gross(slip, before / max(usual_size(result.model.error), 1e-300)))
+        log = mended(log, slip, inputs.reread)
+        data, search, result = _searched(inputs, log, settings, progress)
+    view = data.view
     progress("testing what remains", 0.7)
     rest = remainder(data, result.model, search.rng)
     named = bool(result.model.labels or faults)
@@ -108,12 +109,37 @@ def diagnose_measured(
     )
 
 
+def _searched(
+    inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress
+) -> tuple[Data, Search, SearchResult]:
+    """The search over one log; of a long one, over windows of it."""
+    kept = windows(len(log), MOST_ROWS, WINDOW)
+    view = scene(inputs.system, log.rows(kept), inputs.known)
+    parts = directed_parts(view, candidates(view, settings.exclude_effects))
+    data = data_of(view, structure_of(view, parts))
+    progress("searching", 0.15)
+    search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
+    return data, search, search.run()
+
+
+def _slip(result: SearchResult) -> Acting | None:
+    """A position latency of whole seconds: the rows are paired anew, which is more exact."""
+    at = 0
+    for one in result.model.acting:
+        if one.label == ("latency", "position", 0):
+            spread = float(np.sqrt(max(result.model.covariance[at, at], 0.0)))
+            return whole_seconds(float(one.values["latency_s"]), spread)
+        at += len(one.effect.slopes())
+    return None
+
+
 def expected_size(inputs: Measured) -> float:
     """Usual length of the error vector [m] that the spec's noise makes."""
     view = scene(inputs.system, inputs.log.rows(slice(0, None, max(1, len(inputs.log) // 500))))
     structure = structure_of(view)
-    total = sum(np.einsum("nii->n", w.covariance) for w in structure.white)
-    return float(np.sqrt(np.median(total)))
+    variance = sum(np.einsum("nii->ni", w.covariance) for w in structure.white)
+    visible = np.isfinite(view.log.truth_m)
+    return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
 
 
 def _stairs(data: Data, result: SearchResult, left: bool) -> tuple[Stairs, ...]:
