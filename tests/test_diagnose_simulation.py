@@ -97,7 +97,7 @@ def small(*effects: Hidden) -> WorldLog:
 
 
 def test_written_back_the_same_log_agrees(tmp_path: Path) -> None:
-    """Then the spec is right; a right one is found at fault at the stated 5 %, the seed is fixed."""
+    """Then the spec is right; 5 % of right ones would be found at fault, the seed is fixed."""
     log = small(hidden("latency", "position", latency_s=0.1))
     spec = tmp_path / "spec.yaml"
     spec.write_text(log.spec_yaml(), encoding="utf-8")
@@ -109,6 +109,14 @@ def test_written_back_the_same_log_agrees(tmp_path: Path) -> None:
     again = diagnose(tmp_path / "fixed.yaml", [data])
     assert again.verdict == "agrees"
     assert again.exit_code == 0
+
+
+def test_a_position_log_ignores_the_ranging_sensors_arm(tmp_path: Path) -> None:
+    """A spec with a scanner, a log against a better system: only the antenna's arm counts."""
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(small().spec_yaml(), encoding="utf-8")
+    log = make_log(scenario("car_stops", 9, 60.0, 5.0, "position"))
+    assert diagnose(spec, [log.to_csv(tmp_path / "log.csv")]).verdict == "agrees"
 
 
 def test_the_same_seed_gives_the_same_answer(tmp_path: Path) -> None:

@@ -91,6 +91,8 @@ def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
         zip(system.stages, log.stages, motions, strict=True)
     ):
         antenna, ranging = levers(stage, index)
+        if log.kind == "position":  # the reference point itself is compared
+            ranging = np.zeros(3)
         rotation = euler_to_rotation(logged.euler_rad)
         source = logged.antenna_m if place is None else place
         if source is None:
