@@ -15,7 +15,7 @@ from typing import Any
 
 from syncline_design.choose.decide import choose
 from syncline_design.choose.evaluate import broken, chosen_options, evaluate, pair_bound
-from syncline_design.choose.outcome import Choice
+from syncline_design.choose.outcome import Choice, NoVerdict
 from syncline_design.choose.variations import (
     PLATFORM_FIGURES,
     Build,
@@ -35,7 +35,9 @@ CLOSE = 1e-4
 
 @dataclass(frozen=True, slots=True)
 class Slack:
-    """One term: its value, and the values at which verdict and payload change (None: never).
+    """One term: its value, and the values at which verdict and payload change.
+
+    None: not up to a hundred times the value, or (payload only) not proven.
 
     limited_by: kind of the requirement that then breaks.  unit: of all three figures.
     """
@@ -258,7 +260,10 @@ def _payload_factor(
         found = choose(other, "front")
         return isinstance(found, Choice) and payload(other, found.design) == now
 
-    return _first(same, until)
+    try:
+        return _first(same, until)
+    except NoVerdict:  # what cannot be proven is not claimed
+        return None
 
 
 def _first(holds: Callable[[float], bool], until: float | None) -> float | None:

@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 from syncline_design.choose.decide import choose
 from syncline_design.choose.evaluate import chosen_options, evaluate
-from syncline_design.choose.outcome import Choice
+from syncline_design.choose.outcome import Choice, NoVerdict
 from syncline_design.choose.slack import payload
 from syncline_design.choose.variations import (
     Build,
@@ -206,7 +206,10 @@ def measure_next(
     given = [figure for figure in figures if figure.quantity.has_tolerance]
     found: list[Measurement] = []
     for figure in given or figures:
-        found += _flips(loaded, problem, design, build, figure, assumed=not given)
+        try:
+            found += _flips(loaded, problem, design, build, figure, assumed=not given)
+        except NoVerdict:  # what cannot be proven is not claimed
+            continue
     return tuple(sorted(found, key=lambda m: (-_weight(m), m.figure, m.at)))
 
 
