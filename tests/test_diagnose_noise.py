@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2, multivariate_normal
-from syncline_design.diagnose.scores import Gram, clean_threshold, log_p_of
 
 from syncline_design.diagnose.covariance import factored, inverse_3x3
+from syncline_design.diagnose.gross import whole_seconds
 from syncline_design.diagnose.noise import (
     Slow,
     Structure,
@@ -19,6 +19,8 @@ from syncline_design.diagnose.noise import (
     spec_bounds,
 )
 from syncline_design.diagnose.scales import figure
+from syncline_design.diagnose.scores import Gram, clean_threshold, log_p_of
+from syncline_design.diagnose.tails import tails_of
 from syncline_design.diagnose.trajectory import pieces
 from syncline_design.effects.kinematics import gauss_markov
 
@@ -139,6 +141,30 @@ def test_log_p_far_out_follows_mpmath(freedom: int) -> None:
         upper = mpmath.gammainc(mpmath.mpf(freedom) / 2, mpmath.mpf(statistic) / 2)
         exact = float(mpmath.log(upper / mpmath.gamma(mpmath.mpf(freedom) / 2)))
         assert log_p_of(statistic, freedom) == pytest.approx(exact, rel=1e-3)
+
+
+def test_tails_are_told_from_normal_noise() -> None:
+    """3 x 2000 draws: nu = 3 is known to about 5 %; normal noise gains nothing beyond luck."""
+    rng = np.random.default_rng(8)
+    heavy = tails_of(rng.standard_t(3.0, (2000, 3)))
+    assert heavy.gain > 200
+    assert heavy.degrees_of_freedom == pytest.approx(3.0, rel=0.25)
+    assert heavy.freedom_uncertainty < 0.5
+    normal = tails_of(rng.standard_normal((2000, 3)))
+    assert normal.gain < 10
+    assert normal.outlier_rate < 0.002
+    struck = rng.standard_normal((2000, 3))
+    struck[:40] *= 12.0
+    assert tails_of(struck).outlier_rate == pytest.approx(0.02, abs=0.006)
+
+
+def test_whole_seconds_are_a_slip_and_others_a_latency() -> None:
+    slip = whole_seconds(1.0005, 0.0001)
+    assert slip is not None
+    assert slip.values == {"seconds": 1.0}
+    assert whole_seconds(-17.9999, 0.001) is not None
+    assert whole_seconds(0.88, 0.03) is None
+    assert whole_seconds(0.0001, 0.001) is None
 
 
 def test_splines_stop_at_gaps_and_hold_beyond_ends() -> None:
