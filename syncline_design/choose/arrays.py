@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from operator import attrgetter
@@ -130,21 +131,29 @@ class _Amounts:
         self.matter = any(any(tops) for tops, _ in ratios) or any(rest)
         fits = largest * _most_terms(problem) < INT64_ROOM
         self.scaled = Scaled(name, denominator, np.int64 if fits else object)
-        self.columns = [_whole(tops, bottoms, self.scaled) for tops, bottoms in ratios]
+        self.columns = [
+            _whole(*ratio, len(role), self.scaled)
+            for ratio, role in zip(ratios, spent, strict=True)
+        ]
 
 
-def _ratios(amounts: list[Fraction | None]) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _ratios(amounts: list[Fraction | None]) -> tuple[Sequence[int], Sequence[int]]:
     """Numerators and denominators; what the catalog does not say counts nothing."""
     if not any(amounts):
-        return (0,) * len(amounts), (1,) * len(amounts)
+        return (), ()
     pairs = [(0, 1) if a is None else a.as_integer_ratio() for a in amounts]
     tops, bottoms = zip(*pairs, strict=True)
     return tops, bottoms
 
 
-def _whole(tops: tuple[int, ...], bottoms: tuple[int, ...], scaled: Scaled) -> Column:
-    factors = np.array(bottoms, dtype=scaled.dtype)
-    return np.asarray(np.array(tops, dtype=scaled.dtype) * (scaled.denominator // factors))
+def _whole(tops: Sequence[int], bottoms: Sequence[int], count: int, scaled: Scaled) -> Column:
+    if not tops:
+        return np.zeros(count, dtype=np.int64)
+    column = np.array(tops, dtype=scaled.dtype)
+    if scaled.denominator == 1:
+        return column
+    factors = scaled.denominator // np.array(bottoms, dtype=scaled.dtype)
+    return np.asarray(column * factors)
 
 
 def _most_terms(problem: Problem) -> int:
