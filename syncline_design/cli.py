@@ -66,13 +66,13 @@ def _start_quickly() -> None:
 
     While it imports, a command makes many lasting objects and little garbage: looking for cycles as
     often as Python does by default costs a tenth of its time.  Looking for validation plugins among
-    all installed packages costs about as much, and there are none.  The matrices are small and many:
+    all installed packages costs about as much, and there are none.  Matrices are small and many:
     threads of the linear algebra library slow them down, and could change the last bits.
     """
     gc.set_threshold(50_000, 20, 20)
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
-    for library in ("OMP", "OPENBLAS", "MKL"):
-        os.environ.setdefault(f"{library}_NUM_THREADS", "1")
+    for name in ("OMP", "OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")
 
 
 if __name__ == "__main__":
