@@ -276,6 +276,13 @@ def test_tables_and_csv(tmp_path: Path) -> None:
     assert presentation.slack_table([Slack("x", "s", 1.0, "m", None, None, 2.0)])[1].endswith("2 m")
 
 
+@pytest.mark.parametrize(
+    ("value", "text"), [(5.7563287, "5.757 m"), (0.25, "250 mm"), (0.29453366, "294.6 mm")]
+)
+def test_printed_targets_are_ones_that_the_price_buys(value: float, text: str) -> None:
+    assert presentation.target_text(value) == text
+
+
 @pytest.mark.parametrize("name", ["=HYPERLINK(1)", "+1+1", "@SUM(A1)", "-2+3"])
 def test_csv_runs_no_formula(name: str) -> None:
     roles = [[option(name, 0.5, 0.0, 1)], [option("b", 0.5, 0.0, 1)], [option("c", 0.5, 0.0, 1)]]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
@@ -38,6 +39,14 @@ def amount_text(amount: Fraction | None, resource: ResourceName, currency: str) 
 def length_text(value_m: float) -> str:
     """`29.45 mm`: a length with four figures."""
     return format_quantity(value_m, Dimension.LENGTH)
+
+
+def target_text(value_m: float) -> str:
+    """A length rounded up to four figures: a target that the printed price does buy."""
+    if not value_m > 0.0 or not math.isfinite(value_m):
+        return length_text(value_m)
+    scale = Fraction(10) ** (3 - math.floor(math.log10(value_m)))
+    return length_text(float(math.ceil(Fraction(value_m) * scale) / scale))
 
 
 def role_headers(problem: Problem) -> list[str]:
@@ -93,9 +102,9 @@ def staircase_lines(
     out = []
     for step in steps:
         price = amount_text(step.amount, resource, currency)
-        line = f"{price} buys any target from {length_text(step.tightest_m)}"
+        line = f"{price} buys any target from {target_text(step.tightest_m)}"
         if step.looser_than_m is not None:
-            line += f" up to {length_text(step.looser_than_m)}"
+            line += f" up to {target_text(step.looser_than_m)}"
         if step.extra is not None:
             line += f" ({amount_text(step.extra, resource, currency)} more)"
         out.append(line)
