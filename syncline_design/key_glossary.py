@@ -59,7 +59,7 @@ KEYS: dict[str, str] = {
     "reason": "Why the requirement may be missed.",
     "requirements": "What the design has to meet; each gets a verdict.",
     "requires": "Channels of shared hardware that one use takes: {timing_board: 1}.",
-    "samples": "Number of simulated errors.",
+    "samples": "Number of simulated errors (50 000 when not given), more where a limit needs it.",
     "sensor": "A catalog id, or a mapping with a sensor's keys; of an effect: the role it acts on.",
     "sensors": "Sensors, by id.",
     "sigma_attitude": "Standard deviation of roll, pitch, yaw: one figure or three.",

@@ -301,7 +301,7 @@ class Trajectory(Record):
 class MonteCarloChoice(Record):
     """Size and envelope of the Monte Carlo run."""
 
-    samples: Annotated[int, Field(ge=1, le=100_000_000)] = 200_000
+    samples: Annotated[int, Field(ge=1, le=100_000_000)] = 50_000
     envelope: Literal["limits", "inside", "trajectory"] = "limits"
     trajectory: Trajectory | None = None
 

@@ -88,7 +88,7 @@ effects: []
 def test_defaults_are_those_of_the_interface() -> None:
     spec = loaded(HEAD + STAGE).spec
     assert (spec.currency, spec.sync_model, spec.objective) == ("EUR", "syncline", "cost")
-    assert (spec.coverage_factor, spec.monte_carlo.samples) == (3.0, 200_000)
+    assert (spec.coverage_factor, spec.monte_carlo.samples) == (3.0, 50_000)
     assert spec.monte_carlo.envelope == "limits"
 
 
