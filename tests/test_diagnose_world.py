@@ -40,21 +40,18 @@ def short(platform: str, seed: int, *effects: Hidden, noise: Noise | None = None
 
 
 def test_clean_logs_are_left_alone(tmp_path: Path) -> None:
-    """6 logs at 5 %: more than 2 named comes in 0.2 % of choices of seeds."""
+    """4 logs at 5 %: more than 1 named comes in 1.4 % of choices of seeds."""
     wander = Noise(wander_share=0.6, wander_time_s=10.0)
-    logs = [short(platform, 7) for platform in PLATFORMS]
-    logs += [short(platform, 7, noise=wander) for platform in PLATFORMS[1:3]]
+    logs = [short(platform, 7) for platform in PLATFORMS[:2]]
+    logs += [short(platform, 7, noise=wander) for platform in PLATFORMS[2:]]
     verdicts = [ask(log, tmp_path)["verdict"] for log in logs]
-    assert sum(verdict != "agrees" for verdict in verdicts) <= 2, verdicts
+    assert sum(verdict != "agrees" for verdict in verdicts) <= 1, verdicts
 
 
 CLEAR = (
     ("multirotor_lines", hidden("latency", "position", latency_s=0.06)),
-    ("fixed_wing_circuits", hidden("latency", "attitude", latency_s=0.02)),
     ("car_stops", hidden("lever_arm", "position", x_m=0.12, y_m=-0.08, z_m=0.1)),
     ("vessel_figure_eights", hidden("boresight", "ranging", x_rad=0.006, y_rad=-0.005, z_rad=0.01)),
-    ("car_stops", hidden("heading_hard_iron", "attitude", sin_rad=0.008, cos_rad=-0.006)),
-    ("multirotor_lines", hidden("range_scale", "ranging", scale=0.004)),
     ("fixed_wing_circuits", hidden("timestamp_step", "position", step_s=0.03, time_s=42.0)),
     ("car_stops", hidden("frame_convention", "attitude", convention="yaw_sign")),
 )
