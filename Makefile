@@ -43,7 +43,7 @@ bench: $(DEV)
 
 # The full study of the diagnosis on hidden-world logs; resumes where it was stopped.
 study: $(DEV)
-	$(BIN)/python benchmarks/study_diagnosis.py
+	$(BIN)/python -m benchmarks.study_diagnosis --write docs/study.md
 
 docs: $(DEV)
 	$(PIP) -e '.[docs]'
