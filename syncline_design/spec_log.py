@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-import re
-
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from syncline_design.units import UNITS, suffix_unit
 from syncline_design.values import Loc, Record, Text, did_you_mean, refusal, refusals
 
-_COLUMN = re.compile(r"(?P<name>.*\S)\s+\[(?P<unit>[^\[\]]*)\]\s*")
-
 
 def split_column(text: str) -> tuple[str, str]:
     """`att.phi [rad]` -> (`att.phi`, `rad`); without brackets the unit is empty."""
-    match = _COLUMN.fullmatch(text)
-    return (match["name"].strip(), match["unit"].strip()) if match else (text.strip(), "")
+    whole = text.strip()
+    name, bracket, unit = whole.rpartition("[")
+    bare = name.rstrip()
+    if not (bracket and bare and bare != name and whole.endswith("]")) or "]" in unit[:-1]:
+        return whole, ""
+    return bare, unit[:-1].strip()
 
 
 class LogChoice(Record):

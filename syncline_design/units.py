@@ -23,13 +23,14 @@ from syncline_design.unit_table import Dimension as Dimension
 # products would leave the range of a float.
 SMALLEST, LARGEST = Fraction(1, 10**30), Fraction(10**30)
 MAX_NUMBER_LENGTH = 60
+MAX_TEXT_LENGTH = 300  # a quantity is echoed in reports; two numbers, a unit each, room for spaces
 
 
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
 _EXPONENT = re.compile(r"[eE]([-+]?[0-9]+)$")
 _LEADING_ZERO = re.compile(r"[-+]?0[0-9]")
-_TOLERANCE = re.compile(r"(?P<nominal>.+?)\s*(?:\+/-|\u00b1)\s*(?P<spread>.+)")
-_RANGE = re.compile(r"(?P<low>.+?)\s+\.\.\s+(?P<high>.+)")
+_PLUS_MINUS = re.compile(r"\+/-|\u00b1")
+_TO = re.compile(r"\s\.\.\s")
 
 
 class UnitError(ValueError):
@@ -137,12 +138,29 @@ def parse_quantity(value: Any, dimension: Dimension, *, tolerance: bool = True) 
     if not isinstance(value, str):
         raise _not_text(value, dimension)
     text = value.strip(" ")
-    if found := _RANGE.fullmatch(text):
-        return _with_range(text, found["low"], found["high"], dimension, tolerance)
-    if found := _TOLERANCE.fullmatch(text):
-        return _with_spread(text, found["nominal"], found["spread"], dimension, tolerance)
+    read = _read(text, dimension, tolerance)
+    if len(text) > MAX_TEXT_LENGTH:
+        length = f"a quantity of {len(text)} characters"
+        raise UnitError(length, f"at most {MAX_TEXT_LENGTH}", _shown(text))
+    return read
+
+
+def _read(text: str, dimension: Dimension, tolerance: bool) -> Quantity:
+    if ends := _split(text, _TO):
+        return _with_range(text, *ends, dimension, tolerance)
+    if parts := _split(text, _PLUS_MINUS):
+        return _with_spread(text, *parts, dimension, tolerance)
     exact, unit = _single(text, dimension)
     return Quantity(exact, text, currency=unit if dimension is Dimension.MONEY else None)
+
+
+def _split(text: str, mark: re.Pattern[str]) -> tuple[str, str] | None:
+    """What stands before and after the first mark that has something on both sides."""
+    for found in mark.finditer(text):
+        before, after = text[: found.start()].rstrip(), text[found.end() :].lstrip()
+        if before:
+            return (before, after) if after else None
+    return None
 
 
 def expected_text(dimension: Dimension) -> str:
@@ -187,7 +205,8 @@ def _single(text: str, dimension: Dimension) -> tuple[Fraction, str]:
 def _refuse_unitless(text: str, dimension: Dimension, expected: str) -> NoReturn:
     if joined := re.fullmatch(rf"({_NUMBER.pattern})([^0-9.,eE\s].*)", text):
         if joined[2] in UNITS:
-            raise UnitError("no space before the unit", f"{joined[1]} {joined[2]}", _shown(text))
+            spaced = f"{_shorten(joined[1])} {joined[2]}"
+            raise UnitError("no space before the unit", spaced, _shown(text))
         raise UnitError("not a quantity", expected, _shown(text))
     parse_number(text)  # says what is wrong with the number itself, if anything is
     raise UnitError("a number without a unit", expected, _shown(text), "add the unit")

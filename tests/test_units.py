@@ -6,6 +6,7 @@ import copy
 import math
 import pickle
 import random
+import time
 from decimal import Decimal, getcontext
 from fractions import Fraction
 
@@ -316,3 +317,47 @@ def test_names_with_an_si_suffix() -> None:
         "rate_radps",
     ]
     assert split_suffix("rate_x_degps") == ("rate_x", "_degps")
+
+
+LONG = 100_000
+FLOODS = (
+    " " * LONG,
+    "1" + " " * LONG + "m",
+    "1 m" + " " * LONG + "..",
+    "1 m" + " " * LONG + "x",
+    "1 m" + "\t" * LONG + "+",
+    ". " * LONG,
+    " .. " * LONG,
+    "1 m +/-" + " " * LONG,
+    "1 m" + " " * LONG + "%",
+    "+/-" * LONG,
+    "1" * LONG,
+    "1" * LONG + ".m",
+    "1 " + "m" * LONG,
+    "1:" * LONG,
+)
+
+
+@pytest.mark.parametrize("text", FLOODS, ids=lambda text: repr(text[:8]))
+def test_a_flood_is_refused_at_once(text: str) -> None:
+    """Time grows with the length, not with its square: the square would take half a minute."""
+    start = time.process_time()
+    with pytest.raises(UnitError) as caught:
+        parse_quantity(text, D.LENGTH)
+    assert time.process_time() - start < 0.5
+    assert len(str(caught.value)) < 1000
+
+
+@pytest.mark.parametrize(
+    ("text", "low", "high"),
+    [
+        ("1 m  ..  2 m", 1.0, 2.0),
+        ("1 m\t..\t2 m", 1.0, 2.0),
+        ("2 m   +/-   10 %", 1.8, 2.2),
+        ("2 m+/-10%", 1.8, 2.2),
+        ("2 m \u00b1 5 cm", 1.95, 2.05),
+    ],
+)
+def test_spaces_about_a_tolerance_are_free(text: str, low: float, high: float) -> None:
+    read = parse_quantity(text, D.LENGTH)
+    assert (read.low, read.high) == (pytest.approx(low), pytest.approx(high))
