@@ -50,7 +50,7 @@ def system_of(
             error = clock_error(loaded.catalog.clocks[identity])
             offsets.append((host_timeline(vehicle.name), error))
     factor = float(loaded.spec.coverage_factor)
-    return System(stages, factor, tuple(offsets), effects)
+    return System(stages, factor, tuple(offsets), effects, loaded.spec.horizon.horizon())
 
 
 def host_timeline(vehicle: str) -> str:

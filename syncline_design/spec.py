@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from datetime import date
 from fractions import Fraction
 from typing import Annotated, Any, Literal
@@ -11,6 +12,7 @@ from pydantic import field_validator as reads_field
 from pydantic_core import PydanticCustomError
 
 from syncline_design.catalog import ErrorEntry, Modality, Primitive, SensorEntry
+from syncline_design.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.spec_effects import EffectChoice as EffectChoice
 from syncline_design.spec_log import LogChoice as LogChoice
 from syncline_design.spec_log import split_column as split_column
@@ -20,7 +22,9 @@ from syncline_design.values import (
     AtLeastOne,
     Loc,
     Money,
+    NonNegativeAngle,
     NonNegativeLength,
+    NonNegativeTime,
     PositiveLength,
     PositiveMoney,
     PositiveNumber,
@@ -317,6 +321,28 @@ class MonteCarloChoice(Record):
         return self
 
 
+MOST_TILT_RAD = math.radians(80.0)  # beyond it a level vehicle's roll, pitch and yaw lose meaning
+
+
+class HorizonChoice(Record):
+    """How long, how wide and how steep a mission is; what is not given is 1 h, 1 km, 10 deg."""
+
+    duration: NonNegativeTime = DEFAULT_HORIZON.duration_s
+    extent: NonNegativeLength = DEFAULT_HORIZON.extent_m
+    tilt: NonNegativeAngle = DEFAULT_HORIZON.tilt_rad
+
+    @reads_field("tilt", mode="after")
+    @classmethod
+    def _is_flown_upright(cls, value: float) -> float:
+        if value > MOST_TILT_RAD * (1.0 + 1e-12):
+            raise refusal("out of range", "at most 80 deg", f"{math.degrees(value):.6g} deg")
+        return value
+
+    def horizon(self) -> Horizon:
+        """As the model takes it."""
+        return Horizon(float(self.duration), float(self.extent), float(self.tilt))
+
+
 class Spec(Record):
     """One system: its requirements, stages, and how the choice is made."""
 
@@ -333,6 +359,7 @@ class Spec(Record):
         MethodChoice | None, _one_or_candidates("timestamping", MethodChoice)
     ] = None
     coverage_factor: PositiveNumber = 3.0
+    horizon: HorizonChoice = Field(default_factory=HorizonChoice)
     objective: Literal["cost", "mass", "power", "error"] = "cost"
     monte_carlo: MonteCarloChoice = Field(default_factory=MonteCarloChoice)
     effects: tuple[EffectChoice, ...] = ()

@@ -10,6 +10,7 @@ from typing import Any, Literal
 from syncline_design import __version__
 from syncline_design.design_space import Design
 from syncline_design.design_space import Problem as DesignProblem
+from syncline_design.horizon import Horizon
 from syncline_design.known_effects import describe
 from syncline_design.loading import LoadedSpec, Problem
 from syncline_design.model.budget import Budget, LeverArm
@@ -207,12 +208,22 @@ def frame(loaded: LoadedSpec, problem: DesignProblem, word: str, seed: int) -> J
             "combinations": str(problem.combinations),
             "stages": stages,
         },
+        "horizon": horizon_json(spec.horizon.horizon()),
         "requirements": [],
         "design": None,
         "syncline": None,
         "monte_carlo": None,
         "warnings": [],
         "provenance": _provenance(loaded, seed),
+    }
+
+
+def horizon_json(horizon: Horizon) -> Json:
+    """The `horizon` key: what drifts, grids and heave are charged for."""
+    return {
+        "duration_s": horizon.duration_s,
+        "extent_m": horizon.extent_m,
+        "tilt_rad": horizon.tilt_rad,
     }
 
 

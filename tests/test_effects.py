@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import syncline_design.effects as effects_package
 from syncline_design.effects import NOT_EFFECTS, registry
-from syncline_design.effects.base import Departures, Effect, StageRows, Target
+from syncline_design.effects.base import Basis, Departures, Effect, StageRows, Target
 from syncline_design.effects.frame_convention import conventions
 from syncline_design.model.system import Platform, Sensor, Stage
 from syncline_design.simulate.chain import (
@@ -137,14 +137,16 @@ def test_it_says_what_people_need(effect: Effect, sensor: Target) -> None:
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
 def test_it_adds_to_the_budget(effect: Effect, sensor: Target) -> None:
+    basis = Basis(distance_m=50.0, arm_m=3.0)
     small, large = (
-        effect.contribute(stage(), values_of(effect, sensor, size) | neutral(effect, size), sensor)
+        effect.contribute(
+            stage(), values_of(effect, sensor, size) | neutral(effect, size), sensor, basis
+        )
         for size in (2.0, 4.0)
     )
-    assert small.tau_s + small.systematic_m > 0
     assert large.tau_s >= small.tau_s >= 0
-    assert large.systematic_m >= small.systematic_m >= 0
-    assert (small.tau_s > 0) != (small.systematic_m > 0)
+    assert large.total_m(basis) >= small.total_m(basis) >= 0
+    assert (small.tau_s > 0) != (small.total_m(basis) > 0)
 
 
 def neutral(effect: Effect, size: float) -> dict[str, float]:

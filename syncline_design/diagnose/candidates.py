@@ -110,7 +110,8 @@ def _locations(view: Scene, effect: Effect) -> list[dict[str, float]]:
     located = [p.name for p in effect.parameters if p.located]
     if not located:
         return [{}]
-    times = np.quantile(view.log.time_s, np.linspace(EDGE, 1.0 - EDGE, STEP_TIMES))
+    since = view.log.time_s - view.log.time_s[0]
+    times = np.quantile(since, np.linspace(EDGE, 1.0 - EDGE, STEP_TIMES))
     return [{located[0]: float(t)} for t in times]
 
 

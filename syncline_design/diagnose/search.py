@@ -311,7 +311,8 @@ def located(data: Data, model: Model) -> Model:
     """Refine where the newest effect starts, by halving the grid around the best place."""
     last = model.acting[-1]
     name = next(p.name for p in last.effect.parameters if p.located)
-    first, last_time = np.quantile(data.view.log.time_s, [EDGE, 1.0 - EDGE])
+    since = data.view.log.time_s - data.view.log.time_s[0]
+    first, last_time = np.quantile(since, [EDGE, 1.0 - EDGE])
     reach = (last_time - first) / STEP_TIMES
     best = model
     for _ in range(4):

@@ -77,9 +77,9 @@ def cut_rows(rows: StageRows, index: Rows) -> StageRows:
 
     Elapsed time counts from the first row of what an effect is given, so the first row is kept.
     """
-    names = [n for n in StageRows.__slots__ if n not in ("antenna_m", "ranging_m")]
-    cut = {name: getattr(rows, name)[index] for name in names}
-    return StageRows(antenna_m=rows.antenna_m, ranging_m=rows.ranging_m, **cut)
+    kept = ("antenna_m", "ranging_m", "start_s", "independent")
+    cut = {n: getattr(rows, n)[index] for n in StageRows.__slots__ if n not in kept}
+    return replace(rows, **cut)
 
 
 def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from syncline_design.diagnose.gross import Reread, mended
@@ -42,12 +42,7 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
 
     log = read(0.0)
     reread = read if len(files) > 1 else None
-    system = System(
-        system.stages[: len(log.stages)],
-        system.coverage_factor,
-        system.clock_offsets,
-        system.effects,
-    )
+    system = replace(system, stages=system.stages[: len(log.stages)])
     _demand_fit(loaded, system, log)
     known = known_effects(system)
     for one in known:

@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -41,11 +42,11 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return rotate(rows.rotation, np.cross(_tilt(rows), antenna_to_object(rows)))[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|gain| d omega v / g: the tilt of the platform's hardest turn, at the range d."""
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|gain| omega v / g: the tilt of the platform's hardest turn."""
     p = stage.platform
     tilt = p.v_max_mps * p.omega_max_radps / GRAVITY_MPS2
-    return Contribution(systematic_m=abs(values["gain"]) * tilt * p.distance_m)
+    return Contribution(turn_rad=abs(values["gain"]) * tilt)
 
 
 EFFECT = Effect(

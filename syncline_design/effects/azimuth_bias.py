@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -30,9 +31,9 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return rotate(rows.rotation, turned)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|bias| d."""
-    return Contribution(systematic_m=abs(values["bias_rad"]) * stage.platform.distance_m)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|bias| of the line of sight."""
+    return Contribution(sight_rad=abs(values["bias_rad"]))
 
 
 EFFECT = Effect(

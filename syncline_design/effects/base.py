@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.system import RoleName, Stage
 
 Array = NDArray[np.float64]
@@ -31,6 +32,9 @@ class StageRows:
     point, body axes; rate_radps (n, 3) body; range_m, azimuth_rad, elevation_rad (n,) true
     bearing in the ranging sensor's believed axes; target_m (n, 3) true object in NED.
     antenna_m, ranging_m: lever arms l_G, l_L the spec believes [m], body, (3,) or (n, 3).
+    start_s: when the mission began, on the clock of time_s; None: at the first row, as in a log.
+    independent: each row is a sample of a mission of its own, so what is correlated in time is
+    drawn anew in each; False: the rows follow each other in time.
     """
 
     time_s: Array
@@ -46,6 +50,8 @@ class StageRows:
     antenna_m: Array
     ranging_m: Array
     target_m: Array
+    start_s: float | None = None
+    independent: bool = False
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])
@@ -118,11 +124,38 @@ class Parameter:
 
 
 @dataclass(frozen=True, slots=True)
+class Basis:
+    """What the charge of an effect depends on besides its stage and its parameters.
+
+    horizon: over which drifts, grids and tilts are charged; coverage_factor: k of a normal timing
+    error's bound; distance_m: range d, 0 for a stage without a ranging sensor; arm_m: largest
+    |l_L - l_G| [m], which attitude errors turn as they turn the line of sight.
+    """
+
+    horizon: Horizon = DEFAULT_HORIZON
+    coverage_factor: float = 3.0
+    distance_m: float = 0.0
+    arm_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class Contribution:
-    """What a fitted effect adds to the Syncline: tau of its sensor [s], a systematic term [m]."""
+    """What a known effect adds to the Syncline.
+
+    tau_s: to the timestamp error's bound of its sensor; systematic_m: displaces the estimate by at
+    most this; turn_rad: turns the measured attitude, and with it the line of sight and the arms;
+    sight_rad: turns the line of sight in the body.
+    """
 
     tau_s: float = 0.0
     systematic_m: float = 0.0
+    turn_rad: float = 0.0
+    sight_rad: float = 0.0
+
+    def total_m(self, basis: Basis) -> float:
+        """Systematic term of the budget [m]: systematic + sight d + turn (d + |l_L - l_G|)."""
+        d = basis.distance_m
+        return self.systematic_m + self.sight_rad * d + self.turn_rad * (d + basis.arm_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +186,7 @@ class Covariance:
 
 Depart = Callable[[StageRows, Values, Target, Rng], Departures]
 Sensitivity = Callable[[StageRows, Values, Target], Array]
-Contribute = Callable[[Stage, Values, Target], Contribution]
+Contribute = Callable[[Stage, Values, Target, Basis], Contribution]
 Spread = Callable[[StageRows, Values, Target], Covariance]
 Applies = Callable[[Stage, Target], bool]
 

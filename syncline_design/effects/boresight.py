@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -32,10 +33,10 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return np.stack([-rotate(rows.rotation, np.cross(axis, b)) for axis in np.eye(3)], axis=-1)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|beta| d: the largest displacement at the range d."""
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|beta| of the line of sight."""
     angle = float(np.linalg.norm([values["x_rad"], values["y_rad"], values["z_rad"]]))
-    return Contribution(systematic_m=angle * stage.platform.distance_m)
+    return Contribution(sight_rad=angle)
 
 
 EFFECT = Effect(

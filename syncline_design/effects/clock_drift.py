@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -18,7 +19,7 @@ from syncline_design.model.system import Stage
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
-    """stamp = true + rate (t - t0), so mu = -rate (t - t0), t0 the first row's stamp."""
+    """stamp = true + rate (t - t0), so mu = -rate (t - t0), t0 the mission's start."""
     return shifted(sensor, -values["rate"] * elapsed(rows))
 
 
@@ -27,12 +28,10 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return (-shift_slope(rows, sensor) * elapsed(rows)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """tau grows by |rate| times an hour: a drift without end needs a period, and this is ours."""
-    return Contribution(tau_s=abs(values["rate"]) * PERIOD_S)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """tau grows by |rate| times the mission's duration."""
+    return Contribution(tau_s=abs(values["rate"]) * basis.horizon.duration_s)
 
-
-PERIOD_S = 3600.0
 
 EFFECT = Effect(
     name="clock_drift",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from syncline_design.effects.base import (
+    Basis,
     Contribution,
     Covariance,
     Departures,
@@ -16,7 +17,7 @@ from syncline_design.effects.base import (
     Values,
     Wander,
 )
-from syncline_design.effects.kinematics import gauss_markov
+from syncline_design.effects.kinematics import wander
 from syncline_design.model.system import Stage
 
 AXES = np.ones(3)
@@ -27,8 +28,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     if rng is None:
         return Departures()
     draws = rng.standard_normal((len(rows), 3)) * AXES
-    wander = gauss_markov(rows.time_s, values["time_constant_s"], draws)
-    return Departures(position_m=values["std_m"] * wander)
+    return Departures(position_m=values["std_m"] * wander(rows, values["time_constant_s"], draws))
 
 
 def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
@@ -36,7 +36,7 @@ def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
     return Covariance(wander=Wander(np.diag(AXES), values["std_m"], values["time_constant_s"]))
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """sqrt(3) std: one standard deviation, as the sensor's own term."""
     return Contribution(systematic_m=values["std_m"] * float(np.linalg.norm(AXES)))
 

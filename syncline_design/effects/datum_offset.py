@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -31,7 +32,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return np.broadcast_to(-np.eye(3), (len(rows), 3, 3))
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """|offset|."""
     return Contribution(
         systematic_m=math.hypot(values["north_m"], values["east_m"], values["down_m"])

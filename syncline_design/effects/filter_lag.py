@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -36,7 +37,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return -antenna_velocity(rows)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """A lag acts as a latency of T."""
     return Contribution(tau_s=abs(values["time_constant_s"]))
 

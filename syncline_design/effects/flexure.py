@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -31,7 +32,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return -rows.rotation * rows.acceleration_mps2[:, None, :]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """|C| v omega: the bend in the platform's hardest turn."""
     bend = math.hypot(values["x"], values["y"], values["z"])
     turn = stage.platform.v_max_mps * stage.platform.omega_max_radps

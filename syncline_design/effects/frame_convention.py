@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -89,9 +90,18 @@ def _ranging(rows: StageRows, convention: str) -> Departures:
 _UNIT = {"radians": math.pi / 180.0, "degrees": 180.0 / math.pi}
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """2 d, the far side of the sphere of radius d: such a fault is mended, not budgeted."""
-    return Contribution(systematic_m=2.0 * stage.platform.distance_m)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """Twice what is turned round: such a fault is mended, not budgeted.
+
+    Positions: the antenna's distance from the origin, at most extent + d + arms; attitude: d and
+    the arms; ranging: d.
+    """
+    reach = basis.distance_m
+    if sensor != "ranging":
+        reach += basis.arm_m
+    if sensor == "position":
+        reach += basis.horizon.extent_m
+    return Contribution(systematic_m=2.0 * reach)
 
 
 EFFECT = Effect(

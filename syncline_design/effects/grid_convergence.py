@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -35,12 +36,10 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return -np.cross(np.array([0.0, 0.0, 1.0]), rows.target_m)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|gamma| times a kilometre of baseline: the spec does not say how far the survey goes."""
-    return Contribution(systematic_m=abs(values["rotation_rad"]) * BASELINE_M)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|gamma| times the extent, the farthest that an object lies from the origin."""
+    return Contribution(systematic_m=abs(values["rotation_rad"]) * basis.horizon.extent_m)
 
-
-BASELINE_M = 1000.0
 
 EFFECT = Effect(
     name="grid_convergence",

@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -34,12 +35,10 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return -_level(rows)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|scale| times a kilometre of baseline: the spec does not say how far the survey goes."""
-    return Contribution(systematic_m=abs(values["scale"]) * BASELINE_M)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|scale| times the extent, the farthest that an object lies from the origin."""
+    return Contribution(systematic_m=abs(values["scale"]) * basis.horizon.extent_m)
 
-
-BASELINE_M = 1000.0
 
 EFFECT = Effect(
     name="grid_scale",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -27,9 +28,9 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return down_axis_sweep(rows)[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|bias| d."""
-    return Contribution(systematic_m=abs(values["bias_rad"]) * stage.platform.distance_m)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|bias|."""
+    return Contribution(turn_rad=abs(values["bias_rad"]))
 
 
 EFFECT = Effect(

@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -31,13 +32,10 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return (down_axis_sweep(rows) * elapsed(rows)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|rate| d times ten minutes: a drift without end needs a period, and this is ours."""
-    angle = abs(values["rate_radps"]) * PERIOD_S
-    return Contribution(systematic_m=angle * stage.platform.distance_m)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|rate| times the mission's duration."""
+    return Contribution(turn_rad=abs(values["rate_radps"]) * basis.horizon.duration_s)
 
-
-PERIOD_S = 600.0
 
 EFFECT = Effect(
     name="heading_drift",

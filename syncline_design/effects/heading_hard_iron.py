@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -37,10 +38,9 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return slope
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """sqrt(A^2 + B^2) d: the worst heading."""
-    angle = math.hypot(values["sin_rad"], values["cos_rad"])
-    return Contribution(systematic_m=angle * stage.platform.distance_m)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """sqrt(A^2 + B^2): the worst heading."""
+    return Contribution(turn_rad=math.hypot(values["sin_rad"], values["cos_rad"]))
 
 
 EFFECT = Effect(

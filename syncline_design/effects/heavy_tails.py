@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from syncline_design.effects.base import (
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -31,7 +32,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     return Departures(position_noise=factor * np.where(struck, OUTLIER_FACTOR, 1.0) - 1.0)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """What the standard deviation grows by: sqrt(nu / (nu - 2) (1 + 99 rate)) - 1 times sigma_p."""
     if stage.position is None:
         return Contribution()

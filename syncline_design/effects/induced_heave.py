@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -53,13 +54,13 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return slope
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|l| sin 10 deg: what a vessel's usual roll and pitch make of the lever."""
-    lever = math.hypot(values["x_m"], values["y_m"], values["z_m"])
-    return Contribution(systematic_m=lever * math.sin(math.radians(USUAL_TILT_DEG)))
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """hypot(x, y) sin t + |z| (1 - cos t), t the horizon's tilt: the largest at any tilt below."""
+    tilt = basis.horizon.tilt_rad
+    level = math.hypot(values["x_m"], values["y_m"])
+    lift = abs(values["z_m"]) * (1.0 - math.cos(tilt))
+    return Contribution(systematic_m=level * math.sin(tilt) + lift)
 
-
-USUAL_TILT_DEG = 10.0
 
 EFFECT = Effect(
     name="induced_heave",

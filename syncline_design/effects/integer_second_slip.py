@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from syncline_design.effects.base import (
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -21,7 +22,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
     return shifted(sensor, column(-values["seconds"], rows))
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """tau of the sensor grows by |seconds|."""
     return Contribution(tau_s=abs(values["seconds"]))
 

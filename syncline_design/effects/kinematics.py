@@ -80,8 +80,9 @@ def shift_slope(rows: StageRows, sensor: Target) -> Array:
 
 
 def elapsed(rows: StageRows) -> Array:
-    """t - t0 [s] since the first row, (n,)."""
-    since: Array = rows.time_s - rows.time_s[0]
+    """t - t0 [s] since the mission's start (of a log: its first row), (n,)."""
+    start = rows.time_s[0] if rows.start_s is None else rows.start_s
+    since: Array = rows.time_s - start
     return since
 
 
@@ -97,3 +98,11 @@ def gauss_markov(time_s: Array, time_constant_s: float, draws: Array) -> Array:
     for i in range(1, len(draws)):
         walk[i] = phi[i - 1] * walk[i - 1] + fresh[i - 1]
     return walk
+
+
+def wander(rows: StageRows, time_constant_s: float, draws: Array) -> Array:
+    """A Gauss-Markov process of unit variance along a log, (n, k), from normal draws (n, k).
+
+    Rows that are samples of missions of their own have its stationary distribution each.
+    """
+    return draws if rows.independent else gauss_markov(rows.time_s, time_constant_s, draws)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -38,7 +39,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return slope[:, :, None]
 
 
-def _contribute(_: Stage, values: Values, __: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """tau of the sensor grows by |latency|."""
     return Contribution(tau_s=abs(values["latency_s"]))
 

@@ -6,6 +6,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -34,7 +35,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return rows.rotation if sensor == "position" else -rows.rotation
 
 
-def _contribute(_: Stage, values: Values, __: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """|dl|."""
     return Contribution(
         systematic_m=float(np.linalg.norm([values["x_m"], values["y_m"], values["z_m"]]))

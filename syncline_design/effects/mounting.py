@@ -8,6 +8,7 @@ import numpy as np
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -33,10 +34,9 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return np.stack([rotate(rows.rotation, np.cross(axis, q)) for axis in np.eye(3)], axis=-1)
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """|alpha| d: the largest displacement at the range d."""
-    angle = math.hypot(values["x_rad"], values["y_rad"], values["z_rad"])
-    return Contribution(systematic_m=angle * stage.platform.distance_m)
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """|alpha|."""
+    return Contribution(turn_rad=math.hypot(values["x_rad"], values["y_rad"], values["z_rad"]))
 
 
 EFFECT = Effect(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from syncline_design.effects.base import (
+    Basis,
     Contribution,
     Covariance,
     Departures,
@@ -34,19 +35,19 @@ def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
     return Covariance(factors=((sensor, values["factor"]),))
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """(factor - 1) times the sensor's term of the sensor error."""
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """(factor - 1) times the sensor's terms of the sensor error."""
     part = getattr(stage, sensor, None)
     if part is None:
         return Contribution()
-    d = stage.platform.distance_m
+    more = max(values["factor"] - 1.0, 0.0)
     if sensor == "position":
-        size = math.hypot(*part.sigma)
-    elif sensor == "attitude":
-        size = math.hypot(*part.sigma) * d
-    else:
-        size = part.sigma[0] + math.hypot(part.sigma[1], part.sigma[2]) * d
-    return Contribution(systematic_m=max(values["factor"] - 1.0, 0.0) * size)
+        return Contribution(systematic_m=more * math.hypot(*part.sigma))
+    if sensor == "attitude":
+        return Contribution(turn_rad=more * math.hypot(*part.sigma))
+    return Contribution(
+        systematic_m=more * part.sigma[0], sight_rad=more * math.hypot(*part.sigma[1:])
+    )
 
 
 EFFECT = Effect(

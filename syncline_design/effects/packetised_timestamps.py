@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Covariance,
     Departures,
@@ -38,7 +39,7 @@ def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
     return Covariance(directions=(size * shift_slope(rows, sensor))[:, :, None])
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """tau grows by the whole interval, the oldest that data can be."""
     return Contribution(tau_s=abs(values["interval_s"]))
 

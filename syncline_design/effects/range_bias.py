@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -27,7 +28,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return rotate(rows.rotation, bearing(rows.azimuth_rad, rows.elevation_rad))[:, :, None]
 
 
-def _contribute(_: Stage, values: Values, __: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """|bias|."""
     return Contribution(systematic_m=abs(values["bias_m"]))
 

@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -33,7 +34,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return (shift_slope(rows, "ranging") * _age(rows)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """tau of the ranging sensor grows by half a period, az counted from -pi to pi."""
     return Contribution(tau_s=0.5 * abs(values["period_s"]))
 

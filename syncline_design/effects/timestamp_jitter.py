@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from syncline_design.effects.base import (
+    Basis,
     Contribution,
     Covariance,
     Departures,
@@ -29,7 +30,7 @@ def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
     return Covariance(directions=(values["std_s"] * shift_slope(rows, sensor))[:, :, None])
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """tau grows by k std, k = 3 as in a normal error's bound."""
     return Contribution(tau_s=COVERAGE_FACTOR * abs(values["std_s"]))
 

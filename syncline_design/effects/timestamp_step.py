@@ -6,6 +6,7 @@ import math
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -15,12 +16,14 @@ from syncline_design.effects.base import (
     Target,
     Values,
 )
-from syncline_design.effects.kinematics import shift_slope, shifted
+from syncline_design.effects.kinematics import elapsed, shift_slope, shifted
 from syncline_design.model.system import Stage
 
 
 def _after(rows: StageRows, values: Values) -> Array:
-    return (rows.time_s >= values["time_s"]).astype(float)
+    """1 from time_s after the mission's start on, 0 before, (n,)."""
+    after: Array = (elapsed(rows) >= values["time_s"]).astype(float)
+    return after
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
@@ -33,8 +36,8 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return (-shift_slope(rows, sensor) * _after(rows, values)[:, None])[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
-    """tau of the sensor grows by |step|."""
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """tau of the sensor grows by |step|, whenever in a mission it may happen."""
     return Contribution(tau_s=abs(values["step_s"]))
 
 
@@ -46,7 +49,7 @@ EFFECT = Effect(
         Parameter("step_s", 1e-4, 2.0, "s"),
         Parameter("time_s", 0.0, math.inf, "s", located=True),
     ),
-    sentence="from {time_s} on the {sensor} stamps are ahead by {step_s}",
+    sentence="from {time_s} after the start on the {sensor} stamps are ahead by {step_s}",
     confused_with="a jump of the positions themselves; clock_drift",
     separated_by="speed: a timestamp step scales with it, a jump does not",
     source="ITU-T G.810, time error step; stamp = true + step",

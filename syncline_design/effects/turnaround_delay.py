@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.effects.base import (
     Array,
+    Basis,
     Contribution,
     Departures,
     Effect,
@@ -34,7 +35,7 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return 0.5 * SOUND_SPEED_MPS * line[:, :, None]
 
 
-def _contribute(stage: Stage, values: Values, sensor: Target) -> Contribution:
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """|c dt / 2|."""
     return Contribution(systematic_m=0.5 * SOUND_SPEED_MPS * abs(values["delay_s"]))
 

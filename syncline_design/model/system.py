@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from syncline_design.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.timing import NO_ERROR, TimingError
 
 RoleName = Literal["position", "attitude", "ranging"]
@@ -84,12 +85,14 @@ class System:
 
     clock_offsets: (timeline, error of that timeline against UTC); a timeline not listed is taken
     as common with UTC (offset 0).
+    horizon: how long, wide and steep the mission is, for effects that depend on it.
     """
 
     stages: tuple[Stage, ...]
     coverage_factor: float = 3.0
     clock_offsets: tuple[tuple[str, TimingError], ...] = ()
     effects: tuple[EffectEntry, ...] = ()
+    horizon: Horizon = DEFAULT_HORIZON
 
     def clock_offset(self, timeline: str) -> TimingError:
         """Offset of a timeline against UTC; zero when none is declared."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from syncline_design.model.budget import budget
 from syncline_design.model.system import RoleName, Stage, System
 from syncline_design.simulate import known_effects
-from syncline_design.simulate.draws import position_lever_arm
+from syncline_design.simulate.draws import arm_lengths
 
 ExtraTau = Mapping[tuple[str, RoleName], float]
 
@@ -50,7 +50,7 @@ def stage_bound(stage: Stage, first: bool, tau_p_s: float, tau_a_s: float) -> St
     platform = stage.platform
     v, omega = float(platform.v_max_mps), float(platform.omega_max_radps)
     sigma_p = 0.0 if stage.position is None else math.hypot(*stage.position.sigma)
-    antenna, difference = _arms(stage, first)
+    antenna, difference = arm_lengths(stage, first)
     turn_p, turn_a = omega * tau_p_s, omega * tau_a_s
     position = v * tau_p_s + sigma_p
     if stage.ranging is None or stage.attitude is None:
@@ -83,17 +83,6 @@ def _vector_distance(length: float, longer_by: float, angle_rad: float) -> float
     other = length + longer_by
     squared = longer_by**2 + length * other * chord(angle_rad) ** 2
     return math.sqrt(squared)
-
-
-def _arms(stage: Stage, first: bool) -> tuple[float, float]:
-    """(|l_G|, largest |l_L - l_G|) [m]; a free l_G has length b and any direction."""
-    given = position_lever_arm(stage, first)
-    arm = None if stage.ranging is None else stage.ranging.lever_arm_m
-    ranging = (0.0, 0.0, 0.0) if arm is None else arm
-    if given is None:
-        b = float(stage.platform.baseline_m)
-        return b, b + math.hypot(*ranging)
-    return math.hypot(*given), math.dist(given, ranging)
 
 
 def chain_bounds(system: System, tau_s: float) -> tuple[StageBound, ...]:

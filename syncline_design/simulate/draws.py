@@ -207,6 +207,21 @@ def lever_arms(stage: Stage, first: bool, direction: Array) -> tuple[Array, Arra
     return antenna, _column((0.0, 0.0, 0.0) if arm is None else arm)
 
 
+def arm_lengths(stage: Stage, first: bool) -> tuple[float, float]:
+    """(|l_G|, largest |l_L - l_G|) [m]; a free l_G has length b and any direction.
+
+    Without a ranging sensor the antenna itself is located: (|l_G|, 0).
+    """
+    given = position_lever_arm(stage, first)
+    length = float(stage.platform.baseline_m) if given is None else math.hypot(*given)
+    if stage.ranging is None:
+        return length, 0.0
+    ranging = stage.ranging.lever_arm_m or (0.0, 0.0, 0.0)
+    if given is None:
+        return length, length + math.hypot(*ranging)
+    return length, math.dist(given, ranging)
+
+
 def _column(vector: tuple[float, float, float]) -> Array:
     return np.array([[float(value)] for value in vector])
 

@@ -7,10 +7,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from syncline_design.effects.base import NOTHING, Array, Departures, Effect, StageRows, Values
+from syncline_design.effects.base import (
+    NOTHING,
+    Array,
+    Basis,
+    Contribution,
+    Departures,
+    Effect,
+    StageRows,
+    Values,
+)
+from syncline_design.model.pairing import distance_m
 from syncline_design.model.system import EffectEntry, RoleName, System
 from syncline_design.simulate import kernel
 from syncline_design.simulate.chain import stage_error
+from syncline_design.simulate.draws import arm_lengths
 from syncline_design.simulate.settings import SimulationError
 
 
@@ -116,19 +127,34 @@ def drawn_error(
     return np.ascontiguousarray(stage_error(rows, motion, noise, world, carried).T)
 
 
+def basis_of(system: System, index: int) -> Basis:
+    """What the charges of a stage's effects depend on besides it."""
+    stage = system.stages[index]
+    _, arm = arm_lengths(stage, index == 0)
+    return Basis(system.horizon, system.coverage_factor, distance_m(stage), arm)
+
+
+def stage_contributions(system: System, index: int) -> tuple[tuple[Acting, Contribution], ...]:
+    """What each effect of a stage adds."""
+    stage, basis = system.stages[index], basis_of(system, index)
+    return tuple(
+        (one, one.effect.contribute(stage, one.values, one.sensor, basis))  # type: ignore[arg-type]
+        for one in by_stage(system).get(stage.name, ())
+    )
+
+
 def contributions(
     system: System,
 ) -> tuple[dict[tuple[str, RoleName], float], tuple[tuple[str, str, float], ...]]:
     """What the effects add to the budget: (tau [s] by stage and role, systematic terms [m])."""
     extra: dict[tuple[str, RoleName], float] = {}
     systematic: list[tuple[str, str, float]] = []
-    stages = {stage.name: stage for stage in system.stages}
-    for name, acting in by_stage(system).items():
-        for one in acting:
-            added = one.effect.contribute(stages[name], one.values, one.sensor)  # type: ignore[arg-type]
+    for index, stage in enumerate(system.stages):
+        basis = basis_of(system, index)
+        for one, added in stage_contributions(system, index):
             if added.tau_s and one.sensor != "target":
-                key: tuple[str, RoleName] = (name, one.sensor)  # type: ignore[assignment]
+                key: tuple[str, RoleName] = (stage.name, one.sensor)  # type: ignore[assignment]
                 extra[key] = extra.get(key, 0.0) + added.tau_s
-            if added.systematic_m:
-                systematic.append((f"{one.effect.name} ({one.sensor})", name, added.systematic_m))
+            if total := added.total_m(basis):
+                systematic.append((f"{one.effect.name} ({one.sensor})", stage.name, total))
     return extra, tuple(systematic)
