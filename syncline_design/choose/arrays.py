@@ -197,7 +197,17 @@ def _channels(requires: tuple[tuple[str, int], ...], name: str) -> int:
     return sum(count for item, count in requires if item == name) if requires else 0
 
 
-def useful_options(role: RoleArrays, rate_mps: float, per_sensor: bool) -> RoleArrays:
+def tie_order(tables: Tables, resources: Sequence[Column], ties: Sequence[Column]) -> list[Column]:
+    """Cost, mass, power in this order, limited or not, as far as they are not the first key."""
+    named = dict(zip((s.name for s in tables.keys), resources, strict=True))
+    named.update(zip((s.name for s in tables.ties), ties, strict=True))
+    own = tables.keys[0].name
+    return [named[name] for name in RESOURCES if name in named and name != own]
+
+
+def useful_options(
+    tables: Tables, role: RoleArrays, rate_mps: float, per_sensor: bool
+) -> RoleArrays:
     """Options that no other option of the same timeline makes superfluous.
 
     rate_mps: how fast the total grows with this role's tau.  With the `syncline` model the total
@@ -215,7 +225,7 @@ def useful_options(role: RoleArrays, rate_mps: float, per_sensor: bool) -> RoleA
         columns = Columns(
             [k[rows] for k in keys],
             [w[rows] for w in (*weak, *role.channels)],
-            [t[rows] for t in role.ties],
+            [t[rows] for t in tie_order(tables, role.resources, role.ties)],
         )
         if len(rows):
             kept.append(rows[undominated(columns)])

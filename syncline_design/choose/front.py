@@ -22,12 +22,12 @@ from fractions import Fraction
 
 import numpy as np
 
-from syncline_design.choose.arrays import MARGIN, Tables, tabulate, useful_options
-from syncline_design.choose.evaluate import error_key, evaluate
+from syncline_design.choose.arrays import MARGIN, Tables, tabulate, tie_order, useful_options
+from syncline_design.choose.evaluate import Rank, error_key, evaluate, rank
 from syncline_design.choose.labels import Labels, concatenate, total_m
 from syncline_design.choose.merge import Ceiling, Merge, lowered
 from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
-from syncline_design.choose.pareto import Bools, Column, Columns, Floats, Indices, undominated
+from syncline_design.choose.pareto import Bools, Columns, Floats, Indices, undominated
 from syncline_design.choose.rounded_once import total_errors_m
 from syncline_design.design_space import ClockOption, Design, Problem, ResourceName
 
@@ -72,7 +72,7 @@ def merged_front(
         ceiling = Ceiling(relaxed.labels.resources[0][holds], relaxed.total[holds])
     guarded = _merge_all(tables, accuracy, end, guarded=True, ceiling=ceiling)
     found = _points(tables, guarded, np.ones(len(guarded.total), dtype=bool))
-    return _joined([*points, *found])
+    return _joined([*points, *found], problem)
 
 
 def _reduced(tables: Tables) -> Tables:
@@ -83,7 +83,7 @@ def _reduced(tables: Tables) -> Tables:
     for r, role in enumerate(tables.roles):
         rates = [p.rate_mps for p in problem.pairs if r in (p.role, p.reference)]
         rate = math.fsum(rates) if per_sensor else problem.sync_rate_mps * bool(rates)
-        roles.append(useful_options(role, rate, per_sensor))
+        roles.append(useful_options(tables, role, rate, per_sensor))
     return replace(tables, roles=tuple(roles))
 
 
@@ -133,7 +133,7 @@ def _merge_all(
     if guarded:
         rows = np.flatnonzero(_hold_sync(tables, finished))
         finished = _Finished(finished.labels.take(rows), finished.total[rows], combinations)
-    ties = _tie_columns(tables, finished.labels)
+    ties = tie_order(tables, finished.labels.resources, finished.labels.ties)
     rows = undominated(Columns((finished.labels.resources[0], finished.total), tie=ties))
     labels, total = finished.labels.take(rows), finished.total[rows]
     order = np.argsort(-total, kind="stable")
@@ -179,14 +179,6 @@ def _designs(tables: Tables, finished: _Finished, rows: Indices) -> list[Design]
     return [Design(tuple(o), c) for o, c in zip(options.tolist(), clocks, strict=True)]
 
 
-def _tie_columns(tables: Tables, labels: Labels) -> list[Column]:
-    """Cost, mass, power in this order as far as they are not the front's own resource."""
-    named = dict(zip((s.name for s in tables.keys), labels.resources, strict=True))
-    named.update(zip((s.name for s in tables.ties), labels.ties, strict=True))
-    own = tables.keys[0].name
-    return [named[n] for n in ("cost", "mass", "power") if n in named and n != own]
-
-
 def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
     """Clock indices per vehicle, without clocks that another one of the vehicle replaces."""
     useful = []
@@ -224,17 +216,28 @@ def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoin
     errors = total_errors_m(tables.problem, designs)
     bottom = tables.keys[0].denominator
     amounts = [Fraction(a, bottom) for a in finished.labels.resources[0][kept].tolist()]
-    return _joined(list(map(FrontPoint, amounts, errors, designs)))
+    return _joined(list(map(FrontPoint, amounts, errors, designs)), tables.problem)
 
 
-def _joined(points: list[FrontPoint]) -> tuple[FrontPoint, ...]:
-    """Points as one front; errors equal to 12 figures count as equal."""
-    keyed = [(point.amount, error_key(point.error_m), point) for point in points]
-    keyed.sort(key=lambda entry: entry[:2])
+def _joined(points: list[FrontPoint], problem: Problem) -> tuple[FrontPoint, ...]:
+    """Points as one front; errors equal to 12 figures count as equal, the order settles those."""
+    keyed = [((point.amount, error_key(point.error_m)), point) for point in points]
+    keyed.sort(key=lambda entry: entry[0])
     out: list[FrontPoint] = []
     least = math.inf
-    for _, error, point in keyed:
+    for (_, error), tied in itertools.groupby(keyed, key=lambda entry: entry[0]):
         if error < least:
-            out.append(point)
+            out.append(_first([point for _, point in tied], problem))
             least = error
     return tuple(out)
+
+
+def _first(tied: list[FrontPoint], problem: Problem) -> FrontPoint:
+    """The first in the documented order of points that agree in amount and error."""
+    if len(tied) == 1:
+        return tied[0]
+
+    def place(point: FrontPoint) -> Rank:
+        return rank(problem, point.design, evaluate(problem, point.design))
+
+    return min(tied, key=lambda point: place(point)[2:])

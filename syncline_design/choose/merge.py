@@ -12,7 +12,7 @@ from functools import partial
 
 import numpy as np
 
-from syncline_design.choose.arrays import MARGIN, RoleArrays, Tables
+from syncline_design.choose.arrays import MARGIN, RoleArrays, Tables, tie_order
 from syncline_design.choose.labels import Addition, Labels, concatenate, extend, total_m, with_pair
 from syncline_design.choose.outcome import Deadline
 from syncline_design.choose.pareto import (
@@ -258,7 +258,8 @@ class Merge:
         value, weak = (labels.error, [total])
         if self.per_sensor or role == len(self.problem.roles) - 1:
             value, weak = total, []
-        return Columns((*labels.resources, value), [*weak, *used], labels.ties, guard)
+        ties = tie_order(self.tables, labels.resources, labels.ties)
+        return Columns((*labels.resources, value), [*weak, *used], ties, guard)
 
     def _within_budgets(self, labels: Labels, role: int) -> Bools:
         mask = np.ones(len(labels), dtype=bool)

@@ -36,10 +36,13 @@ class Guard:
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """keys and weak: smaller is better.  tie: order among rows equal in every key.
+    """keys and weak: smaller is better.  tie: order among rows equal in amount and error.
 
-    A row replaces another when it is nowhere worse and either smaller in a key or earlier in the
-    tie order; being smaller in a weak column alone does not settle a tie of names.
+    keys: the amount first, the error last, limited amounts between.  weak: where it starts with an
+    error, that of the row as it stands beside the one that only adds up.  A row replaces another
+    when it is nowhere worse and either smaller in the amount, smaller in every error, or earlier in
+    the tie order.  Less of a limited amount, or of the error that may not count in the end, does
+    not settle a tie: whatever follows, both may end with the same amount and error.
     """
 
     keys: Sequence[Column]
@@ -103,9 +106,7 @@ def _thinned(columns: Columns) -> Indices:
 
 def _clearly_replaces(columns: Columns, first: Indices, second: Indices) -> Bools:
     """Whether rows replace others without any question of ties."""
-    out = np.zeros(len(second), dtype=bool)
-    for key in columns.keys:
-        out |= np.asarray(key[first] < key[second], dtype=bool)
+    out = _settled(columns.keys, columns.weak, first, second)
     for column in (*columns.keys, *columns.weak):
         out &= np.asarray(column[first] <= column[second], dtype=bool)
     guard = columns.guard
@@ -114,6 +115,16 @@ def _clearly_replaces(columns: Columns, first: Indices, second: Indices) -> Bool
         alike &= guard.bound[first] <= guard.bound[second]
         out &= guard.safe[first] | alike
     return out
+
+
+def _settled(
+    keys: Sequence[Column], weak: Sequence[Column], first: Indices, second: Indices
+) -> Bools:
+    """Whether rows that are nowhere worse end smaller in amount or error than others for sure."""
+    errors = [keys[-1], *weak[: 1 if _is_error(weak) else 0]]
+    out = np.asarray(keys[0][first] < keys[0][second], dtype=bool)
+    below = [np.asarray(column[first] < column[second], dtype=bool) for column in errors]
+    return np.asarray(out | np.logical_and.reduce(below))
 
 
 def tie_rank(tie: Sequence[Column], count: int) -> Indices:
@@ -153,8 +164,8 @@ def _one_staircase(
         place = bisect_right(one_at, one)
         if place and two_at[place - 1] <= two:
             other = row_at[place - 1]
-            clear = amount[other] < amount[row] or first[other] < one or ties[other] < ties[row]
-            if not clear:
+            less = first[other] < one and second[other] < two
+            if not (less or amount[other] < amount[row] or ties[other] < ties[row]):
                 kept.append(row)
             continue
         kept.append(row)
@@ -206,7 +217,8 @@ class _Sorted:
 
     def __init__(self, columns: Columns, order: Indices, ties: Indices) -> None:
         self.keys = [column[order] for column in columns.keys]
-        self.columns = self.keys + [column[order] for column in columns.weak]
+        self.weak = [column[order] for column in columns.weak]
+        self.columns = self.keys + self.weak
         self.ties = ties
         # The error, and the weak column beside it (the error again where there is none).
         value = len(self.keys) - 1
@@ -219,10 +231,8 @@ class _Sorted:
         worse = np.zeros(np.broadcast_shapes(first.shape, second.shape), dtype=bool)
         for column in self.columns:
             worse |= np.asarray(column[first] > column[second], dtype=bool)
-        settled = self.ties[first] < self.ties[second]
-        for key in self.keys:
-            settled = settled | np.asarray(key[first] < key[second], dtype=bool)
-        out: Bools = settled & ~worse
+        settled = _settled(self.keys, self.weak, first, second)
+        out: Bools = (settled | (self.ties[first] < self.ties[second])) & ~worse
         if self.guard is not None:
             g = self.guard
             alike = (g.error[first] >= g.error[second]) & (g.bound[first] <= g.bound[second])
@@ -280,7 +290,9 @@ class _Sorted:
             for g in below[group[row]]:
                 other = stairs[g].lowest(one, two)
                 if other is not None and (
-                    amount[other] < amount[row] or first[other] < one or ties[other] < ties[row]
+                    amount[other] < amount[row]
+                    or (first[other] < one and second[other] < two)
+                    or ties[other] < ties[row]
                 ):
                     break
             else:
