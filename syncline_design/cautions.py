@@ -7,6 +7,7 @@ from typing import Any
 
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.budget import differs
+from syncline_design.model.system import UTC
 from syncline_design.units import Dimension, format_quantity
 from syncline_design.verdict import Verified
 
@@ -76,8 +77,18 @@ def _clocks(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
         )
         return
     for stage in verified.system.stages:
-        lines = sorted({"utc" if s.timeline == "utc" else "host" for s in stage.sensors()})
-        if len(lines) > 1 and stage.vehicle in silent:
+        if stage.vehicle not in silent:
+            continue
+        if stage.ranging is None:
+            if stage.position is not None and stage.position.timeline != UTC:
+                yield (
+                    "common-clock",
+                    f"{stage.name} is stamped on the host clock and held against true time, and "
+                    "no `clock` says how far these are apart: the offset is taken as 0",
+                )
+            continue
+        lines = {"utc" if s.timeline == UTC else "host" for s in stage.sensors()}
+        if len(lines) > 1:
             yield (
                 "common-clock",
                 f"{stage.name} has sensors on the host clock and on UTC, and no `clock` says how "

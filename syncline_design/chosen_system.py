@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from syncline_design import timing
 from syncline_design.catalog import (
@@ -77,26 +78,12 @@ def _distribution(entry: TimestampError) -> timing.Distribution:
 def clock_error(entry: ClockEntry) -> timing.TimingError:
     """Offset of a host clock against UTC, with what it drifts away in holdover.
 
-    The drift's sign is unknown: it widens a bounded distribution to both sides by drift times
-    holdover, and adds to what remains of a normal one.  The bound is that of the offset plus
-    |drift| holdover in either case.
+    The drift's sign is unknown: plus and minus drift times holdover, beside the offset's own draw.
     """
     offset = timing_error(entry.offset)
     if entry.drift is None or entry.holdover is None:
         return offset
-    drifted = abs(float(entry.drift)) * float(entry.holdover)
-    if isinstance(offset.distribution, timing.Normal) or offset.calibrated_s is not None:
-        shift = timing.mean(offset.distribution) if offset.calibrated_s is None else 0.0
-        return timing.TimingError(
-            offset.distribution, drifted + abs(shift) + (offset.calibrated_s or 0.0)
-        )
-    match offset.distribution:
-        case timing.Uniform(low, high):
-            return timing.TimingError(timing.Uniform(low - drifted, high + drifted))
-        case timing.Constant(value):
-            return timing.TimingError(timing.Uniform(value - drifted, value + drifted))
-        case timing.Empirical(values):
-            return timing.TimingError(timing.Uniform(min(values) - drifted, max(values) + drifted))
+    return replace(offset, drifted_s=abs(float(entry.drift)) * float(entry.holdover))
 
 
 def _stage(loaded: LoadedSpec, index: int, chosen: dict[RoleName, Option | None]) -> Stage:

@@ -126,7 +126,7 @@ class Infrastructure:
 class Pair:
     """Two roles whose timestamps meet: relative error bound tau_a + tau_b + timeline offset.
 
-    role, reference: indices into Problem.roles; reference None: against the role's own stamp.
+    role, reference: indices into Problem.roles; reference None: against true time, on UTC.
     rate_mps: how fast the estimate moves with that relative error (per_sensor model).
     """
 

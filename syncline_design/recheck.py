@@ -6,8 +6,9 @@ code with the model, the tables or the solvers.  Formulas (E. R. Jellum et al., 
   sync error    = (v_max + d omega_max) tau_sys, summed over stages         (eq. sync_error_ub)
   tau_crit      = sensor error / (v_max + d omega_max)                      (eq. t_crit)
 tau_sys is the largest bound of any two timestamps that meet: tau_a + tau_ref + offset of their
-timelines.  A figure is rounded to a float once, at the end, and that float is compared with the
-limit: a printed limit that is met exactly passes, one that is missed by 1e-12 does not.
+timelines; a stage without a ranging sensor meets true time, which is UTC.  A figure is rounded to
+a float once, at the end, and that float is compared with the limit: a printed limit that is met
+exactly passes, one that is missed by 1e-12 does not.
 """
 
 from __future__ import annotations
@@ -228,6 +229,8 @@ def _bound(error: Any, coverage_factor: float) -> Decimal:
 
 
 Moves = tuple[Decimal, Decimal, Decimal]  # v_max, d omega_max, d
+_Moment = tuple[str, Decimal]  # timeline of a stamp, bound of its error against that timeline
+_TRUE_TIME: _Moment = ("utc", Decimal(0))
 
 
 def _moves(
@@ -270,20 +273,27 @@ def _meetings(
     chosen: Mapping[tuple[str, Role], _Chosen],
     moves: Mapping[str, Moves],
 ) -> Iterator[tuple[Decimal, Decimal]]:
-    """(bound of the relative timestamp error [s], rate [m/s]) of all that meet."""
-    before: _Chosen | None = None
+    """(bound of the relative timestamp error [s], rate [m/s]) of all that meet.
+
+    A stage takes its object at one moment: the one at which its ranging sensor measured, or, where
+    nothing ranges, the true time that the result is compared at.  Its position (a later stage: the
+    chain before it, as stamped by the ranging there) and its attitude are held against that.
+    """
+    carried: _Moment | None = None
     for stage in loaded.spec.stages:
         speed, turning, _ = moves[stage.name]
-        position = chosen[stage.name, "position"] if before is None else before
-        reference = chosen.get((stage.name, "ranging"))
-        if reference is None:
-            yield position.tau, speed
-            return
-        attitude = chosen[stage.name, "attitude"]
-        for one, rate in ((position, speed), (attitude, turning)):
-            offset = _between(loaded, selection, one.timeline, reference.timeline)
-            yield one.tau + reference.tau + offset, rate
-        before = reference
+        ranging = chosen.get((stage.name, "ranging"))
+        located = _TRUE_TIME if ranging is None else (ranging.timeline, ranging.tau)
+        if carried is None:
+            own = chosen[stage.name, "position"]
+            carried = (own.timeline, own.tau)
+        held: list[tuple[_Moment, Decimal]] = [(carried, speed)]
+        if ranging is not None:
+            attitude = chosen[stage.name, "attitude"]
+            held.append(((attitude.timeline, attitude.tau), turning))
+        for (timeline, tau), rate in held:
+            yield tau + located[1] + _between(loaded, selection, timeline, located[0]), rate
+        carried = located
 
 
 def _between(loaded: LoadedSpec, selection: Selection, first: str, second: str) -> Decimal:

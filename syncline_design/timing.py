@@ -52,10 +52,13 @@ class TimingError:
     `calibrated_s` None: mu follows the distribution as it stands.  Otherwise the known mean is
     removed and a constant of unknown sign, at most `calibrated_s`, remains (about 2 ms is what
     practice reaches).
+    `drifted_s`: what a free-running clock has drifted away [s], drift times holdover: a further
+    uniform draw between plus and minus it.
     """
 
     distribution: Distribution
     calibrated_s: float | None = None
+    drifted_s: float = 0.0
 
 
 NO_ERROR = TimingError(Constant(0.0))
@@ -74,12 +77,18 @@ def mean(distribution: Distribution) -> float:
             return math.fsum(values) / len(values)
 
 
+def expected(error: TimingError) -> float:
+    """Mean of mu [s] that is left: none where it is calibrated out."""
+    return 0.0 if error.calibrated_s is not None else mean(error.distribution)
+
+
 def bound(error: TimingError, coverage_factor: float = DEFAULT_COVERAGE_FACTOR) -> float:
     """Bound tau_i [s] of |mu|.
 
     |mean| + k std for a normal error (k: coverage factor), the larger absolute end for a uniform
     one, |value| for a constant one, the largest absolute value of an empirical one.  With the mean
-    calibrated out, the bound of the centred error plus what remains of the mean.
+    calibrated out, the bound of the centred error plus what remains of the mean.  What the clock
+    has drifted away adds to either.
     """
     shift = 0.0 if error.calibrated_s is None else mean(error.distribution)
     remains = 0.0 if error.calibrated_s is None else error.calibrated_s
@@ -92,4 +101,4 @@ def bound(error: TimingError, coverage_factor: float = DEFAULT_COVERAGE_FACTOR) 
             spread = abs(value - shift)
         case Empirical(values):
             spread = max(abs(value - shift) for value in values)
-    return spread + remains
+    return spread + remains + error.drifted_s

@@ -216,8 +216,8 @@ class Enumeration:
         tau = error = 0.0
         for i, stage in enumerate(self.stages):
             position = (0, "position") if i == 0 else (i - 1, "ranging")
-            if (i, "ranging") not in at:  # a position alone, against true time
-                pairs = [(at[position].tau_s, stage.v_mps)]
+            if (i, "ranging") not in at:  # a position alone, against true time, which is UTC
+                pairs = [(at[position].tau_s + self._from_utc(at, position, clocks), stage.v_mps)]
             else:
                 speeds = ((position, stage.v_mps), ((i, "attitude"), stage.d_m * stage.w_radps))
                 pairs = [(self._relative(at, a, (i, "ranging"), clocks), v) for a, v in speeds]
@@ -229,17 +229,22 @@ class Enumeration:
         self, at: dict[Slot, Option], a: Slot, b: Slot, clocks: dict[str, str | None]
     ) -> float:
         """Bound of the relative timestamp error of two sensors [s]."""
-        timelines = []
-        for slot in (a, b):
-            timeline = self.catalog["timestamping"][at[slot].method].get("timeline", "host")
-            timelines.append("utc" if timeline == "utc" else self.stages[slot[0]].vehicle)
-        offset = 0.0
-        if timelines[0] != timelines[1]:
-            names = [clocks[t] for t in timelines if t != "utc"]
-            offset = sum(
-                clock_bound(self.catalog["clocks"][n] if n else None, self.k) for n in names
-            )
+        if self._timeline(at, a) == self._timeline(at, b):
+            offset = 0.0
+        else:
+            offset = self._from_utc(at, a, clocks) + self._from_utc(at, b, clocks)
         return at[a].tau_s + at[b].tau_s + offset
+
+    def _timeline(self, at: dict[Slot, Option], slot: Slot) -> str:
+        """`utc`, or the vehicle whose host clock stamps."""
+        timeline = self.catalog["timestamping"][at[slot].method].get("timeline", "host")
+        return "utc" if timeline == "utc" else self.stages[slot[0]].vehicle
+
+    def _from_utc(self, at: dict[Slot, Option], slot: Slot, clocks: dict[str, str | None]) -> float:
+        """Bound of the offset of a sensor's timeline from UTC [s]."""
+        timeline = self._timeline(at, slot)
+        clock = None if timeline == "utc" else clocks[timeline]
+        return clock_bound(self.catalog["clocks"][clock] if clock else None, self.k)
 
     def _bought(
         self, at: dict[Slot, Option], clocks: dict[str, str | None]

@@ -457,14 +457,14 @@ def test_stage_without_ranging_locates_itself_only() -> None:
     )
     clocks = (("host:uav", TimingError(Constant(1.0))),)
     result = budget(System((stage,), clock_offsets=clocks))
-    assert result.tau_s == 1e-3
+    assert result.tau_s == 1.001  # true time is on UTC: the clock does not cancel
     assert result.sync_rate_mps == 21.0
     assert result.stages[0].distance_m == 0.0
     assert result.sensor_error_m == pytest.approx(0.01 * math.sqrt(3))
-    assert result.total_m == pytest.approx(0.01 * math.sqrt(3) + 0.021)
+    assert result.total_m == pytest.approx(0.01 * math.sqrt(3) + 21.0 * 1.001)
     assert result.total_m == result.total_per_sensor_m
     assert [term.term for term in result.ledger] == ["sigma_p", "v_max*tau"]
-    assert [row.ratio for row in result.sensors] == pytest.approx([1e-3 / 824.8e-6, 0.0], rel=1e-3)
+    assert [row.ratio for row in result.sensors] == pytest.approx([1.001 / 824.8e-6, 0.0], rel=1e-3)
 
 
 def test_nothing_moves() -> None:

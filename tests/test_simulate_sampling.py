@@ -469,8 +469,8 @@ def test_a_later_stage_is_shifted_against_the_ranging_before_it() -> None:
     np.testing.assert_allclose(np.linalg.norm(errors, axis=1), 0.2, rtol=1e-12)
 
 
-def test_position_only_system_refers_to_its_own_stamp() -> None:
-    """No clock enters: error v * mu, mu the position's own."""
+def test_position_only_system_refers_to_true_time() -> None:
+    """A stamp 5 s ahead of UTC (host - UTC) and valid 10 ms after it: error v (10 ms - 5 s)."""
     system = position_only()
     stage = dataclasses.replace(
         system.stages[0],
@@ -479,7 +479,7 @@ def test_position_only_system_refers_to_its_own_stamp() -> None:
     )
     clock = (("host:car", TimingError(Constant(5.0))),)
     errors = sample_errors(System((stage,), clock_offsets=clock), SimulationSettings(samples=50))
-    np.testing.assert_allclose(np.linalg.norm(errors, axis=1), 0.3, rtol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(errors, axis=1), 30.0 * 4.99, rtol=1e-12)
 
 
 def test_ten_seconds_of_shift_and_gimbal_lock_work() -> None:

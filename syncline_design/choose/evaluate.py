@@ -108,10 +108,11 @@ def chosen_clocks(problem: Problem, design: Design) -> list[ClockOption]:
 
 
 def pair_bound(problem: Problem, design: Design, options: list[Option], pair: Pair) -> Fraction:
-    """Bound of the relative timestamp error of a pair [s]."""
+    """Bound of the relative timestamp error of a pair [s]; without reference, against UTC."""
     own = options[pair.role]
     if pair.reference is None:
-        return own.tau()
+        clock = chosen_clocks(problem, design)[problem.roles[pair.role].vehicle]
+        return own.tau() + (clock.offset() if own.timeline == "host" else Fraction(0))
     other = options[pair.reference]
     vehicles = (problem.roles[pair.role].vehicle, problem.roles[pair.reference].vehicle)
     bound = own.tau() + other.tau()

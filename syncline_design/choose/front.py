@@ -101,6 +101,8 @@ def demand_structure(problem: Problem) -> None:
     for pair in problem.pairs:
         own = problem.roles[pair.role]
         if pair.reference is None:
+            if own.role == "ranging":
+                raise TooLarge("a chain that ends in a stage without a ranging sensor")
             continue
         other = problem.roles[pair.reference]
         same = own.stage == other.stage and own.role != "ranging"

@@ -200,17 +200,21 @@ class Merge:
         if (role, timing.role) not in self.rates:
             return None
         if timing.role is None:
-            return options.tau
+            return np.asarray(options.tau + self._from_utc(options.host, stage.vehicle))
         offset = self._offset(options.host, stage.vehicle, timing, stage.vehicle)
         return np.asarray(options.tau + timing.tau_s + offset)
 
     def _offset(self, host: Bools, vehicle: int, timing: TimingClass, other: int) -> Floats:
         """Offset between timelines: 0 on the same one, else both host clocks' against UTC."""
         theirs = self.offsets[other] if timing.host else 0.0
-        offset = np.where(host, self.offsets[vehicle], 0.0) + theirs
+        offset = self._from_utc(host, vehicle) + theirs
         if vehicle == other:
             return np.where(host == timing.host, 0.0, offset)
         return np.where(host | timing.host, offset, 0.0)
+
+    def _from_utc(self, host: Bools, vehicle: int) -> Floats:
+        """Offset of timelines from UTC: the host clock's, or none."""
+        return np.where(host, self.offsets[vehicle], 0.0)
 
     def _used_at(self, stage: StageRoles) -> int:
         return stage.vehicle * len(self.tables.tracked)

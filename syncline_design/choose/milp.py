@@ -192,7 +192,8 @@ class _Model:
             for own in self.classes[pair.role]:
                 y = self.cp.sum(self.x[pair.role][own.rows])
                 if pair.reference is None:
-                    yield own.tau, [y]
+                    for offset, clocks in self._from_utc(pair.role, own.host):
+                        yield own.tau + offset, [y, *clocks]
                     continue
                 for other in self.classes[pair.reference]:
                     other_y = self.cp.sum(self.x[pair.reference][other.rows])
@@ -214,6 +215,15 @@ class _Model:
                 sum(clocks[i].offset_bound_s for _, clocks, i in chosen),
                 [self.c[v][i] for v, _, i in chosen],
             )
+
+    def _from_utc(self, role: int, host: bool) -> Iterator[tuple[float, list[Any]]]:
+        """(offset of a role's timeline from UTC, clock binaries that make it)."""
+        if not host:
+            yield 0.0, []
+            return
+        v = self.problem.roles[role].vehicle
+        for i, clock in enumerate(self.problem.vehicles[v].clocks):
+            yield clock.offset_bound_s, [self.c[v][i]]
 
     def _add_hardware(self) -> None:
         for (v, k), units in self.units.items():
@@ -257,29 +267,32 @@ class _Model:
             for r in (pair.role, pair.reference):
                 if r is not None:
                     total = total + (pair.rate_mps * self.tables.roles[r].tau / scale_m) @ self.x[r]
-            if pair.reference is not None:
-                total = total + self._offset_terms(pair, scale_m)
+            for offset, members in self._apart(pair):
+                if not offset > 0.0:
+                    continue
+                active = self.cp.Variable(nonneg=True)
+                self.rows.append(active >= sum(members) - (len(members) - 1))
+                total = total + pair.rate_mps * offset / scale_m * active
         return total
 
-    def _offset_terms(self, pair: Pair, scale_m: float) -> Any:
-        total: Any = 0.0
+    def _apart(self, pair: Pair) -> Iterator[tuple[float, list[Any]]]:
+        """(offset between a pair's timelines, binaries that are all 1 where it applies)."""
         for host in (False, True):
+            own = self._on_timeline(pair.role, host)
+            if own is None:
+                continue
+            if pair.reference is None:
+                for offset, clocks in self._from_utc(pair.role, host):
+                    yield offset, [own, *clocks]
+                continue
             for other in (False, True):
-                sides = [
-                    self._on_timeline(pair.role, host),
-                    self._on_timeline(pair.reference, other),
-                ]
-                for offset, clocks in self._offsets(pair, host, other):
-                    if offset > 0.0 and all(side is not None for side in sides):
-                        members = [*sides, *clocks]
-                        active = self.cp.Variable(nonneg=True)
-                        self.rows.append(active >= sum(members) - (len(members) - 1))
-                        total = total + pair.rate_mps * offset / scale_m * active
-        return total
+                theirs = self._on_timeline(pair.reference, other)
+                if theirs is not None:
+                    for offset, clocks in self._offsets(pair, host, other):
+                        yield offset, [own, theirs, *clocks]
 
-    def _on_timeline(self, role: int | None, host: bool) -> Any:
+    def _on_timeline(self, role: int, host: bool) -> Any:
         """1 where a role's choice stamps on the host clock (or in UTC); None if no option does."""
-        assert role is not None
         rows = np.flatnonzero(self.tables.roles[role].host == host)
         return self.cp.sum(self.x[role][rows]) if len(rows) else None
 

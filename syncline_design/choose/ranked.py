@@ -189,7 +189,9 @@ class _Search:
         summed = np.zeros(len(role))
         for pair in self.problem.pairs:
             bound = self._tau(node, role, pair.role)
-            if pair.reference is not None:
+            if pair.reference is None and pair.role <= r:
+                bound = bound + self._from_utc(node, role, pair.role)
+            elif pair.reference is not None:
                 bound = bound + self._tau(node, role, pair.reference)
                 if max(pair.role, pair.reference) <= r:
                     bound = bound + self._offset(node, role, pair.role, pair.reference)
@@ -207,20 +209,23 @@ class _Search:
 
     def _offset(self, node: _Node, role: RoleArrays, first: int, second: int) -> Floats:
         """Offset between the timelines of two decided roles, the next one's options included."""
-        host = [
-            role.host
-            if which == len(node.places)
-            else np.full(len(role), self.tables.roles[which].host[node.places[which]])
-            for which in (first, second)
-        ]
+        host = [self._on_host(node, role, which) for which in (first, second)]
         vehicles = [self.problem.roles[which].vehicle for which in (first, second)]
-        bounds = [
-            self.problem.vehicles[v].clocks[self.clock_order[v][node.clocks[v]]].offset_bound_s
-            for v in vehicles
-        ]
-        apart = np.where(host[0], bounds[0], 0.0) + np.where(host[1], bounds[1], 0.0)
         same = (host[0] == host[1]) & (~host[0] | (vehicles[0] == vehicles[1]))
+        apart = self._from_utc(node, role, first) + self._from_utc(node, role, second)
         return np.where(same, 0.0, apart)
+
+    def _on_host(self, node: _Node, role: RoleArrays, which: int) -> Bools:
+        """Whether a decided role is stamped by its host, for each of the next role's options."""
+        if which == len(node.places):
+            return role.host
+        return np.full(len(role), self.tables.roles[which].host[node.places[which]])
+
+    def _from_utc(self, node: _Node, role: RoleArrays, which: int) -> Floats:
+        """Offset of a decided role's timeline from UTC [s]."""
+        v = self.problem.roles[which].vehicle
+        clock = self.problem.vehicles[v].clocks[self.clock_order[v][node.clocks[v]]]
+        return np.where(self._on_host(node, role, which), clock.offset_bound_s, 0.0)
 
     def _child(self, block: _Block, at: int) -> _Node:
         place = int(block.order[at])

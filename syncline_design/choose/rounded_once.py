@@ -77,17 +77,22 @@ class _Columns:
 
     def _bound(self, pair: Pair) -> Double:
         tau, host = self._timing(pair.role)
+        bound: Double = (tau, np.zeros(len(tau)))
+        vehicle = self.problem.roles[pair.role].vehicle
         if pair.reference is None:
-            return tau, np.zeros(len(tau))
+            return plus(bound, np.where(host, self._offset(vehicle), 0.0))
         other, other_host = self._timing(pair.reference)
-        vehicles = [self.problem.roles[r].vehicle for r in (pair.role, pair.reference)]
+        vehicles = [vehicle, self.problem.roles[pair.reference].vehicle]
         same = (host == other_host) & (~host | (vehicles[0] == vehicles[1]))
-        bound = plus((tau, np.zeros(len(tau))), other)
+        bound = plus(bound, other)
         for vehicle, on_host in zip(vehicles, (host, other_host), strict=True):
-            table = self.problem.vehicles[vehicle].clocks
-            offset = np.array([table[i].offset_bound_s for i in self.clocks[vehicle]])
-            bound = plus(bound, np.where(on_host & ~same, offset, 0.0))
+            bound = plus(bound, np.where(on_host & ~same, self._offset(vehicle), 0.0))
         return bound
+
+    def _offset(self, vehicle: int) -> Floats:
+        """Bounds of the offset of a vehicle's host clock [s]."""
+        table = self.problem.vehicles[vehicle].clocks
+        return np.array([table[i].offset_bound_s for i in self.clocks[vehicle]])
 
     def _timing(self, r: int) -> tuple[Floats, Indices]:
         table = self.problem.roles[r].options

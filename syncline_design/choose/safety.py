@@ -85,6 +85,6 @@ class Safety:
 
     def _largest_offset(self, pair: Pair) -> float:
         if pair.reference is None:
-            return 0.0
+            return self.offsets[self.problem.roles[pair.role].vehicle]
         own, other = (self.problem.roles[r].vehicle for r in (pair.role, pair.reference))
         return self.offsets[own] + (self.offsets[other] if other != own else 0.0)

@@ -58,7 +58,8 @@ class Scene:
         return _corrected_error(self, self._departures(acting))
 
     def _departures(self, acting: Sequence[Acting]) -> list[Departures]:
-        total = [_mean_timing(stage) for stage in self.system.stages]
+        ranged = self.log.kind != "position"
+        total = [_mean_timing(self.system, stage, ranged) for stage in self.system.stages]
         for a in (*self.known, *acting):
             departed = a.effect.depart(self.rows[a.stage], a.values, a.sensor, None)
             total[a.stage] = total[a.stage] + departed
@@ -168,14 +169,22 @@ def _stage_rows(
     )
 
 
-def _mean_timing(stage: Stage) -> Departures:
-    """The mean timestamp errors that the spec itself declares."""
+def _mean_timing(system: System, stage: Stage, ranged: bool) -> Departures:
+    """The mean timestamp errors that the spec itself declares, against UTC.
+
+    A stamp of the host clock is that clock's offset (host - UTC) ahead: mu = eps - offset.  In a
+    log of positions only the position sensor was at work; the rest, and the true time that its
+    stamp is held against, are the better system's.
+    """
 
     def mean(sensor: Sensor | None) -> Array:
-        if sensor is None or sensor.timing.calibrated_s is not None:
+        if sensor is None:
             return np.zeros(1)
-        return np.array([timing.mean(sensor.timing.distribution)])
+        offset = system.clock_offset(sensor.timeline)
+        return np.array([timing.expected(sensor.timing) - timing.expected(offset)])
 
+    if not ranged:
+        return Departures(position_shift_s=mean(stage.position))
     return Departures(
         position_shift_s=mean(stage.position),
         attitude_shift_s=mean(stage.attitude),

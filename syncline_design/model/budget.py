@@ -20,10 +20,11 @@ from syncline_design.model.pairing import (
     PairRow,
     distance_m,
     largest,
+    offset_s,
     pair_rows,
     tau_s,
 )
-from syncline_design.model.system import RoleName, Sensor, Stage, System
+from syncline_design.model.system import UTC, RoleName, Sensor, Stage, System
 
 SyncModelName = Literal["syncline", "per_sensor"]
 TermKind = Literal["sensor", "sync", "systematic"]
@@ -231,10 +232,19 @@ def _enters(stage: Stage, sensor: Sensor) -> bool:
 
 def _sensor_rows(system: System, extra_tau_s: ExtraTau) -> tuple[SensorRow, ...]:
     return tuple(
-        _sensor_row(stage, sensor, i == 0, tau_s(system, stage, sensor, extra_tau_s))
+        _sensor_row(stage, sensor, i == 0, _own_tau_s(system, stage, sensor, extra_tau_s))
         for i, stage in enumerate(system.stages)
         for sensor in stage.sensors()
     )
+
+
+def _own_tau_s(system: System, stage: Stage, sensor: Sensor, extra_tau_s: ExtraTau) -> float:
+    """tau [s] of a sensor for its own tau_crit: against its timeline, where others share it.
+
+    A stage without a ranging sensor is held against true time, so there the clock counts too.
+    """
+    own = tau_s(system, stage, sensor, extra_tau_s)
+    return own if stage.ranging is not None else own + offset_s(system, sensor.timeline, UTC)
 
 
 def _sensor_row(stage: Stage, sensor: Sensor, first: bool, tau: float) -> SensorRow:

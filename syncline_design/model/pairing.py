@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from syncline_design import timing
-from syncline_design.model.system import RoleName, Sensor, Stage, System
+from syncline_design.model.system import UTC, RoleName, Sensor, Stage, System
 
 ExtraTau = Mapping[tuple[str, RoleName], float]
 
@@ -22,8 +22,8 @@ class PairRow:
 
     stage, role: whose estimate it enters and as what (position or attitude); sensor: the sensor
     that measured it (in a later stage's position pair the ranging sensor of the stage before);
-    reference: the ranging sensor of the stage, "" for true time.  rate_mps: how fast the estimate
-    moves with the relative error; sync_error_m = rate_mps * tau_s.
+    reference: the ranging sensor of the stage, "" for true time, which is on UTC.
+    rate_mps: how fast the estimate moves with the relative error; sync_error_m = rate_mps * tau_s.
     """
 
     stage: str
@@ -77,7 +77,8 @@ def pair_rows(system: System, extra_tau_s: ExtraTau) -> tuple[PairRow, ...]:
 
     In the first stage position and attitude against the ranging sensor; from the second stage on
     the position is the chain before it, stamped by that stage's ranging sensor.  A stage without
-    a ranging sensor has its position stamp against true time alone.
+    a ranging sensor has its position stamp against true time: nothing cancels there, so a stamp
+    of the host clock carries that clock's offset against UTC.
     """
     rows: list[PairRow] = []
     before: Stage | None = None
@@ -116,12 +117,12 @@ def _pair_row(
     owner, sensor = measured_by
     reference = stage.ranging
     relative = tau_s(system, owner, sensor, extra_tau_s)
-    if reference is None:
-        return PairRow(
-            stage.name, role, sensor.id, "", relative, 0.0, rate_mps, rate_mps * relative
-        )
-    offset = offset_s(system, sensor.timeline, reference.timeline)
-    relative += tau_s(system, stage, reference, extra_tau_s) + offset
+    against, name = UTC, ""
+    if reference is not None:
+        against, name = reference.timeline, reference.id
+        relative += tau_s(system, stage, reference, extra_tau_s)
+    offset = offset_s(system, sensor.timeline, against)
+    relative += offset
     return PairRow(
-        stage.name, role, sensor.id, reference.id, relative, offset, rate_mps, rate_mps * relative
+        stage.name, role, sensor.id, name, relative, offset, rate_mps, rate_mps * relative
     )

@@ -83,8 +83,8 @@ class EffectEntry:
 class System:
     """Stages of a chain, first to last, with the host clocks' offsets against UTC.
 
-    clock_offsets: (timeline, error of that timeline against UTC); a timeline not listed is taken
-    as common with UTC (offset 0).
+    clock_offsets: (timeline, its offset = host - UTC [s], as a distribution); a timeline not listed
+    is taken as common with UTC (offset 0).
     horizon: how long, wide and steep the mission is, for effects that depend on it.
     """
 

@@ -218,9 +218,9 @@ def noise_curvature_m(system: System) -> float:
 
 
 def _dimensions(system: System) -> int:
-    """Dimensions of the cube: rays 2, per stage up to 11, per sensor or clock up to 2."""
+    """Dimensions of the cube: rays 2, per stage up to 11, per sensor up to 2, per clock up to 3."""
     sensors = sum(len(stage.sensors()) for stage in system.stages)
-    return 2 + 11 * len(system.stages) + 2 * (sensors + len(system.clock_offsets))
+    return 2 + 11 * len(system.stages) + 2 * sensors + 3 * len(system.clock_offsets)
 
 
 def _ray_directions(source: Source) -> Array:

@@ -82,10 +82,12 @@ def directions(height: Array, turn: Array) -> Array:
 
 
 def timing_draws(system: System, source: Source) -> Shifts:
-    """mu [s] of every sensor that enters, against true time.
+    """mu [s] of every sensor that enters, against true time (UTC).
 
-    Its own distribution plus the offset of its timeline's clock: one draw per timeline, shared by
-    the sensors on it.  A stage without a ranging sensor refers to its own stamp: no clock.
+    What a sensor stamped t on the host clock was valid at t + eps of that clock, and offset is
+    host - UTC, so mu = eps - offset: one draw of the offset per timeline, shared by the sensors
+    on it.  Between them it cancels; against UTC, as for a stage without a ranging sensor, it
+    counts.
     """
     offsets: dict[str, Array] = {}
     for timeline, error in system.clock_offsets:
@@ -94,8 +96,8 @@ def timing_draws(system: System, source: Source) -> Shifts:
     for stage in system.stages:
         for sensor in entering(stage):
             mu = timing_draw(sensor.timing, source)
-            if stage.ranging is not None and sensor.timeline in offsets:
-                mu = mu + offsets[sensor.timeline]
+            if sensor.timeline in offsets:
+                mu = mu - offsets[sensor.timeline]
             shifts[stage.name, sensor.role] = mu
     return shifts
 
@@ -109,14 +111,21 @@ def timing_draw(error: TimingError, source: Source) -> Array:
     """n draws of mu [s].
 
     With the mean calibrated out, what remains of it has unknown sign and size up to
-    `calibrated_s`: uniform between the two signs (JCGM 100:2008, 4.3.7).
+    `calibrated_s`, and so has what a clock drifted away: uniform between the two signs
+    (JCGM 100:2008, 4.3.7).
     """
     drawn = _distribution_draw(error.distribution, source)
-    if error.calibrated_s is None:
-        return drawn
-    remains = error.calibrated_s * (2.0 * source.uniform(1)[0] - 1.0)
-    centred: Array = drawn - mean(error.distribution) + remains
-    return centred
+    if error.calibrated_s is not None:
+        drawn = drawn - mean(error.distribution) + _either_sign(error.calibrated_s, source)
+    if error.drifted_s:
+        drawn = drawn + _either_sign(error.drifted_s, source)
+    return drawn
+
+
+def _either_sign(size_s: float, source: Source) -> Array:
+    """n draws [s], uniform between minus and plus a size."""
+    drawn: Array = size_s * (2.0 * source.uniform(1)[0] - 1.0)
+    return drawn
 
 
 def _distribution_draw(distribution: Distribution, source: Source) -> Array:
@@ -273,5 +282,5 @@ def time_margin_s(system: System) -> float:
                 total += abs(value)
             case Empirical(values):
                 total += max(abs(value) for value in values)
-        total += error.calibrated_s or 0.0
+        total += (error.calibrated_s or 0.0) + error.drifted_s
     return total if math.isfinite(total) else 0.0

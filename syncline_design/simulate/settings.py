@@ -96,7 +96,10 @@ def demand_simulable(system: System) -> None:
                 text = f"a {name} of at most the distance {stage.platform.distance_m:g} m"
                 _demand(arm <= stage.platform.distance_m, path, text, f"{arm:g} m")
     for timeline, error in system.clock_offsets:
-        _demand_distribution(f"clock_offsets.{timeline}", error.distribution)
+        path = f"clock_offsets.{timeline}"
+        _demand_distribution(path, error.distribution)
+        drifted = error.drifted_s
+        _demand(0.0 <= drifted < math.inf, path, "a drift of 0 s or more", drifted)
 
 
 def _demand_motion(stage: Stage) -> None:
