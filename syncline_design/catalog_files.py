@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design.catalog import SECTIONS, Catalog, CatalogFile
+from syncline_design.input_files import note_place
 from syncline_design.units import UNITS, Dimension, Quantity, UnitError, parse_quantity
 from syncline_design.validation import validate
 from syncline_design.values import did_you_mean
@@ -121,6 +122,7 @@ def inside_folder(
     try:
         target = (folder / name).resolve()
         there = target.exists()
+        note_place(folder / name, target)
     except (OSError, RuntimeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         return problem_at(document, path, f"a path that cannot be followed: {reason}", wanted, name)
@@ -129,6 +131,9 @@ def inside_folder(
     if not there:
         near = [p.name for p in sorted(root.glob("*.yaml"))]
         return problem_at(document, path, "no such file", wanted, name, did_you_mean(name, near))
+    if not target.is_file():
+        kind = "a folder" if target.is_dir() else "not a regular file (a pipe, socket or device)"
+        return problem_at(document, path, kind, wanted, name)
     return target
 
 

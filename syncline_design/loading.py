@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from importlib.resources import files
 from pathlib import Path
 
 from syncline_design.catalog import Catalog
 from syncline_design.catalog_files import (
+    BUILTIN_PACKAGE,
     Collection,
     add_builtin,
     add_own,
@@ -14,12 +16,21 @@ from syncline_design.catalog_files import (
     inside_folder,
     problem_at,
 )
+from syncline_design.input_files import (
+    FileContent,
+    FilesRead,
+    UnsuitableError,
+    noting,
+    read_plain,
+)
 from syncline_design.references import currency_problems, misfits, missing_figures, unknown_ids
 from syncline_design.spec import Spec
 from syncline_design.validation import validate
 from syncline_design.yaml_reader import Document, KeyPath, Position, Problem, parse, read
 
 MAX_SHOWN = 50
+MOST_TRAJECTORY_BYTES = 2**28
+BUILTIN_FOLDER = Path(str(files(BUILTIN_PACKAGE))).resolve()
 
 
 class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the program
@@ -53,6 +64,8 @@ class LoadedSpec:
     text: str = field(repr=False)
     origins: dict[tuple[str, str], str] = field(repr=False)
     builtin: bool = True
+    files: tuple[tuple[str, str], ...] = ()  # read besides: name from the spec's folder, SHA-256
+    trajectory: FileContent | None = None
 
     def place(self, path: KeyPath) -> str:
         """`file:line:column` of a key path, or of the nearest thing around it."""
@@ -68,7 +81,9 @@ def load(path: str | Path, builtin: bool = True) -> LoadedSpec:
 
     builtin: whether the shipped catalogs are drawn in too.
     """
-    return _loaded(read(path), Path(path), builtin)
+    with noting() as found:
+        loaded = _loaded(read(path), Path(path), builtin)
+    return replace(loaded, files=_beside(loaded, found))
 
 
 def load_text(text: str, path: str | Path, builtin: bool = True) -> LoadedSpec:
@@ -127,27 +142,63 @@ def _complete(document: Document, path: Path, collection: Collection, builtin: b
     problems += unknown_ids(document, collection)
     if spec is None:
         raise BadInput(tuple(problems))
-    problems += _missing_files(document, spec, path.parent)
-    _stop_at(problems)
+    found, trajectory = _named_files(document, spec, path.parent)
+    _stop_at(problems + found)
     catalog = collection.catalog()
     _stop_at(misfits(document, spec, catalog) + currency_problems(document, spec, catalog))
     _stop_at(missing_figures(document, spec, catalog))
     return LoadedSpec(
         spec, catalog, path, document.positions, document.sha256, collection.sha256(),
-        document.text, collection.origins, builtin,
+        document.text, collection.origins, builtin, trajectory=trajectory,
     )  # fmt: skip
 
 
-def _missing_files(document: Document, spec: Spec, folder: Path) -> list[Problem]:
-    """Files that the spec names for later: they have to be there, inside its folder."""
-    named: list[tuple[KeyPath, str]] = []
-    trajectory = spec.monte_carlo.trajectory
-    if trajectory is not None and trajectory.file is not None:
-        named.append((("monte_carlo", "trajectory", "file"), trajectory.file))
-    if spec.log is not None:
-        named += [(("log", "files", i), name) for i, name in enumerate(spec.log.files)]
-    found = [inside_folder(document, at, name, folder, folder.resolve()) for at, name in named]
-    return [item for item in found if isinstance(item, Problem)]
+def _named_files(
+    document: Document, spec: Spec, folder: Path
+) -> tuple[list[Problem], FileContent | None]:
+    """Files that the spec names for later: they have to be there, inside its folder.
+
+    The trajectory is read at once, so that a verdict rests on one content of it.
+    """
+    named = enumerate(spec.log.files if spec.log is not None else ())
+    found = [
+        inside_folder(document, ("log", "files", i), name, folder, folder.resolve())
+        for i, name in named
+    ]
+    problems = [item for item in found if isinstance(item, Problem)]
+    recorded = _recorded_trajectory(document, spec, folder)
+    if isinstance(recorded, Problem):
+        return [*problems, recorded], None
+    return problems, recorded
+
+
+def _recorded_trajectory(
+    document: Document, spec: Spec, folder: Path
+) -> FileContent | Problem | None:
+    choice = spec.monte_carlo.trajectory
+    if choice is None or choice.file is None:
+        return None
+    at: KeyPath = ("monte_carlo", "trajectory", "file")
+    inside = inside_folder(document, at, choice.file, folder, folder.resolve())
+    if isinstance(inside, Problem):
+        return inside
+    try:
+        return FileContent(folder / choice.file, read_plain(inside, MOST_TRAJECTORY_BYTES))
+    except (OSError, UnsuitableError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        return problem_at(document, at, f"cannot read the file: {reason.lower()}")
+
+
+def _beside(loaded: LoadedSpec, found: FilesRead) -> tuple[tuple[str, str], ...]:
+    """What a spec was read with: its own catalogs, files of delays, trajectory; names, hashes."""
+    folder = loaded.path.parent.resolve()
+    own = {Path(path).resolve(): digest for path, digest in found.contents.items()}
+    own.pop(loaded.path.resolve(), None)
+    return tuple(
+        (path.relative_to(folder).as_posix(), digest)
+        for path, digest in sorted(own.items())
+        if path.is_relative_to(folder) and not path.is_relative_to(BUILTIN_FOLDER)
+    )
 
 
 __all__ = [

@@ -28,6 +28,7 @@ from syncline_design.open_choice import Picked, pick
 from syncline_design.problem import build_problem, selection_of
 from syncline_design.spec_writer import PinnedRole, pinned_spec_text
 from syncline_design.units import Dimension, format_quantity
+from syncline_design.verdict import files_json
 from syncline_design.verify import CheckSettings, verify
 from syncline_design.yaml_reader import printable
 
@@ -133,6 +134,7 @@ def optimisation_json(found: Optimisation) -> Json:
             "version": __version__,
             "spec_sha256": loaded.spec_sha256,
             "catalogs_sha256": loaded.catalogs_sha256,
+            "files": files_json(loaded),
             "seed": found.settings.seed,
         },
     }

@@ -10,6 +10,7 @@ from syncline_design.known_effects import effect_entries
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.system import System
 from syncline_design.simulate import SimulationError, SimulationResult, simulate
+from syncline_design.verdict import files_json
 from syncline_design.verify import picked_design, refuse_trajectory, simulation_settings
 
 
@@ -27,6 +28,7 @@ class SimulatedSpec:
         provenance = {
             "spec_sha256": self.loaded.spec_sha256,
             "catalogs_sha256": self.loaded.catalogs_sha256,
+            "files": files_json(self.loaded),
         }
         return {**self.result.to_json(), "spec": spec, "provenance": provenance}
 

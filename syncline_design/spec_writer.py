@@ -7,8 +7,6 @@ the data instead, with a comment that says so.
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,10 +14,11 @@ from typing import Any
 
 import yaml
 
-from syncline_design.loading import BadInput, LoadedSpec, load_text
+from syncline_design.loading import LoadedSpec, load_text
+from syncline_design.result_files import write_file
 from syncline_design.spec import EffectChoice, Role
 from syncline_design.units import Quantity
-from syncline_design.yaml_reader import KeyPath, Problem, parse, plain_scalar
+from syncline_design.yaml_reader import KeyPath, parse, plain_scalar
 
 MAX_WIDTH = 96
 
@@ -88,39 +87,10 @@ def _bare(value: float | str) -> float | str:
 
 
 def write_spec(text: str, path: str | Path, builtin: bool = True) -> LoadedSpec:
-    """Check a spec's text as if it lay at `path`, then write it there in one step."""
+    """Check a spec's text as if it lay at `path`, then write it there in one step; OutputError."""
     loaded = load_text(text, path, builtin)
-    write_whole(Path(path), text)
+    write_file(path, text.encode("utf-8"))
     return loaded
-
-
-def write_whole(path: Path, text: str) -> None:
-    """Write a file so that it is there whole or not at all."""
-    temporary: str | None = None
-    try:
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        with os.fdopen(descriptor, "w", encoding="utf-8", newline="\n") as stream:
-            stream.write(text)
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(temporary).chmod(_mode(path))
-        Path(temporary).replace(path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        reason = (error.strerror or str(error)).lower()
-        raise BadInput(
-            (Problem(str(path), 0, 0, "", f"cannot write the file: {reason}"),)
-        ) from None
-
-
-def _mode(path: Path) -> int:
-    """Permissions of the file that is replaced, else the ones a new file gets."""
-    if path.exists():
-        return path.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 def _changed(loaded: LoadedSpec, changes: list[tuple[KeyPath, dict[str, Any]]], reason: str) -> str:

@@ -236,10 +236,16 @@ def _provenance(loaded: LoadedSpec, seed: int) -> Json:
         "version": __version__,
         "spec_sha256": loaded.spec_sha256,
         "catalogs_sha256": loaded.catalogs_sha256,
+        "files": files_json(loaded),
         "seed": seed,
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
+
+
+def files_json(loaded: LoadedSpec) -> list[Json]:
+    """Every file besides spec and shipped catalogs whose content entered the result."""
+    return [{"file": name, "sha256": digest} for name, digest in loaded.files]
 
 
 def effects_json(system: System) -> list[Json]:

@@ -13,6 +13,7 @@ from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
 from syncline_design.design_space import Problem as DesignProblem
+from syncline_design.input_files import FileContent
 from syncline_design.known_effects import effect_entries, known_of
 from syncline_design.loading import BadInput, LoadedSpec, Problem, load
 from syncline_design.model.budget import budget
@@ -227,10 +228,9 @@ def simulation_settings(loaded: LoadedSpec, seed: int) -> SimulationSettings:
     choice = loaded.spec.monte_carlo
     limits = [float(r.limit) for r in loaded.spec.requirements if r.kind == "accuracy"]
     limits = limits or [float(r.limit) for r in loaded.spec.requirements if r.kind == "monte_carlo"]
-    trajectory: str | Path | None = None
-    if choice.trajectory is not None:
-        file = choice.trajectory.file
-        trajectory = choice.trajectory.manoeuvre if file is None else loaded.path.parent / file
+    trajectory: str | FileContent | None = loaded.trajectory
+    if trajectory is None and choice.trajectory is not None:
+        trajectory = choice.trajectory.manoeuvre
     return SimulationSettings(
         samples=choice.samples,
         seed=seed,

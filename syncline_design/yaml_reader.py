@@ -11,9 +11,7 @@ from __future__ import annotations
 
 import hashlib
 import importlib
-import os
 import re
-import stat
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -22,6 +20,7 @@ from typing import Any
 
 import yaml
 
+from syncline_design.input_files import UnsuitableError, read_plain
 from syncline_design.yaml_scalars import Number as Number
 from syncline_design.yaml_scalars import plain_scalar as plain_scalar
 
@@ -138,23 +137,10 @@ def _unreadable(problem: Problem, sha256: str = "") -> Document:
 
 def read_bytes(path: Path) -> bytes:
     """Bytes of a regular file of acceptable size; size and kind are looked at before reading."""
-    # O_NONBLOCK: opening a FIFO would wait for its writer for ever.
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     try:
-        status = os.fstat(descriptor)
-        if stat.S_ISDIR(status.st_mode):
-            raise StopReadingError("a folder; expected a file")
-        if not stat.S_ISREG(status.st_mode):
-            raise StopReadingError("not a regular file (a pipe, socket or device)")
-        if status.st_size > MAX_BYTES:
-            raise StopReadingError(f"{status.st_size} bytes; expected at most {MAX_BYTES}")
-        with os.fdopen(descriptor, "rb", closefd=False) as stream:
-            content = stream.read(MAX_BYTES + 1)
-    finally:
-        os.close(descriptor)
-    if len(content) > MAX_BYTES:
-        raise StopReadingError(f"more than {MAX_BYTES} bytes")
-    return content
+        return read_plain(path, MAX_BYTES)
+    except UnsuitableError as error:
+        raise StopReadingError(str(error)) from None
 
 
 def _encoding_problem(file: str, raw: bytes, error: UnicodeDecodeError) -> Problem:

@@ -170,7 +170,7 @@ def test_no_output_takes_the_place_of_a_file_that_is_read(tmp_path: Path) -> Non
         (("check", str(spec), "--output", f"json:{spec}"), "is read by this command"),
         (("check", str(spec), "--output", f"json:{tmp_path / 'link.json'}"), "is read by"),
         (("simulate", str(spec), "--output", f"json:{other}"), "a YAML file is there"),
-        (("optimize", str(spec), "--write-design", str(spec)), "is the spec itself"),
+        (("optimize", str(spec), "--write-design", str(spec)), "is read by this command"),
     ):
         done = run(*arguments)
         assert done.returncode == 2, arguments

@@ -195,7 +195,7 @@ def test_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     def denied(*_: object, **__: object) -> int:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("syncline_design.yaml_reader.os.open", denied)
+    monkeypatch.setattr("syncline_design.input_files.os.open", denied)
     assert "permission denied" in refused(spec)[0]
 
 

@@ -13,6 +13,7 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
+from syncline_design.input_files import FileContent
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
 from syncline_design.simulate import (
     SimulationError,
@@ -173,7 +174,7 @@ def test_track_interpolates_attitude_like_scipy_slerp(tmp_path: Path) -> None:
     columns = circle_columns(20)
     columns |= {n: np.cumsum(rng.normal(size=20) * 5) for n in ("roll_deg", "pitch_deg", "yaw_deg")}
     path = write_track(tmp_path / "rough.csv", columns)
-    track = _file_track(path, path.stat().st_mtime_ns, "")
+    track = _file_track(FileContent(path, path.read_bytes()), "")
     from scipy.spatial.transform import Slerp
 
     angles = np.stack([columns[n] for n in ("yaw_deg", "pitch_deg", "roll_deg")], axis=-1)

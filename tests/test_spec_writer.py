@@ -9,13 +9,13 @@ import pytest
 
 from syncline_design.loading import BadInput, LoadedSpec, load, load_text
 from syncline_design.resolution import candidate_sensors, timestamping_of, usable_primitives
+from syncline_design.result_files import OutputError, write_file
 from syncline_design.spec import ROLE_NAMES, EffectChoice, InlineTimestamping
 from syncline_design.spec_writer import (
     PinnedRole,
     pinned_spec_text,
     with_effects_text,
     write_spec,
-    write_whole,
 )
 from syncline_design.yaml_reader import parse
 
@@ -174,14 +174,14 @@ def test_a_failed_write_leaves_the_old_file(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(BadInput, match="no space left"):
-        write_whole(target, "new")
+    with pytest.raises(OutputError, match="No space left"):
+        write_file(target, b"new")
     assert target.read_text(encoding="utf-8") == "old"
     assert list(tmp_path.iterdir()) == [target]
     monkeypatch.undo()
     target.chmod(0o640)
-    write_whole(target, "new")
+    write_file(target, b"new")
     assert target.read_text(encoding="utf-8") == "new"
     assert target.stat().st_mode & 0o777 == 0o640
-    with pytest.raises(BadInput, match="cannot write"):
-        write_whole(tmp_path / "absent" / "out.yaml", "new")
+    with pytest.raises(OutputError, match="cannot write"):
+        write_file(target / "below" / "out.yaml", b"new")

@@ -73,12 +73,7 @@ def optimize(
     from syncline_design.optimisation import OptimizeSettings, optimisation_text, optimize
     from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
 
-    targets = output_targets(output, OPTIMIZE_FORMATS, [spec, *_given(write_design)])
-    if write_design is not None and write_design.resolve() == spec.resolve():
-        refuse(
-            f"syncline-design: --write-design {write_design}: is the spec itself, whose open "
-            "choices would be lost; give another name"
-        )
+    targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
     loaded = load(spec)
     for name in loaded.spec.catalogs if write_design is not None else ():
         if write_design is not None and not (write_design.parent / name).exists():
@@ -94,10 +89,6 @@ def optimize(
         _write_design(found, write_design)
     emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
     return found.exit_code
-
-
-def _given(path: Path | None) -> list[Path]:
-    return [] if path is None else [path]
 
 
 def _write_design(found: Any, path: Path) -> None:

@@ -75,8 +75,7 @@ def diagnose(
     from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
     from syncline_design.report.text import visible
 
-    reads = [spec, *(log or ()), *([] if write_spec is None else [write_spec])]
-    targets = output_targets(output, DIAGNOSE_FORMATS, reads)
+    targets = output_targets(output, DIAGNOSE_FORMATS, [spec, *(log or ())], [write_spec])
     loaded = load(spec)
     settings = DiagnosisSettings(
         seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects

@@ -47,15 +47,19 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
 
     @functools.wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        from syncline_design.input_files import ReplacedInputError, noting
         from syncline_design.loading import BadInput
-        from syncline_design.report.write import OutputError
+        from syncline_design.result_files import OutputError
 
         try:
-            code = command(*args, **kwargs)
+            with noting():
+                code = command(*args, **kwargs)
         except typer.Exit:
             raise
         except BadInput as error:
             refuse(str(error))
+        except ReplacedInputError as error:
+            refuse(f"syncline-design: {error}")
         except OutputError as error:
             refuse(f"syncline-design: {error}", NO_VERDICT)
         except KeyboardInterrupt:
@@ -91,15 +95,35 @@ def refuse_unexpected(error: Exception) -> NoReturn:
 
 
 def output_targets(
-    output: list[str] | None, formats: tuple[str, ...], reads: Sequence[Path] = ()
+    output: list[str] | None,
+    formats: tuple[str, ...],
+    reads: Sequence[Path] = (),
+    writes: Sequence[Path | None] = (),
 ) -> list[Target]:
-    """Where results go; refused where one would overwrite a file that the command reads."""
-    from syncline_design.report.write import OutputError, check_targets, parse_target
+    """Where results go; refused where one would overwrite a file that the command reads.
 
+    reads: files named on the command line; what these name in turn is held against the targets
+    when it is opened.  writes: specs that are written besides.
+    """
+    from syncline_design.input_files import ReplacedInputError, claim_outputs, note_read
+    from syncline_design.report.write import (
+        STDOUT,
+        OutputError,
+        check_targets,
+        check_writable,
+        parse_target,
+    )
+
+    specs = [path for path in writes if path is not None]
     try:
         targets = [parse_target(text, formats) for text in output or ()]
-        check_targets(targets, reads)
-    except OutputError as error:
+        for path in specs:
+            check_writable(path)
+        check_targets(targets, [*reads, *specs])
+        for path in reads:
+            note_read(path)
+        claim_outputs([*specs, *(Path(t.path) for t in targets if t.path != STDOUT)])
+    except (OutputError, ReplacedInputError) as error:
         refuse(f"syncline-design: {error}")
     return targets
 

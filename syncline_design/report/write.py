@@ -1,21 +1,23 @@
-"""The only place that writes result files: all or nothing, the old file intact on failure."""
+"""Where results go: `--output FORMAT:PATH` read, checked before anything is computed, written."""
 
 from __future__ import annotations
 
 import contextlib
 import os
 import sys
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from syncline_design.result_files import OutputError, descriptor_of, is_stream, write_files
+
+__all__ = [
+    "STDOUT", "OutputError", "Target", "check_targets", "check_writable", "parse_target",
+    "write_outputs",
+]  # fmt: skip
+
 STDOUT: Final = "-"
-
-
-class OutputError(Exception):
-    """A result could not be written; the message says which, why and what to do."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,14 +44,15 @@ def parse_target(argument: str, known: Sequence[str]) -> Target:
             f"--output {argument}: no path after the colon; expected {name}:PATH, or {name}:- "
             "for standard output"
         )
-    return Target(name, path if separator else STDOUT)
+    return Target(name, STDOUT if not separator or descriptor_of(path) == 1 else path)
 
 
 def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None:
     """Refuse, before anything is computed, targets that cannot be written or that collide.
 
-    reads: files that the command reads; no result may take the place of one of them, nor of any
-    YAML file, which would be a spec or a catalog.
+    reads: files that the command is known to read; no result may take the place of one of them,
+    nor of any YAML file, which would be a spec or a catalog.  What the command finds to read later
+    on is held against the same targets when it is opened (`input_files.claim_outputs`).
     """
     inputs = {os.path.realpath(path) for path in reads}
     seen: set[str] = set()
@@ -59,14 +62,12 @@ def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None
             where = "standard output" if key == STDOUT else target.path
             raise OutputError(f"two outputs go to {where}; give each its own path")
         seen.add(key)
-        _keep_inputs(target, key, inputs)
-        if target.path != STDOUT:
-            _check_writable(Path(target.path))
+        if target.path != STDOUT and not is_stream(target.path):
+            _keep_inputs(target, key, inputs)
+            check_writable(Path(target.path))
 
 
 def _keep_inputs(target: Target, key: str, inputs: set[str]) -> None:
-    if target.path == STDOUT:
-        return
     if key in inputs:
         raise OutputError(f"{target.path}: is read by this command; write the result elsewhere")
     if key.endswith((".yaml", ".yml")) and Path(key).is_file():
@@ -76,12 +77,13 @@ def _keep_inputs(target: Target, key: str, inputs: set[str]) -> None:
         )
 
 
-def _check_writable(path: Path) -> None:
+def check_writable(path: Path) -> None:
+    """Refuse a path that cannot become a file."""
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file in it")
-    if _is_stream(path):
+    if is_stream(path):
         return
-    parent = path.parent
+    parent = Path(os.path.realpath(path)).parent
     while not parent.exists():
         parent = parent.parent
     if not parent.is_dir():
@@ -90,97 +92,19 @@ def _check_writable(path: Path) -> None:
         raise OutputError(f"{path}: no permission to write in {parent}")
 
 
-def _is_stream(path: Path) -> bool:
-    """A device or pipe, such as /dev/null: written to directly, nothing there to keep intact."""
-    return path.exists() and not path.is_file() and not path.is_dir()
-
-
 def write_outputs(rendered: Sequence[tuple[Target, str | bytes]]) -> None:
     """Write every rendered text; files first, each atomically, then standard output.
 
-    All texts are written to temporary files beside their targets before the first one is put in
-    place, so that a full disk leaves every old file as it was.
+    A full disk leaves every old file as it was.
     """
-    staged: list[tuple[Path, Path]] = []
-    files = [(Path(os.path.realpath(t.path)), text) for t, text in rendered if t.path != STDOUT]
-    try:
-        for final, text in files:
-            if not _is_stream(final):
-                staged.append((_stage(final, text), final))
-        for temporary, final in staged:
-            _put_in_place(temporary, final)
-    finally:
-        for temporary, _ in staged:
-            with contextlib.suppress(OSError):
-                temporary.unlink(missing_ok=True)
-    for final, text in files:
-        if _is_stream(final):
-            _write_stream(final, text)
+    write_files([(t.path, _encoded(text)) for t, text in rendered if t.path != STDOUT])
     for target, text in rendered:
         if target.path == STDOUT:
             _print(text)
 
 
-def _stage(final: Path, text: str | bytes) -> Path:
-    """Write text to a temporary file in the folder of `final`, down to the disk."""
-    try:
-        final.parent.mkdir(parents=True, exist_ok=True)
-        descriptor, name = tempfile.mkstemp(prefix=f".{final.name[:80]}.", dir=final.parent)
-    except OSError as error:
-        raise _explained(final, error) from None
-    try:
-        with os.fdopen(descriptor, "wb") as stream:
-            stream.write(_encoded(text))
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(name).chmod(_mode_for(final))
-    except OSError as error:
-        with contextlib.suppress(OSError):
-            Path(name).unlink(missing_ok=True)
-        raise _explained(final, error) from None
-    return Path(name)
-
-
 def _encoded(text: str | bytes) -> bytes:
     return text if isinstance(text, bytes) else text.encode("utf-8")
-
-
-def _mode_for(final: Path) -> int:
-    """The old file's permissions, or those the process gives new files (mkstemp gives 0600)."""
-    with contextlib.suppress(OSError):
-        return final.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
-
-
-def _put_in_place(temporary: Path, final: Path) -> None:
-    try:
-        temporary.replace(final)
-    except OSError as error:
-        raise _explained(final, error) from None
-    with contextlib.suppress(OSError):  # some file systems cannot sync a folder
-        descriptor = os.open(final.parent, os.O_RDONLY)
-        try:
-            os.fsync(descriptor)
-        finally:
-            os.close(descriptor)
-
-
-def _write_stream(path: Path, text: str | bytes) -> None:
-    try:
-        with path.open("wb") as stream:
-            stream.write(_encoded(text))
-    except OSError as error:
-        raise _explained(path, error) from None
-
-
-def _explained(final: Path, error: OSError) -> OutputError:
-    reason = error.strerror or str(error)
-    if _is_stream(final):
-        return OutputError(f"{final}: cannot write: {reason}")
-    kept = "the file that was there is unchanged" if final.exists() else "nothing was written"
-    return OutputError(f"{final}: cannot write: {reason}; {kept}")
 
 
 def _print(text: str | bytes) -> None:

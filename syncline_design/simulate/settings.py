@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from syncline_design.input_files import FileContent
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.timing import Constant, Distribution, Empirical, Normal, Uniform
 
@@ -40,7 +41,7 @@ class SimulationSettings:
     quantiles: tuple[float, ...] = DEFAULT_QUANTILES
     limit_m: float | None = None
     workers: int | None = None
-    trajectory: str | Path | None = None
+    trajectory: str | Path | FileContent | None = None
     tau_grid_s: tuple[float, ...] | None = None
     estimator: Estimator = "plain"
     confidence: float = 0.95

@@ -13,6 +13,7 @@ Anything else is the path of a CSV file with the columns of a measured log: `tim
 from __future__ import annotations
 
 import csv
+import io
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from syncline_design.effects.base import Array, StageRows
 from syncline_design.effects.kinematics import bearing, rotate
+from syncline_design.input_files import FileContent, UnsuitableError, read_plain
 from syncline_design.model.system import Platform, Stage, System
 from syncline_design.simulate import known_effects
 from syncline_design.simulate.chain import (
@@ -209,16 +211,13 @@ def _noise(system: System, index: int, shifts: Shifts, source: RandomSource) -> 
 def _stage_track(system: System, settings: SimulationSettings, index: int) -> Track:
     """The track of one stage, from its manoeuvre or from the file."""
     stage = system.stages[index]
-    name = str(settings.trajectory or DEFAULT_MANOEUVRE)
+    chosen = settings.trajectory or DEFAULT_MANOEUVRE
     margin = time_margin_s(system)
-    if name in MANOEUVRES:
-        return _manoeuvre_track(stage.platform, name, margin)
+    if isinstance(chosen, str) and chosen in MANOEUVRES:
+        return _manoeuvre_track(stage.platform, chosen, margin)
     prefix = f"{stage.name}_" if len(system.stages) > 1 else ""
-    path = Path(name)
-    if not path.is_file():
-        known = ", ".join(MANOEUVRES)
-        raise SimulationError(f"trajectory: expected a CSV file or one of {known}, found {name!r}")
-    track = _file_track(path, path.stat().st_mtime_ns, prefix)
+    file = chosen if isinstance(chosen, FileContent) else _content(Path(chosen))
+    path, track = file.path, _file_track(file, prefix)
     if track.time_s[-1] - track.time_s[0] <= 2.0 * margin:
         raise SimulationError(
             f"{path}: the trajectory lasts {track.time_s[-1] - track.time_s[0]:g} s, expected more "
@@ -281,10 +280,23 @@ def _manoeuvre_track(platform: Platform, name: str, margin_s: float) -> Track:
     return Track(time_s, position, velocity, rotation, turn)
 
 
+def _content(path: Path) -> FileContent:
+    """A trajectory that a caller names by its path."""
+    try:
+        return FileContent(path, read_plain(path))
+    except (OSError, UnsuitableError) as error:
+        known = ", ".join(MANOEUVRES)
+        reason = getattr(error, "strerror", None) or str(error)
+        raise SimulationError(
+            f"trajectory: expected a CSV file or one of {known}, found {str(path)!r} ({reason})"
+        ) from None
+
+
 @lru_cache(maxsize=8)
-def _file_track(path: Path, _: int, prefix: str) -> Track:
-    """The track of a CSV file (its time of change is part of the cache's key)."""
-    columns = _read_columns(path)
+def _file_track(file: FileContent, prefix: str) -> Track:
+    """The track of a CSV file; the cache goes by what is in it."""
+    path = file.path
+    columns = _read_columns(file)
     time_s = _column(path, columns, "time", "s", ("s", "ms"))
     if time_s.shape[0] < 2 or not np.all(np.diff(time_s) > 0.0):
         raise SimulationError(f"{path}: time_s: expected at least two rows of rising time")
@@ -328,13 +340,13 @@ def _sight(
     )
 
 
-def _read_columns(path: Path) -> dict[str, Array]:
+def _read_columns(file: FileContent) -> dict[str, Array]:
     """All columns of a CSV file as numbers; a cell that is none names its line and column."""
+    path = file.path
     try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            reader = csv.reader(file)
-            rows = [(reader.line_num, row) for row in reader if row]
-    except (OSError, UnicodeDecodeError, csv.Error) as failure:
+        reader = csv.reader(io.StringIO(file.content.decode("utf-8-sig"), newline=""))
+        rows = [(reader.line_num, row) for row in reader if row]
+    except (UnicodeDecodeError, csv.Error) as failure:
         raise SimulationError(f"{path}: expected a CSV file in UTF-8: {failure}") from None
     if not rows:
         raise SimulationError(f"{path}: expected a header and rows, found an empty file")

@@ -1,0 +1,183 @@
+"""The files that a command reads: opened in one way, and every one of them noted.
+
+Only plain files are opened: a pipe would wait for its writer for ever, a device has no end.  What
+was read is noted where somebody asks for it: results are kept under the content of every file that
+entered them, and no result may take the place of a file that the command reads.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import stat
+from collections.abc import Iterator, Sequence
+from contextvars import ContextVar
+from dataclasses import dataclass, field
+from pathlib import Path
+
+Identity = tuple[int, int]  # device and inode: one file, whatever its names
+MISSING = "missing"
+
+
+class UnsuitableError(Exception):
+    """A file that is no plain file, or too large; the text says what it is."""
+
+
+class ReplacedInputError(Exception):
+    """A result would take the place of a file that the command reads."""
+
+
+@dataclass
+class FilesRead:
+    """What was looked for and read while this was asked for.
+
+    contents: absolute path to the SHA-256 of what was read there.  places: absolute path as it was
+    named, to the file that it led to (or `missing`).  outputs: files that are to be written.
+    """
+
+    contents: dict[str, str] = field(default_factory=dict)
+    places: dict[str, str] = field(default_factory=dict)
+    identities: dict[Identity, str] = field(default_factory=dict)
+    outputs: list[Path] = field(default_factory=list)
+
+    def claim(self, outputs: Sequence[Path]) -> None:
+        """Files that will be written; refused as soon as one of them is read, now or later."""
+        self.outputs += outputs
+        self.demand_apart()
+
+    def add(self, path: Path, status: os.stat_result | None) -> None:
+        """One more file that is read."""
+        if status is not None and stat.S_ISREG(status.st_mode):
+            self.identities.setdefault((status.st_dev, status.st_ino), str(path))
+            self.demand_apart()
+
+    def demand_apart(self) -> None:
+        """Refuse when a file to be written is one that is read, by whatever name."""
+        for output in self.outputs:
+            identity = identity_of(output)
+            read_as = self.identities.get(identity) if identity is not None else None
+            if read_as is not None:
+                shown = "" if Path(read_as) == output else f" (as {read_as})"
+                raise ReplacedInputError(
+                    f"{output}: is read by this command{shown}; write the result elsewhere"
+                )
+
+
+@dataclass(frozen=True, slots=True)
+class FileContent:
+    """A file as it was when it was read: whatever happens to it later, one run sees one content."""
+
+    path: Path
+    content: bytes = field(repr=False)
+
+    def __str__(self) -> str:
+        return str(self.path)
+
+
+_ACTIVE: ContextVar[tuple[FilesRead, ...]] = ContextVar("files_read", default=())
+
+
+@contextlib.contextmanager
+def noting() -> Iterator[FilesRead]:
+    """Note every file that this thread reads inside the block."""
+    found = FilesRead()
+    token = _ACTIVE.set((*_ACTIVE.get(), found))
+    try:
+        yield found
+    finally:
+        _ACTIVE.reset(token)
+
+
+def claim_outputs(outputs: Sequence[Path]) -> None:
+    """Say which files the running command will write; ReplacedInputError if it reads one."""
+    for noted in _ACTIVE.get()[:1]:
+        noted.claim(outputs)
+
+
+def identity_of(path: Path) -> Identity | None:
+    """Device and inode of a plain file, through symlinks; None where there is none."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError):
+        return None
+    return (status.st_dev, status.st_ino) if stat.S_ISREG(status.st_mode) else None
+
+
+def note_place(path: Path, target: Path) -> None:
+    """A file that was looked for under this name and lies (or is missing) at `target`."""
+    for noted in _ACTIVE.get():
+        noted.places[str(path.absolute())] = place_of(path)
+        with contextlib.suppress(OSError, ValueError):
+            noted.add(path, target.stat())
+
+
+def place_of(path: Path) -> str:
+    """Where a name leads, relative to its folder, and to what; for comparison only."""
+    try:
+        real = path.resolve()
+        mode = real.stat().st_mode
+    except (OSError, RuntimeError, ValueError):
+        return MISSING
+    kind = "file" if stat.S_ISREG(mode) else "folder" if stat.S_ISDIR(mode) else "other"
+    return f"{kind} {os.path.relpath(real, path.parent.resolve())}"
+
+
+def note_content(path: Path, content: bytes, status: os.stat_result | None = None) -> None:
+    """The bytes that were read from a file."""
+    active = _ACTIVE.get()
+    digest = hashlib.sha256(content).hexdigest() if active else ""
+    for noted in active:
+        noted.contents[str(path.absolute())] = digest
+        noted.add(path, status)
+
+
+def note_read(path: Path) -> None:
+    """A file that another library reads."""
+    with contextlib.suppress(OSError, ValueError):
+        status = path.stat()
+        for noted in _ACTIVE.get():
+            noted.add(path, status)
+
+
+def content_of(path: Path) -> str:
+    """SHA-256 of a plain file; `missing` where there is none."""
+    try:
+        return hashlib.sha256(_read(path, None)[0]).hexdigest()
+    except (OSError, UnsuitableError, ValueError):
+        return MISSING
+
+
+def read_plain(path: Path, most: int | None = None) -> bytes:
+    """Bytes of a plain file of at most `most` bytes; noted.
+
+    Kind and size are looked at before anything is read: OSError, UnsuitableError.
+    """
+    content, status = _read(path, most)
+    note_content(path, content, status)
+    return content
+
+
+def _read(path: Path, most: int | None) -> tuple[bytes, os.stat_result]:
+    # O_NONBLOCK: opening a FIFO would wait for its writer for ever.
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    try:
+        status = os.fstat(descriptor)
+        demand_plain(status)
+        if most is not None and status.st_size > most:
+            raise UnsuitableError(f"{status.st_size} bytes; expected at most {most}")
+        with os.fdopen(descriptor, "rb", closefd=False) as stream:
+            content = stream.read() if most is None else stream.read(most + 1)
+    finally:
+        os.close(descriptor)
+    if most is not None and len(content) > most:
+        raise UnsuitableError(f"more than {most} bytes")
+    return content, status
+
+
+def demand_plain(status: os.stat_result) -> None:
+    """UnsuitableError unless this is a plain file."""
+    if stat.S_ISDIR(status.st_mode):
+        raise UnsuitableError("a folder; expected a file")
+    if not stat.S_ISREG(status.st_mode):
+        raise UnsuitableError("not a regular file (a pipe, socket or device)")
