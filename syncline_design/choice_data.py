@@ -7,19 +7,17 @@ from itertools import islice
 from typing import Any
 
 from syncline_design.choose.outcome import FrontPoint
-from syncline_design.chosen_system import system_of
 from syncline_design.design_data import design_json
 from syncline_design.design_space import Design, Problem
-from syncline_design.known_effects import Known
+from syncline_design.effect_tables import design_budget
 from syncline_design.loading import LoadedSpec
-from syncline_design.model.budget import budget
 from syncline_design.open_choice import Picked
 
 Json = dict[str, Any]
 NEXT_BEST = 5
 
 
-def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked, known: Known) -> Json:
+def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked) -> Json:
     """The `choice` key of a verdict; the front is of cost against error where costs are known."""
     from syncline_design.choose.decide import best
     from syncline_design.choose.front import front
@@ -31,9 +29,9 @@ def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked, known: Kno
     points = front(problem) if _priced(problem) else ()
     return {
         "proof": proof_json(picked),
-        "front": front_json(loaded, problem, points, known),
+        "front": front_json(loaded, problem, points),
         "staircase": [step.to_json() for step in staircase(points)],
-        "next_best": designs_json(loaded, problem, islice(others, NEXT_BEST), known),
+        "next_best": designs_json(loaded, problem, islice(others, NEXT_BEST)),
         "excluded": excluded_json(problem),
     }
 
@@ -54,7 +52,6 @@ def front_json(
     loaded: LoadedSpec,
     problem: Problem,
     points: Iterable[FrontPoint],
-    known: Known,
     resource: str = "cost",
 ) -> list[Json]:
     """The points of a front with their designs, by rising amount of the resource."""
@@ -62,27 +59,25 @@ def front_json(
         {
             resource: float(point.amount),
             "error_m": point.error_m,
-            "design": full_design(loaded, problem, point.design, known),
+            "design": full_design(loaded, problem, point.design),
         }
         for point in points
     ]
 
 
-def designs_json(
-    loaded: LoadedSpec, problem: Problem, designs: Iterable[Design], known: Known
-) -> list[Json]:
+def designs_json(loaded: LoadedSpec, problem: Problem, designs: Iterable[Design]) -> list[Json]:
     """Designs with what they cost and reach, in the order given."""
-    return [_with_error(loaded, problem, design, known) for design in designs]
+    return [_with_error(loaded, problem, design) for design in designs]
 
 
-def full_design(loaded: LoadedSpec, problem: Problem, design: Design, known: Known) -> Json:
+def full_design(loaded: LoadedSpec, problem: Problem, design: Design) -> Json:
     """A design as the `design` key writes it."""
-    figures = budget(system_of(loaded, problem, design), known.extra_tau_s, known.systematic)
+    figures = design_budget(loaded, problem, design)
     return design_json(loaded, problem, design, figures)
 
 
-def _with_error(loaded: LoadedSpec, problem: Problem, design: Design, known: Known) -> Json:
-    figures = budget(system_of(loaded, problem, design), known.extra_tau_s, known.systematic)
+def _with_error(loaded: LoadedSpec, problem: Problem, design: Design) -> Json:
+    figures = design_budget(loaded, problem, design)
     shown = design_json(loaded, problem, design, figures)
     error = figures.total(loaded.spec.sync_model)
     return {key: shown[key] for key in ("cost", "mass", "power")} | {

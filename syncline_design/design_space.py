@@ -42,13 +42,16 @@ class Option:
     primitive: str
     method: str
     sensor_error_m: float  # this sensor's term of the roof
-    tau_s: float  # bound of its timestamp error
+    tau_s: float  # bound of its timestamp error, with what known effects add
     tau_crit_s: float  # inf when motion does not matter
     timeline: Literal["host", "utc"]
     resources: Resources  # sensor plus timestamping, per sensor
     requires: tuple[tuple[str, int], ...] = ()  # (infrastructure id, channels)
     exact_error_m: Fraction | None = None
     exact_tau_s: Fraction | None = None
+    systematic_m: float = 0.0  # known effects whose size hangs on this sensor
+    exact_systematic_m: Fraction | None = None
+    own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
 
     @property
     def names(self) -> tuple[str, str, str]:
@@ -62,6 +65,10 @@ class Option:
     def tau(self) -> Fraction:
         """Bound of the timestamp error [s], exactly."""
         return exactly(self.tau_s, self.exact_tau_s)
+
+    def systematic(self) -> Fraction:
+        """Known systematic error that comes with this sensor [m], exactly."""
+        return exactly(self.systematic_m, self.exact_systematic_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,6 +181,11 @@ class Problem:
     sync_model: SyncModel
     objective: Objective
     exact_sync_rate_mps: Fraction | None = None
+    exact_fixed_error_m: Fraction | None = None
+
+    def fixed_error(self) -> Fraction:
+        """Systematic terms that every design has [m], exactly."""
+        return exactly(self.fixed_error_m, self.exact_fixed_error_m)
 
     def sync_rate(self) -> Fraction:
         """Sync rate of the chain [m/s], exactly."""
@@ -213,8 +225,11 @@ def with_limits(problem: Problem, limits: Limits) -> Problem:
 
 def sync_ratio(option: Option) -> float:
     """tau / tau_crit of one option, rounded once; 0 where motion does not matter."""
-    if option.tau_crit_s == float("inf"):
+    if option.tau_crit_s == float("inf") or option.tau_s == 0.0:
         return 0.0
+    if option.own_rate_mps is not None:
+        caused, error = option.tau() * option.own_rate_mps, option.error()
+        return float(caused / error) if error > 0 else float("inf")
     return option.tau_s / option.tau_crit_s if option.tau_crit_s > 0.0 else float("inf")
 
 

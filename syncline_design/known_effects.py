@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 
 from syncline_design.loading import BadInput, LoadedSpec
-from syncline_design.model.system import EffectEntry, Platform, RoleName, Sensor, Stage, System
-from syncline_design.resolution import platform_of
-from syncline_design.spec import EffectChoice, StageChoice
-from syncline_design.timing import NO_ERROR
+from syncline_design.model.system import EffectEntry, RoleName, System
+from syncline_design.spec import EffectChoice
 from syncline_design.units import Dimension, format_quantity, suffix_unit
 from syncline_design.yaml_reader import KeyPath, Problem, show_path
 
@@ -23,18 +21,13 @@ class Known:
     systematic: tuple[tuple[str, str, float], ...] = ()
 
 
-def known_of(loaded: LoadedSpec, system: System | None = None) -> Known:
-    """Contributions of the spec's effects; without a system, before any sensor is chosen.
-
-    An effect whose size depends on the sensor (an understated noise) adds nothing before the
-    choice and its full part afterwards, when the design is verified.
-    """
-    effects = effect_entries(loaded)
-    if not effects:
+def known_of(system: System) -> Known:
+    """Contributions of a system's known effects."""
+    if not system.effects:
         return Known()
     from syncline_design.simulate.known_effects import contributions
 
-    return Known(*contributions(system or _bare_system(loaded, effects)))
+    return Known(*contributions(system))
 
 
 def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:
@@ -106,42 +99,6 @@ def _problem(
     hint = f"did you mean {close[0]}?" if close else ""
     expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]
     return Problem(str(loaded.path), line, column, show_path(path), message, expected, found, hint)
-
-
-def _bare_system(loaded: LoadedSpec, effects: tuple[EffectEntry, ...]) -> System:
-    """The stages as they move, with noiseless sensors where roles will be filled."""
-    stages = []
-    for index, choice in enumerate(loaded.spec.stages):
-        entry = platform_of(choice.platform, loaded.catalog)
-        platform = Platform(
-            float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline)
-        )
-        position = _bare_sensor(choice, "position")
-        transponder = None if index == 0 or position is None else position.lever_arm_m
-        stages.append(
-            Stage(
-                choice.name,
-                choice.vehicle_name,
-                platform,
-                position if index == 0 else None,
-                _bare_sensor(choice, "attitude"),
-                _bare_sensor(choice, "ranging"),
-                transponder,
-            )
-        )
-    factor = float(loaded.spec.coverage_factor)
-    horizon = loaded.spec.horizon.horizon()
-    return System(tuple(stages), factor, effects=effects, horizon=horizon)
-
-
-def _bare_sensor(stage: StageChoice, role: RoleName) -> Sensor | None:
-    """A role's sensor before it is chosen: where it sits, no noise, no timestamp error."""
-    choice = stage.role(role)
-    if choice is None:
-        return None
-    arm = None if choice.lever_arm is None else [float(length) for length in choice.lever_arm]
-    placed = None if arm is None else (arm[0], arm[1], arm[2])
-    return Sensor("", role, (0.0, 0.0, 0.0), NO_ERROR, lever_arm_m=placed)
 
 
 def describe(entry: EffectEntry) -> str:

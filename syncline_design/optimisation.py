@@ -22,10 +22,10 @@ from syncline_design.choose.tolerance import (
     tolerance_verdict,
 )
 from syncline_design.design_space import Design, Problem, ResourceName
-from syncline_design.known_effects import Known, known_of
+from syncline_design.effect_tables import problem_of
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked, pick
-from syncline_design.problem import build_problem, selection_of
+from syncline_design.problem import selection_of
 from syncline_design.spec_writer import PinnedRole, pinned_spec_text
 from syncline_design.units import Dimension, format_quantity
 from syncline_design.verdict import files_json
@@ -63,7 +63,6 @@ class Optimisation:
 
     loaded: LoadedSpec
     problem: Problem
-    known: Known
     settings: OptimizeSettings
     picked: Picked
     designs: tuple[Design, ...]
@@ -85,12 +84,7 @@ class Optimisation:
 
 def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     """The best designs of a spec; pinned roles stay as they are."""
-    known = known_of(loaded)
-
-    def build(spec: LoadedSpec) -> Problem:
-        return build_problem(spec, known.extra_tau_s, known.systematic)
-
-    problem = build(loaded)
+    problem = problem_of(loaded)
     simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
     checking = CheckSettings(seed=settings.seed, monte_carlo=simulated)
     picked = pick(
@@ -103,32 +97,32 @@ def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     designs: tuple[Design, ...] = ()
     hinges = explanation = None
     if picked.verified is None:
-        explanation = explain(loaded, problem, build)
+        explanation = explain(loaded, problem, problem_of)
     else:
         chosen = picked.verified.design
         others = (d for d in best(problem, settings.count + 1) if d != chosen)
         designs = (chosen, *islice(others, settings.count - 1))
         hinges = Hinges(
-            slack_ledger(loaded, problem, chosen, build),
-            tolerance_verdict(loaded, problem, chosen, build),
-            measure_next(loaded, problem, chosen, build),
+            slack_ledger(loaded, problem, chosen, problem_of),
+            tolerance_verdict(loaded, problem, chosen, problem_of),
+            measure_next(loaded, problem, chosen, problem_of),
         )
     return Optimisation(
-        loaded, problem, known, settings, picked, designs, points, staircase(points), hinges,
+        loaded, problem, settings, picked, designs, points, staircase(points), hinges,
         explanation,
     )  # fmt: skip
 
 
 def optimisation_json(found: Optimisation) -> Json:
     """Everything as plain data; `designs` best first, `front` with --pareto."""
-    loaded, problem, known = found.loaded, found.problem, found.known
+    loaded, problem = found.loaded, found.problem
     data: Json = {
         "schema": SCHEMA,
         "verdict": "infeasible" if found.exit_code == 1 else "meets",
         "spec": {"name": loaded.spec.name, "file": str(loaded.path)},
         "proof": proof_json(found.picked),
         "combinations": str(problem.combinations),
-        "designs": designs_json(loaded, problem, found.designs, known),
+        "designs": designs_json(loaded, problem, found.designs),
         "excluded": excluded_json(problem),
         "provenance": {
             "version": __version__,
@@ -141,7 +135,7 @@ def optimisation_json(found: Optimisation) -> Json:
     if found.exit_code == 3:
         data["verdict"] = "indeterminate"
     if found.settings.pareto:
-        data["front"] = front_json(loaded, problem, found.front, known, found.settings.resource)
+        data["front"] = front_json(loaded, problem, found.front, found.settings.resource)
         data["staircase"] = [step.to_json() for step in found.prices]
     if found.hinges is not None:
         data["slack"] = [row.to_json() for row in found.hinges.slack]

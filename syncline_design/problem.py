@@ -88,38 +88,57 @@ INLINE = "inline"
 NO_EXTRA: Mapping[tuple[str, RoleName], float] = {}
 
 
+@dataclass(frozen=True, slots=True)
+class SensorEffects:
+    """What known effects add where one sensor takes a role: its whole extra tau, exactly the
+    systematic errors that hang on it."""
+
+    tau_s: float = 0.0
+    systematic_m: Fraction = Fraction(0)
+
+
+BySensor = Mapping[tuple[str, RoleName, str], SensorEffects]  # stage name, role, sensor
+NO_SENSOR: BySensor = {}
+
+
 def build_problem(
     loaded: LoadedSpec,
     extra_tau_s: Mapping[tuple[str, RoleName], float] = NO_EXTRA,
     systematic: Sequence[tuple[str, str, float]] = (),
+    by_sensor: BySensor = NO_SENSOR,
 ) -> Problem:
     """Tables of everything a loaded spec leaves to choose.
 
     extra_tau_s: what known effects add to the tau of (stage name, role) [s]; systematic: known
-    systematic errors as (term, stage name, value [m]), the same for every design.
+    systematic errors as (term, stage name, value [m]), the same for every design; by_sensor: what
+    they add where it hangs on the sensor (its tau in place of extra_tau_s).
     """
     spec = loaded.spec
     motions = [_motion(loaded, stage) for stage in spec.stages]
     limits = _limits(loaded)
     vehicles = list(dict.fromkeys(stage.vehicle_name for stage in spec.stages))
     tables = tuple(
-        _role_table(loaded, index, role, motions[index], limits.sync, vehicles, extra_tau_s)
+        _role_table(
+            loaded, index, role, motions[index], limits.sync, vehicles, extra_tau_s, by_sensor
+        )
         for index, stage in enumerate(spec.stages)
         for role in ROLES
         if not _is_empty(stage.role(role))
     )
     rate = sum((motion.rate for motion in motions), Fraction(0))
+    fixed = sum((Fraction(value) for _, _, value in systematic), Fraction(0))
     return Problem(
         roles=tables,
         pairs=_pairs(tables, motions),
         vehicles=tuple(_vehicle(loaded, name) for name in vehicles),
         infrastructure=tuple(_infrastructure(loaded)),
         sync_rate_mps=float(rate),
-        fixed_error_m=math.fsum(value for _, _, value in systematic),
+        fixed_error_m=float(fixed),
         limits=limits,
         sync_model=spec.sync_model,
         objective=spec.objective,
         exact_sync_rate_mps=rate,
+        exact_fixed_error_m=fixed,
     )
 
 
@@ -217,12 +236,14 @@ def _role_table(
     sync_limit: float,
     vehicles: list[str],
     extra_tau_s: Mapping[tuple[str, RoleName], float],
+    by_sensor: BySensor,
 ) -> RoleTable:
     stage = loaded.spec.stages[index]
-    extra = Fraction(extra_tau_s.get((stage.name, role), 0.0))
+    usual = SensorEffects(extra_tau_s.get((stage.name, role), 0.0))
+    effects = _EffectsOf(stage.name, role, usual, by_sensor)
     options: list[Option] = []
     excluded: list[Excluded] = []
-    for one in _candidates(loaded, stage, role, motion, extra):
+    for one in _candidates(loaded, stage, role, motion, effects):
         ratio = sync_ratio(one) if isinstance(one, Option) else 0.0
         if isinstance(one, Excluded):
             excluded.append(one)
@@ -235,8 +256,21 @@ def _role_table(
     return RoleTable(index, stage.name, role, vehicle, tuple(options), tuple(excluded))
 
 
+@dataclass(frozen=True, slots=True)
+class _EffectsOf:
+    """Known effects of one role, by its sensor."""
+
+    stage: str
+    role: RoleName
+    usual: SensorEffects
+    by_sensor: BySensor
+
+    def of(self, sensor: str) -> SensorEffects:
+        return self.by_sensor.get((self.stage, self.role, sensor), self.usual)
+
+
 def _candidates(
-    loaded: LoadedSpec, stage: StageChoice, role: Role, motion: _Motion, extra: Fraction
+    loaded: LoadedSpec, stage: StageChoice, role: Role, motion: _Motion, effects: _EffectsOf
 ) -> Iterator[Option | Excluded]:
     """Every (sensor, primitive, method) that the spec lets a role take, or why it cannot."""
     spec, catalog = loaded.spec, loaded.catalog
@@ -244,7 +278,7 @@ def _candidates(
     assert choice is not None
     methods = timestamping_of(spec, stage, choice, catalog)
     for name, sensor in candidate_sensors(spec, stage, role, catalog):
-        figures = _Figures(loaded, role, motion, extra, name, sensor)
+        figures = _Figures(loaded, role, motion, effects.of(name), name, sensor)
         if isinstance(methods, InlineTimestamping):
             tau = tau_bound(methods.error, spec.coverage_factor)
             primitive = choice.primitive or INLINE
@@ -268,7 +302,7 @@ class _Figures:
     loaded: LoadedSpec
     role: RoleName
     motion: _Motion
-    extra: Fraction
+    effects: SensorEffects
     name: str
     sensor: SensorEntry
 
@@ -284,8 +318,10 @@ class _Figures:
         enters = self.motion.ranges or self.role == "position"
         error = _sensor_error(self.sensor, self.role, self.motion) if enters else Fraction(0)
         rate = self.motion.speed if self.role == "position" else self.motion.rate
-        crit = float(error / rate) if enters and rate > 0 else math.inf
-        tau = tau + self.extra
+        matters = enters and rate > 0
+        crit = float(error / rate) if matters else math.inf
+        tau = tau + Fraction(self.effects.tau_s)
+        systematic = self.effects.systematic_m
         return Option(
             sensor=self.name,
             primitive=primitive,
@@ -298,6 +334,9 @@ class _Figures:
             requires=tuple(sorted(entry.requires.items())) if entry else (),
             exact_error_m=error,
             exact_tau_s=tau,
+            systematic_m=float(systematic),
+            exact_systematic_m=systematic if systematic else None,
+            own_rate_mps=rate if matters else None,
         )
 
 

@@ -13,12 +13,13 @@ from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
 from syncline_design.design_space import Problem as DesignProblem
+from syncline_design.effect_tables import problem_of
 from syncline_design.input_files import FileContent
 from syncline_design.known_effects import effect_entries, known_of
 from syncline_design.loading import BadInput, LoadedSpec, Problem, load
 from syncline_design.model.budget import budget
 from syncline_design.model.system import System
-from syncline_design.problem import build_problem, selection_of, sole_design
+from syncline_design.problem import selection_of, sole_design
 from syncline_design.recheck import Recheck, recheck
 from syncline_design.simulate import (
     Decision,
@@ -106,8 +107,7 @@ def _check_or_refuse(path: Path, settings: CheckSettings) -> Json:
 
 def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
     """The verdict of a loaded spec."""
-    known = known_of(loaded)
-    problem = build_problem(loaded, known.extra_tau_s, known.systematic)
+    problem = problem_of(loaded)
     sole = sole_design(problem)
     if sole is not None:
         problem, design = sole
@@ -118,8 +118,7 @@ def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
 
 def picked_design(loaded: LoadedSpec) -> tuple[DesignProblem, Design]:
     """The only design of a pinned spec, or the best of an open one; BadInput when there is none."""
-    known = known_of(loaded)
-    problem = build_problem(loaded, known.extra_tau_s, known.systematic)
+    problem = problem_of(loaded)
     sole = sole_design(problem)
     if sole is not None:
         return sole
@@ -149,7 +148,7 @@ def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSetti
     )
     if picked.verified is None:
         return _infeasible_json(loaded, problem, settings)
-    choice = choice_json(loaded, problem, picked, known_of(loaded))
+    choice = choice_json(loaded, problem, picked)
     data = _verdict_json(loaded, problem, picked.verified, settings, choice)
     if picked.verified.word != "meets" and not picked.exhausted:
         data["verdict"] = "indeterminate"
@@ -163,10 +162,7 @@ def _infeasible_json(loaded: LoadedSpec, problem: DesignProblem, settings: Check
     from syncline_design.choice_data import excluded_json
     from syncline_design.choose.explain import explain
 
-    known = known_of(loaded)
-    found = explain(
-        loaded, problem, lambda spec: build_problem(spec, known.extra_tau_s, known.systematic)
-    )
+    found = explain(loaded, problem, problem_of)
     data = frame(loaded, problem, "infeasible", settings.seed)
     data["infeasibility"] = found.to_json() | {"text": found.lines()}
     conflict = {m.id for members in (found.conflict, *found.further) for m in members}
@@ -215,7 +211,7 @@ def verify(
 ) -> Verified:
     """Budget, exact recheck, Monte Carlo and every requirement of one design."""
     system = system_of(loaded, problem, design, effect_entries(loaded))
-    known = known_of(loaded, system)
+    known = known_of(system)
     figures = budget(system, known.extra_tau_s, known.systematic)
     exact = recheck(loaded, selection_of(problem, design), known.extra_tau_s, known.systematic)
     found, trouble = _monte_carlo(loaded, system, settings)

@@ -29,10 +29,15 @@ MOST_CHANNELS = 1000
 
 @dataclass(frozen=True, slots=True)
 class RoleArrays:
-    """Options of one role in the order of their names; place: their place in that order."""
+    """Options of one role in the order of their names; place: their place in that order.
+
+    error: what an option adds to the total [m], its systematic part included; noise: the sensor
+    error alone [m], which the sync requirement is held against.
+    """
 
     place: Indices
     error: Floats
+    noise: Floats
     tau: Floats
     host: Bools
     resources: tuple[Column, ...]  # key resources, the primary one first
@@ -44,6 +49,7 @@ class RoleArrays:
         return RoleArrays(
             self.place[rows],
             self.error[rows],
+            self.noise[rows],
             self.tau[rows],
             self.host[rows],
             tuple(c[rows] for c in self.resources),
@@ -184,6 +190,7 @@ def _role_arrays(
     ]
     return RoleArrays(
         np.arange(len(options)),
+        np.array([_added_m(o) for o in options], dtype=float),
         np.array([o.sensor_error_m for o in options], dtype=float),
         np.array([o.tau_s for o in options], dtype=float),
         np.array([o.timeline == "host" for o in options], dtype=bool),
@@ -191,6 +198,12 @@ def _role_arrays(
         tuple(columns[keys:]),
         tuple(channels),
     )
+
+
+def _added_m(option: Option) -> float:
+    if option.systematic_m == 0.0:
+        return option.sensor_error_m
+    return float(option.error() + option.systematic())
 
 
 def _channels(requires: tuple[tuple[str, int], ...], name: str) -> int:

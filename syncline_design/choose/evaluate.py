@@ -70,7 +70,7 @@ def evaluate(problem: Problem, design: Design) -> Evaluation:
     sensor_error, tau_sys, sync_error = _errors(problem, design, options)
     units = units_bought(problem, design, options)
     cost, mass, power = (_sum(problem, design, options, units, name) for name in RESOURCES)
-    total = sensor_error + sync_error + Fraction(problem.fixed_error_m)
+    total = sensor_error + sync_error + _systematic(problem, options)
     return Evaluation(cost, mass, power, units, sensor_error, tau_sys, sync_error, total, rate)
 
 
@@ -93,8 +93,14 @@ def _errors(
 
 def total_error_m(problem: Problem, design: Design) -> float:
     """Total error alone [m], rounded once: what `evaluate` gives as error_m."""
-    sensor, _, sync = _errors(problem, design, chosen_options(problem, design))
-    return float(sensor + sync + Fraction(problem.fixed_error_m))
+    options = chosen_options(problem, design)
+    sensor, _, sync = _errors(problem, design, options)
+    return float(sensor + sync + _systematic(problem, options))
+
+
+def _systematic(problem: Problem, options: list[Option]) -> Fraction:
+    """Known systematic errors [m]: those of every design and those of its sensors."""
+    return sum((option.systematic() for option in options), problem.fixed_error())
 
 
 def chosen_options(problem: Problem, design: Design) -> list[Option]:

@@ -145,7 +145,9 @@ def _merge_all(
 def _no_labels(keys: int) -> Labels:
     none = np.zeros(0)
     whole = tuple(np.zeros(0, dtype=np.int64) for _ in range(keys))
-    return Labels(whole, (), none, none, none, (), np.zeros((0, 1), dtype=np.intp), none, none > 0)
+    return Labels(
+        whole, (), none, none, none, none, (), np.zeros((0, 1), dtype=np.intp), none, none > 0
+    )
 
 
 def _with_total(
@@ -161,7 +163,7 @@ def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
     limit = problem.limits.sync
     if math.isinf(limit) or len(labels) == 0:
         return np.ones(len(labels), dtype=bool)
-    caused, allowed = problem.sync_rate_mps * labels.bound, limit * labels.error
+    caused, allowed = problem.sync_rate_mps * labels.bound, limit * labels.noise
     holds = np.asarray(caused < allowed * (1.0 - MARGIN))
     close = np.flatnonzero(~holds & (caused <= allowed * (1.0 + MARGIN)))
     for row, design in zip(close, _designs(tables, finished, close), strict=True):

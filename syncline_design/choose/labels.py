@@ -23,7 +23,8 @@ MOST_LABELS = 400_000  # partial designs kept before the merge gives up
 class Labels:
     """Partial designs, in the order of their choices.
 
-    resources, ties: sums so far.  error: sensor error [m], added in the order of the roles.
+    resources, ties: sums so far.  error: sensor and systematic errors [m], added in the order of
+    the roles; noise: the sensor errors alone [m], which the sync requirement is held against.
     bound: largest pair bound so far [s].  sync: sync error so far [m] (per_sensor only).
     used: channels in use, one column per (vehicle, shared hardware).  choice: one row of option
     places per label, one column per role decided.  reference_tau, reference_host: of the last
@@ -33,6 +34,7 @@ class Labels:
     resources: tuple[Column, ...]
     ties: tuple[Column, ...]
     error: Floats
+    noise: Floats
     bound: Floats
     sync: Floats
     used: tuple[Column, ...]
@@ -49,6 +51,7 @@ class Labels:
             tuple(c[rows] for c in self.resources),
             tuple(c[rows] for c in self.ties),
             self.error[rows],
+            self.noise[rows],
             self.bound[rows],
             self.sync[rows],
             tuple(c[rows] for c in self.used),
@@ -66,6 +69,7 @@ def concatenate(parts: list[Labels]) -> Labels:
         tuple(np.concatenate(c) for c in zip(*(p.resources for p in parts), strict=True)),
         tuple(np.concatenate(c) for c in zip(*(p.ties for p in parts), strict=True)),
         np.concatenate([p.error for p in parts]),
+        np.concatenate([p.noise for p in parts]),
         np.concatenate([p.bound for p in parts]),
         np.concatenate([p.sync for p in parts]),
         tuple(np.concatenate(c) for c in zip(*(p.used for p in parts), strict=True)),
@@ -127,6 +131,7 @@ def _extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) 
         _sums(labels.resources, options.resources, left, right),
         _sums(labels.ties, options.ties, left, right),
         labels.error[left] + options.error[right],
+        labels.noise[left] + options.noise[right],
         bound,
         sync,
         tuple(used),

@@ -101,6 +101,7 @@ class Merge:
             _after([role.resources[k].min() for role in tables.roles], 0)
             for k in range(len(tables.keys))
         ]
+        self.systematic_after = _after([(r.error - r.noise).min() for r in tables.roles], 0.0)
         self.safety = Safety(tables, self.offsets) if guarded else None
         self.capacity = _most_channels(tables)
 
@@ -143,6 +144,7 @@ class Merge:
         return Labels(
             tuple(sums[:cut]),
             tuple(sums[cut:]),
+            zero,
             zero,
             zero,
             zero,
@@ -258,7 +260,7 @@ class Merge:
         guard = None
         if self.safety is not None:
             safe = self.safety.safe(labels, role, timing)
-            guard = Guard(safe, labels.error, labels.bound)
+            guard = Guard(safe, labels.noise, labels.bound)
         value, weak = (labels.error, [total])
         if self.per_sensor or role == len(self.problem.roles) - 1:
             value, weak = total, []
@@ -279,7 +281,8 @@ class Merge:
         caused = labels.sync if self.per_sensor else self.rate * labels.bound
         error = labels.error + self.error_after[role]
         if self.safety is not None:
-            error = np.maximum(error, self.safety.least_error(labels))
+            systematic = labels.error - labels.noise + self.systematic_after[role]
+            error = np.maximum(error, self.safety.least_error(labels) + systematic)
         return np.asarray(error + self.problem.fixed_error_m + caused)
 
     def _within_accuracy(self, labels: Labels, role: int) -> Bools:

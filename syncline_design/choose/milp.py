@@ -327,7 +327,7 @@ class _Model:
             demand = self.problem.sync_rate_mps * ceiling / limit
             if demand > 0.0:
                 covered = sum(
-                    np.minimum(role.error / demand, 1.0) @ self.x[r]
+                    np.minimum(role.noise / demand, 1.0) @ self.x[r]
                     for r, role in enumerate(self.tables.roles)
                 )
                 self.rows.append(covered >= (1.0 - MARGIN) * self.z[k])

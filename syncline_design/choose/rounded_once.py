@@ -30,7 +30,7 @@ def total_errors_m(problem: Problem, designs: Sequence[Design]) -> list[float]:
     columns = _Columns(problem, options, clocks)
     total = columns.sync()
     for r in range(len(problem.roles)):
-        total = plus(total, columns.error(r))
+        total = plus(plus(total, columns.error(r)), columns.systematic(r))
     total = plus(total, np.full(len(designs), problem.fixed_error_m))
     out: list[float] = (total[0] + total[1]).tolist()
     return out
@@ -38,12 +38,14 @@ def total_errors_m(problem: Problem, designs: Sequence[Design]) -> list[float]:
 
 def _is_plain(problem: Problem) -> bool:
     """Whether every figure is a float and nothing more."""
-    given = [problem.exact_sync_rate_mps, *(pair.exact_rate_mps for pair in problem.pairs)]
+    given = [problem.exact_sync_rate_mps, problem.exact_fixed_error_m]
+    given += [pair.exact_rate_mps for pair in problem.pairs]
     given += [clock.exact_offset_s for vehicle in problem.vehicles for clock in vehicle.clocks]
     if any(figure is not None for figure in given):
         return False
     options = [option for table in problem.roles for option in table.options]
-    return all(o.exact_error_m is None and o.exact_tau_s is None for o in options)
+    exact = [(o.exact_error_m, o.exact_tau_s, o.exact_systematic_m) for o in options]
+    return all(figures == (None, None, None) for figures in exact)
 
 
 class _Columns:
@@ -56,6 +58,11 @@ class _Columns:
         """Sensor errors of one role [m]."""
         table = self.problem.roles[r].options
         return np.array([table[i].sensor_error_m for i in self.options[r]])
+
+    def systematic(self, r: int) -> Floats:
+        """Systematic errors that come with the sensors of one role [m]."""
+        table = self.problem.roles[r].options
+        return np.array([table[i].systematic_m for i in self.options[r]])
 
     def sync(self) -> Double:
         """Sync error [m]: rate times the largest bound, or the sum over pairs."""

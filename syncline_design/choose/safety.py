@@ -35,12 +35,12 @@ class Safety:
         problem = tables.problem
         self.problem, self.tables, self.offsets = problem, tables, offsets
         self.limit, self.rate = problem.limits.sync, problem.sync_rate_mps
-        self.least = [float(role.error.min()) for role in tables.roles]
-        most = [float(role.error.max()) for role in tables.roles]
+        self.least = [float(role.noise.min()) for role in tables.roles]
+        most = [float(role.noise.max()) for role in tables.roles]
         self.least_after = [sum(self.least[r + 1 :]) for r in range(len(most))]
         self.most_after = [sum(most[r + 1 :]) for r in range(len(most))]
         self.deficit = [
-            float((self.rate * role.tau - self.limit * role.error).max()) for role in tables.roles
+            float((self.rate * role.tau - self.limit * role.noise).max()) for role in tables.roles
         ]
 
     def least_error(self, labels: Labels) -> Floats:
@@ -49,14 +49,14 @@ class Safety:
 
     def can_reach(self, labels: Labels, role: int) -> Bools:
         """Labels that some completion could still lead above the bound."""
-        most = labels.error + self.most_after[role]
+        most = labels.noise + self.most_after[role]
         return np.asarray(self.limit * most * (1.0 + MARGIN) > self.rate * labels.bound)
 
     def safe(self, labels: Labels, role: int, timing: TimingClass) -> Bools:
         """Labels that satisfy the constraint whatever follows."""
-        ends = labels.error + self.least_after[role]
+        ends = labels.noise + self.least_after[role]
         own = self.limit * ends * (1.0 - MARGIN) > self.rate * labels.bound
-        return np.asarray(own & (labels.error > self.threshold(role, timing)))
+        return np.asarray(own & (labels.noise > self.threshold(role, timing)))
 
     def threshold(self, role: int, timing: TimingClass) -> float:
         """Sensor error so far above which no pair still to come can break the constraint [m]."""
