@@ -15,7 +15,7 @@ from syncline_design.diagnose.noise import NoiseLevel, precision
 from syncline_design.diagnose.scales import figure
 from syncline_design.diagnose.search import SearchResult, Step
 from syncline_design.diagnose.simulation import Scene
-from syncline_design.diagnose.tails import scaled_remainder, tails_of
+from syncline_design.diagnose.tails import tails_in
 from syncline_design.effects.base import Effect
 
 Label = tuple[str, str, int]
@@ -169,8 +169,7 @@ def _stochastic(data: Data, model: Model, opened: Opened, steps: Mapping[Label, 
         spread = value * _log_spread(data, model, ("size", opened.directed, 0))
         figures = {effect.parameters[0].name: (value, spread)}
     elif opened.what == "tails":
-        slow = model.precision.slow_part(model.error)
-        found = tails_of(scaled_remainder(data.structure, model.level, model.error, slow))
+        found = tails_in(data, model)
         figures = {
             "degrees_of_freedom": (found.degrees_of_freedom, found.freedom_uncertainty),
             "outlier_rate": (found.outlier_rate, math.inf),

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.diagnose.axes import Axes, varying_axes
 from syncline_design.diagnose.candidates import Candidate, slopes
 from syncline_design.diagnose.covariance import Precision
 from syncline_design.diagnose.noise import (
@@ -36,13 +37,13 @@ LONG, SHORT = 25, 10  # iterations of a noise fit from scratch, and from a good 
 
 @dataclass(frozen=True, slots=True)
 class Data:
-    """A scene with its noise structure, the rows the noise is fitted on, and the rows in use."""
+    """A scene with its noise structure, the rows the noise is fitted on, and the axes compared."""
 
     view: Scene
     structure: Structure
     noise_rows: NDArray[np.int64]
     noise_structure: Structure
-    used: NDArray[np.int64] | None = None  # None: all rows
+    axes: Axes
 
     def error(self, acting: Sequence[Acting]) -> Array:
         """Corrected error with unknown components at zero (they have a huge variance)."""
@@ -52,7 +53,8 @@ class Data:
 def data_of(view: Scene, structure: Structure) -> Data:
     """A scene ready for fitting."""
     index = windows(len(view), NOISE_ROWS, STRETCH)
-    return Data(view, structure, index, structure.rows(index))
+    axes = varying_axes(view.error(), structure)
+    return Data(view, structure, index, structure.rows(index), axes)
 
 
 def windows(rows: int, most: int, length: int) -> NDArray[np.int64]:
@@ -95,8 +97,9 @@ class Model:
 
     @property
     def labels(self) -> tuple[tuple[str, str, int], ...]:
-        """Everything named, in order: deterministic effects first."""
-        return tuple(a.label for a in self.acting) + tuple(o.candidate.label for o in self.opened)
+        """Everything named, each once, in order: effects that move the mean first."""
+        moved = [a.label for a in self.acting]
+        return tuple(dict.fromkeys([*moved, *(o.candidate.label for o in self.opened)]))
 
     @property
     def free_sizes(self) -> tuple[int, ...]:

@@ -11,7 +11,6 @@ import numpy as np
 from syncline_design.diagnose.candidates import Candidate, Signature, slopes, zero_values
 from syncline_design.diagnose.fitting import Data, Model, fit, inner, inverse_scaled
 from syncline_design.diagnose.noise import precision
-from syncline_design.diagnose.simulation import Acting
 from syncline_design.effects.base import Array
 
 Label = tuple[str, str, int]
@@ -124,16 +123,18 @@ def _without(normal: Array, score: Array, width: int) -> tuple[Array, Array]:
     )
 
 
-def unseen(data: Data, model: Model, others: Sequence[Signature]) -> tuple[Acting, ...]:
-    """Effects that this log could not show: at the plausible most, not 3 standard errors."""
+def unseen(data: Data, model: Model, others: Sequence[Signature]) -> tuple[str, ...]:
+    """What this log could not show: parameters that at their plausible most stay below 3 sigma."""
     hidden = []
     for s in others:
         if s.at:
             continue
         columns = np.nan_to_num(s.columns)
-        normal = inner(columns, model.precision.solve(columns))
-        for k, p in enumerate(s.candidate.effect.slopes()):
-            if p.high * np.sqrt(max(normal[k, k], 0.0)) < 3.0:
-                hidden.append(s.candidate.acting({p.name: p.high}))
-                break
+        own = np.sqrt(np.maximum(np.diag(inner(columns, model.precision.solve(columns))), 0.0))
+        slopes_of = s.candidate.effect.slopes()
+        names = [p.name for k, p in enumerate(slopes_of) if p.high * own[k] < 3.0]
+        if names:
+            which = "" if len(names) == len(slopes_of) else f": {', '.join(names)}"
+            name, sensor, _ = s.candidate.label
+            hidden.append(f"{name} ({sensor}){which}")
     return tuple(hidden)

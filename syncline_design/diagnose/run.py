@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from syncline_design import __version__
+from syncline_design.diagnose.axes import without_still_axes
 from syncline_design.diagnose.candidates import candidates, directed_parts
 from syncline_design.diagnose.expected_noise import structure_of
 from syncline_design.diagnose.figures_data import plots
@@ -100,7 +101,8 @@ def diagnose_measured(
         placebo=_placebo(data, search, result, left),
         steps=_stairs(data, result, left),
         unseen=_unseen(data, search, result),
-        log=log_json(inputs.log) | {"fitted": len(view), "motion": _motion_json(data)},
+        log=log_json(replace(inputs.log, notes=view.log.notes))
+        | {"fitted": len(view), "motion": _motion_json(data)},
         noise=_noise_json(data, result),
         plots=plots(data, result, cells),
         spec=None if loaded is None else {"name": loaded.spec.name, "file": str(loaded.path)},
@@ -113,8 +115,10 @@ def _searched(
     inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress
 ) -> tuple[Data, Search, SearchResult]:
     """The search over one log; of a long one, over windows of it."""
-    kept = windows(len(log), MOST_ROWS, WINDOW)
-    view = scene(inputs.system, log.rows(kept), inputs.known)
+    log = log.rows(windows(len(log), MOST_ROWS, WINDOW))
+    plain = structure_of(scene(inputs.system, log, inputs.known))
+    log = without_still_axes(inputs.system, log, inputs.known, plain)
+    view = scene(inputs.system, log, inputs.known)
     parts = directed_parts(view, candidates(view, settings.exclude_effects))
     data = data_of(view, structure_of(view, parts))
     progress("searching", 0.15)
@@ -168,8 +172,7 @@ def _placebo(
 
 
 def _unseen(data: Data, search: Search, result: SearchResult) -> tuple[str, ...]:
-    hidden = unseen(data, result.model, search.free_signatures(result.model))
-    return tuple(f"{a.effect.name} ({a.sensor})" for a in hidden)
+    return unseen(data, result.model, search.free_signatures(result.model))
 
 
 def log_json(log: Log) -> Json:

@@ -26,12 +26,20 @@ def scatter_candidates(
     for candidate in found:
         if candidate.label in model.labels or candidate.effect.sensitivity is not None:
             continue
+        if _free_already(candidate, model):
+            continue
         for opened, level in _put_in(data, candidate, model):
             found_nll = precision(data.noise_structure, level).negative_log_likelihood(error)
             if found_nll < base - least:
                 result.append((opened, level))
                 break
     return result
+
+
+def _free_already(candidate: Candidate, model: Model) -> bool:
+    """Whether the noise that an effect would free is free: heavy tails free their sensor's size."""
+    name, sensor, stage = candidate.label
+    return name == "noise_understated" and ("heavy_tails", sensor, stage) in model.labels
 
 
 def _put_in(data: Data, candidate: Candidate, model: Model) -> list[tuple[Opened, NoiseLevel]]:

@@ -49,7 +49,7 @@ from syncline_design.diagnose.scores import (
 )
 from syncline_design.diagnose.settings import DiagnosisSettings
 from syncline_design.diagnose.simulation import Acting
-from syncline_design.diagnose.tails import scaled_remainder, tails_of
+from syncline_design.diagnose.tails import tails_in
 
 TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
@@ -215,9 +215,9 @@ class Search:
         if (name, sensor) != ("noise_understated", "position") or not tails:
             return []
         model = understated.model
-        slow = model.precision.slow_part(model.error)
-        z = scaled_remainder(self.data.structure, model.level, model.error, slow)
-        gain = tails_of(z).gain
+        if tails[0].label in model.labels:
+            return []
+        gain = tails_in(self.data, model).gain
         if gain < TAILS_NATS:
             return []
         opened = (*model.opened[:-1], Opened(tails[0], "tails"))

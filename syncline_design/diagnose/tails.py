@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from syncline_design.diagnose.axes import Axes
+from syncline_design.diagnose.fitting import Data, Model
 from syncline_design.diagnose.noise import NoiseLevel, Structure, white_covariance
 from syncline_design.effects.base import Array
 
@@ -24,20 +27,35 @@ class Tails:
     outlier_rate: float
 
 
+def tails_in(data: Data, model: Model) -> Tails:
+    """Tails of the white part of what a model leaves."""
+    slow = model.precision.slow_part(model.error)
+    return tails_of(scaled_remainder(data.structure, model.level, model.error, slow, data.axes))
+
+
 def scaled_remainder(
-    structure: Structure, level: NoiseLevel, error: Array, slow_part: Array
+    structure: Structure, level: NoiseLevel, error: Array, slow_part: Array, axes: Axes
 ) -> Array:
-    """z = L^-1 (e - slow), L L' the white covariance: standard normal if all is normal; (n, 3)."""
-    lower = np.linalg.cholesky(white_covariance(structure, level))
-    z: Array = np.linalg.solve(lower, (error - slow_part)[:, :, None])[:, :, 0]
+    """z = L^-1 (e - slow), L L' the white covariance of the axes that the log compares.
+
+    Standard normal if all is normal, (n, axes): an axis that is not known or never varies has no
+    noise, and its zeros would pass for the core of a heavy-tailed distribution.
+    """
+    kept = list(axes)
+    covariance = white_covariance(structure, level)[:, kept][:, :, kept]
+    lower = np.linalg.cholesky(covariance)
+    left = (error - slow_part)[:, kept]
+    z: Array = np.linalg.solve(lower, left[:, :, None])[:, :, 0]
     return z
 
 
 def tails_of(z: Array) -> Tails:
-    """Fit Student's t with a scale to standardised components (n, 3)."""
+    """Fit Student's t with a scale to standardised components (n, axes)."""
     from scipy.stats import norm, t
 
     values = z.ravel()
+    if not float(np.median(np.abs(values))) > 0.0:  # more than half are zero: no noise to judge
+        return Tails(0.0, math.inf, math.inf, 0.0)
     plain = float(np.sum(norm.logpdf(values, scale=float(np.std(values)))))
     found = []
     for freedom in FREEDOMS:
