@@ -18,11 +18,11 @@ from syncline_design.diagnose.noise import (
     precision,
     spec_bounds,
 )
-from syncline_design.diagnose.scales import figure
 from syncline_design.diagnose.scores import Gram, clean_threshold, log_p_of
 from syncline_design.diagnose.tails import tails_of
 from syncline_design.diagnose.trajectory import pieces
 from syncline_design.effects.kinematics import gauss_markov
+from syncline_design.estimates import figure
 
 Array = NDArray[np.float64]
 

@@ -104,14 +104,14 @@ def diagnosed() -> Page:
     "words",
     [
         "GNSS positions are 87.1 ms older than their stamps.",
-        "87.10 \u00b1 0.30 ms".replace(" ", "\u00a0"),
+        "87.1 \u00b1 0.3 ms".replace(" ", "\u00a0"),
         "This log cannot tell it apart from lever arm (position)",
         "vary the speed",
         "98.1\u00a0%",
         "2\u00a0987 of 3\u00a0000",
         "missing values",
         "283\u00a0mm",
-        "along, speed 6.2\u00a0m/s to 9\u00a0m/s: mean \u2212652\u00a0mm, 508 standard errors",
+        "along, speed 6.2\u00a0m/s to 9\u00a0m/s: mean \u221265.2\u00a0cm, 508 standard errors",
         "Told apart on this log from filter lag (position), 141 nat worse",
         "boresight: the vehicle never tilted",
         "after, plus a placebo: boresight (ranging)",
@@ -134,20 +134,64 @@ def test_diagnosis_verdicts(verdict: str, words: str) -> None:
 @pytest.mark.parametrize(
     ("value", "uncertainty", "unit", "text"),
     [
-        (0.0871, 0.0003, "s", "87.10 \u00b1 0.30 ms"),
-        (-0.37, 0.0123, "m", "\u2212370 \u00b1 12 mm"),
-        (0.35312, 0.0021, "m", "353.1 \u00b1 2.1 mm"),
+        (0.0871, 0.0003, "s", "87.1 \u00b1 0.3 ms"),
+        (-0.37, 0.0123, "m", "\u221237.0 \u00b1 1.2 cm"),
+        (0.35312, 0.0021, "m", "35.31 \u00b1 0.21 cm"),
         (math.radians(0.25), math.radians(0.011), "rad", "250 \u00b1 11 mdeg"),
         (1e-5, 2e-4, "s", "10 \u00b1 200 \u00b5s"),
         (3.0, None, "", "3"),
         (18.0, 0.0, "s", "18 s"),
-        (4.7e-5, 2.0e-6, "", "0.0000470 \u00b1 0.0000020"),
+        (4.7e-5, 2.0e-6, "", "47.0 \u00b1 2.0 ppm"),
     ],
 )
 def test_estimates_end_where_their_uncertainty_does(
     value: float, uncertainty: float | None, unit: str, text: str
 ) -> None:
     assert numbers.with_uncertainty(value, uncertainty, unit) == text.replace(" ", "\u00a0")
+
+
+@pytest.mark.parametrize(
+    ("value", "uncertainty", "unit"),
+    [
+        (0.123, 0.004, "m"),
+        (-0.0871, 0.0003, "s"),
+        (1e-4, 2e-6, "rad/s"),
+        (5.9e-5, 1e-6, ""),
+        (-0.0032, 0.0001, "m/(m/s2)"),
+        (0.02, None, "rad"),
+    ],
+)
+def test_a_finding_reads_the_same_on_console_page_markdown_and_json(
+    value: float, uncertainty: float | None, unit: str
+) -> None:
+    """One estimate through all four outputs; mpmath undoes the unit and finds the value again."""
+    from dataclasses import replace
+
+    from syncline_design.diagnose.findings import Figure, Finding
+    from syncline_design.diagnose.result import finding_json
+    from syncline_design.effects import registry
+    from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
+
+    effect = replace(registry()["latency"], sentence="it is {latency_s}")
+    figures = {"latency_s": Figure(value, uncertainty, unit)}
+    found = Finding(effect, "position", "uav", figures, (), (), 1.0, -5.0)
+    entry = finding_json(found)
+    console = found.sentence.removeprefix("It is ")
+    assert entry["parameters"]["latency_s"]["text"] == console
+    data = samples.diagnosis() | {"findings": [entry]}
+    typeset = console.replace("-", "\u2212").replace(" ", "\u00a0")
+    assert typeset in Page(render_diagnosis(data)).text
+    assert typeset in render_diagnosis_markdown(data).replace("\\", "")
+    body, _, shown = console.rpartition(" ")
+    size = {
+        "cm": "1e-2", "ms": "1e-3", "ppm": "1e-6", "mm/(m/s2)": "1e-3",
+        "deg": mpmath.pi / 180, "deg/h": mpmath.pi / 648000,
+    }[shown]  # fmt: skip
+    middle, _, spread = body.partition(" \u00b1 ")
+    tolerance = abs(mpmath.mpf(uncertainty or value)) / 10
+    assert abs(mpmath.mpf(middle) * mpmath.mpf(size) - mpmath.mpf(value)) < tolerance
+    if uncertainty is not None:
+        assert abs(mpmath.mpf(spread) * mpmath.mpf(size) - mpmath.mpf(uncertainty)) < tolerance
 
 
 @pytest.mark.parametrize("exponent", range(-9, 4))

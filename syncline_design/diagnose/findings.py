@@ -12,11 +12,11 @@ from syncline_design.diagnose.fitting import Data, Model, Opened
 from syncline_design.diagnose.gross import Gross
 from syncline_design.diagnose.identify import Comparison, compare
 from syncline_design.diagnose.noise import NoiseLevel, precision
-from syncline_design.diagnose.scales import figure
 from syncline_design.diagnose.search import SearchResult, Step
 from syncline_design.diagnose.simulation import Scene
 from syncline_design.diagnose.tails import tails_in
 from syncline_design.effects.base import Effect
+from syncline_design.estimates import figure
 
 Label = tuple[str, str, int]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
@@ -30,6 +30,13 @@ class Figure:
     value: float | str
     standard_uncertainty: float | None
     unit: str
+
+
+def figure_text(shown: Figure) -> str:
+    """A parameter as every output prints it."""
+    if isinstance(shown.value, str):
+        return shown.value
+    return figure(shown.value, shown.standard_uncertainty, shown.unit)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +67,7 @@ class Finding:
     @property
     def sentence(self) -> str:
         """What is wrong, with figures."""
-        shown = {
-            name: f.value
-            if isinstance(f.value, str)
-            else figure(f.value, f.standard_uncertainty, f.unit)
-            for name, f in self.parameters.items()
-        }
+        shown = {name: figure_text(f) for name, f in self.parameters.items()}
         text = self.effect.sentence.format(sensor=WORDS[self.sensor], **shown)
         return text[0].upper() + text[1:]
 

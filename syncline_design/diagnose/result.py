@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
-from syncline_design.diagnose.findings import Finding
+from syncline_design.diagnose.findings import Finding, figure_text
 from syncline_design.diagnose.gap import Gap
 from syncline_design.diagnose.regimes import Cell
 from syncline_design.diagnose.remainder import Remainder
@@ -67,7 +67,7 @@ class Diagnosis:
         document = {
             "schema": SCHEMA,
             "verdict": self.verdict,
-            "findings": [_finding_json(f) for f in self.findings],
+            "findings": [finding_json(f) for f in self.findings],
             "remaining": {
                 "unexplained": self.unexplained,
                 "p": self.remaining.p,
@@ -113,12 +113,15 @@ def _entry(finding: Finding) -> EffectChoice:
     )
 
 
-def _finding_json(finding: Finding) -> Json:
+def finding_json(finding: Finding) -> Json:
+    """One finding as an entry of `findings`."""
     return {
         "effect": finding.effect.name,
         "sensor": finding.sensor,
         "stage": finding.stage,
-        "parameters": {name: asdict(f) for name, f in finding.parameters.items()},
+        "parameters": {
+            name: {**asdict(f), "text": figure_text(f)} for name, f in finding.parameters.items()
+        },
         "aliases": [asdict(a) for a in finding.aliases],
         "excluded": [asdict(a) for a in finding.excluded],
         "sentence": finding.sentence,

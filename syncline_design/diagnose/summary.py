@@ -6,7 +6,7 @@ from syncline_design.diagnose.findings import AliasFigure, Finding
 from syncline_design.diagnose.gap import Gap
 from syncline_design.diagnose.regimes import Cell
 from syncline_design.diagnose.result import Diagnosis
-from syncline_design.diagnose.scales import figure
+from syncline_design.estimates import figure
 
 OPENING = {
     "agrees": "AGREES: nothing is missing; what differs is the noise that the spec expects.",

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Any
 
-DIAGNOSE_FORMATS: Final = ("json", "html")
+from syncline_design.report.formats import DIAGNOSE_FORMATS as DIAGNOSE_FORMATS
 
 
 def render_diagnose(name: str, data: dict[str, Any]) -> str:
@@ -13,6 +13,10 @@ def render_diagnose(name: str, data: dict[str, Any]) -> str:
         from syncline_design.report.json_out import json_text
 
         return json_text(data)
+    if name == "markdown":
+        from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
+
+        return render_diagnosis_markdown(data)
     from syncline_design.report.diagnosis_page import render_diagnosis
 
     return render_diagnosis(data)

@@ -13,7 +13,7 @@ from syncline_design.report.text import harmless, sentence_list
 from syncline_design.report.verdict_words import Json, Outcome, items, named, part
 from syncline_design.units import split_suffix
 
-_OUTCOMES: Final[dict[str, Outcome]] = {
+DIAGNOSES: Final[dict[str, Outcome]] = {
     "agrees": Outcome("good", "\u2713", "Log and simulation agree"),
     "explained": Outcome("warn", "!", "Something was missing, and it has a name"),
     "unexplained": Outcome("bad", "?", "Something remains unexplained"),
@@ -34,11 +34,11 @@ def render_diagnosis(data: Json) -> str:
     data = harmless(data)
     drawn = _figures(data)
     sections: dict[str, Any] = {
-        "findings": [_finding(entry) for entry in items(data, "findings")],
-        "gap": [t for t in (_gap(data), _steps(data)) if t is not None],
+        "findings": [finding_words(entry) for entry in items(data, "findings")],
+        "gap": [t for t in (gap_table(data), _steps(data)) if t is not None],
         "residuals": "residuals" in drawn,
-        "where": _where(data),
-        "design": [_text(line) for line in part(data, "design").get("text") or ()],
+        "where": where_lines(data),
+        "design": [plain_text(line) for line in part(data, "design").get("text") or ()],
         "log": _log_facts(data),
         "provenance": _provenance(data),
     }
@@ -46,42 +46,50 @@ def render_diagnosis(data: Json) -> str:
         "diagnosis.html.j2",
         kind="Diagnosis",
         name=str(part(data, "spec").get("name") or "Measured log against simulation"),
-        outcome=_OUTCOMES.get(str(data.get("verdict")), _OUTCOMES["unexplained"]),
-        sentence=_sentence(data),
+        outcome=DIAGNOSES.get(str(data.get("verdict")), DIAGNOSES["unexplained"]),
+        sentence=sentence_text(data),
         facts=_facts(data),
         contents=[(key, label) for key, label in _CONTENTS if sections[key]],
         sections=sections,
         figures={key: None if key not in drawn else page.trusted_svg(drawn[key].svg)
                  for key in ("residuals", "gap", "where", "coverage")},
         coverage=_coverage(data),
-        unseen=[_text(entry) for entry in data.get("unseen") or ()],
+        unseen=[plain_text(entry) for entry in data.get("unseen") or ()],
         rejected=_rejected(data),
-        remaining=_remaining(data),
+        remaining=remaining_text(data),
     )  # fmt: skip
 
 
 def parameter_text(entry: Json) -> str:
-    """`87.1 ms ± 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
+    """`87.1 ± 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
     value, unit = numbers.finite(entry.get("value")), str(entry.get("unit") or "")
     if value is None:
-        return _text(entry.get("value"))
+        return plain_text(entry.get("value"))
     return numbers.with_uncertainty(value, numbers.finite(entry.get("standard_uncertainty")), unit)
 
 
-def _text(value: object) -> str:
+def _length(value_m: object) -> str:
+    """Metres as the console prints them: 12.3 cm there is 12.3 cm here."""
+    known = numbers.finite(value_m)
+    return numbers.MISSING if known is None else numbers.with_uncertainty(known, None, "m")
+
+
+def plain_text(value: object) -> str:
     """Any JSON value as words: lists joined, mappings as `key value`."""
     if value is None:
         return ""
     if isinstance(value, Mapping):
-        return ", ".join(f"{key.replace('_', ' ')} {_text(entry)}" for key, entry in value.items())
+        return ", ".join(
+            f"{key.replace('_', ' ')} {plain_text(entry)}" for key, entry in value.items()
+        )
     if isinstance(value, list | tuple):
-        return sentence_list([_text(entry) for entry in value])
+        return sentence_list([plain_text(entry) for entry in value])
     if isinstance(value, bool):
         return "yes" if value else "no"
     return numbers.number(value) if isinstance(value, int | float) else str(value)
 
 
-def _finding(entry: Json) -> dict[str, Any]:
+def finding_words(entry: Json) -> dict[str, Any]:
     parameters = [
         (split_suffix(name)[0].replace("_", " "), parameter_text(value))
         for name, value in named(entry, "parameters")
@@ -94,8 +102,8 @@ def _finding(entry: Json) -> dict[str, Any]:
         "parameters": parameters,
         "aliases": sentence_list([_effect_text(e) for e in entry.get("aliases") or ()]),
         "excluded": sentence_list([_excluded_text(e) for e in items(entry, "excluded")]),
-        "separated_by": _text(entry.get("separated_by")),
-        "evidence": _text(entry.get("evidence")),
+        "separated_by": plain_text(entry.get("separated_by")),
+        "evidence": plain_text(entry.get("evidence")),
     }
 
 
@@ -116,7 +124,7 @@ def _excluded_text(entry: Json) -> str:
     return _effect_text(entry) + (f", {worse:.3g} nat worse" if worse is not None else "")
 
 
-def _sentence(data: Json) -> str:
+def sentence_text(data: Json) -> str:
     found = items(data, "findings")
     if not found:
         remaining = part(data, "remaining").get("unexplained")
@@ -137,7 +145,7 @@ def _facts(data: Json) -> list[tuple[str, str]]:
     for key, label in (("before", "RMS before"), ("after", "RMS after"), ("floor", "Floor")):
         rms = part(held_out, key).get("rms_m")
         if numbers.finite(rms) is not None:
-            facts.append((label, numbers.length(rms, 3)))
+            facts.append((label, _length(rms)))
     if log.get("rows") is not None:
         facts.append(("Rows used", f"{numbers.count(log.get('used'))} of "
                                    f"{numbers.count(log.get('rows'))}"))  # fmt: skip
@@ -146,7 +154,7 @@ def _facts(data: Json) -> list[tuple[str, str]]:
 
 def _score_cells(entry: Json) -> list[Cell]:
     return [
-        Cell(numbers.length(entry.get("rms_m")), numbers.finite(entry.get("rms_m"))),
+        Cell(_length(entry.get("rms_m")), numbers.finite(entry.get("rms_m"))),
         Cell(numbers.number(entry.get("reduced_chi2")), numbers.finite(entry.get("reduced_chi2"))),
         Cell(numbers.number(entry.get("nll_per_sample")),
              numbers.finite(entry.get("nll_per_sample"))),
@@ -157,7 +165,7 @@ def _score_cells(entry: Json) -> list[Cell]:
 _SCORES: Final = ("RMS #", "Reduced \u03c7\u00b2 #", "NLL per sample #", "95 % coverage #")
 
 
-def _gap(data: Json) -> Table | None:
+def gap_table(data: Json) -> Table | None:
     """Before, after and floor on blocks and on a regime that the fit did not see; the placebo."""
     gap = part(data, "gap")
     sources = (
@@ -171,7 +179,7 @@ def _gap(data: Json) -> Table | None:
             if part(source, key)]  # fmt: skip
     placebo = part(gap, "placebo")
     if part(part(placebo, "held_out"), "after"):
-        label = f"after, plus a placebo: {_text(placebo.get('added'))}"
+        label = f"after, plus a placebo: {plain_text(placebo.get('added'))}"
         rows.append((Cell(label), *_score_cells(part(part(placebo, "held_out"), "after"))))
     return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
 
@@ -183,7 +191,7 @@ def gap_steps(data: Json) -> list[tuple[str, Json]]:
         held_out = part(entry, "held_out")
         if not found:
             found.append(("spec as it is", part(held_out, "before")))
-        found.append((f"+ {_text(entry.get('added'))}", part(held_out, "after")))
+        found.append((f"+ {plain_text(entry.get('added'))}", part(held_out, "after")))
     return [(label, scores) for label, scores in found if scores]
 
 
@@ -193,7 +201,7 @@ def _steps(data: Json) -> Table | None:
     return table("Gap after each addition", heads, rows) if len(rows) > 2 else None
 
 
-def _where(data: Json) -> list[str]:
+def where_lines(data: Json) -> list[str]:
     found = data.get("where") or part(data, "remaining").get("where") or ()
     return [_cell_text(entry) for entry in found] if isinstance(found, Sequence) else []
 
@@ -201,18 +209,18 @@ def _where(data: Json) -> list[str]:
 def _cell_text(entry: object) -> str:
     """`along track at speed 6.3 m/s to 9 m/s: mean -652 mm, 508 standard errors`."""
     if not isinstance(entry, Mapping) or "covariate" not in entry:
-        return _text(entry)
+        return plain_text(entry)
     unit = str(entry.get("unit") or "")
     low, high = (numbers.si_quantity(entry.get(key), unit, 3) for key in ("low", "high"))
     axis = str(entry.get("axis") or "all axes")
     text = f"{axis}, {str(entry['covariate']).replace('_', ' ')} {low} to {high}"
     mean, score = numbers.finite(entry.get("mean_m")), numbers.finite(entry.get("score"))
     if mean is not None:
-        text += f": mean {numbers.length(mean, 3)}"
+        text += f": mean {_length(mean)}"
     return text + (f", {abs(score):.3g} standard errors" if score is not None else "")
 
 
-def _remaining(data: Json) -> str:
+def remaining_text(data: Json) -> str:
     remaining = part(data, "remaining")
     if not remaining.get("unexplained"):
         return ""
@@ -223,11 +231,11 @@ def _remaining(data: Json) -> str:
 def _log_facts(data: Json) -> list[tuple[str, str]]:
     log = part(data, "log")
     simple = [
-        (str(key).replace("_", " "), _text(value))
+        (str(key).replace("_", " "), plain_text(value))
         for key, value in log.items()
         if key not in ("rejected", "rows", "used") and value not in (None, "", [], {})
     ]
-    files = _text(data.get("log_files"))
+    files = plain_text(data.get("log_files"))
     counted = [("rows", numbers.count(log.get("rows"))), ("used", numbers.count(log.get("used")))]
     return [*([("files", files)] if files else []), *(counted if log else []), *simple]
 

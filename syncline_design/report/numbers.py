@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any, Final
 
-from syncline_design.units import UNITS, Dimension, format_quantity
+from syncline_design import estimates
+from syncline_design.units import Dimension, format_quantity
 
 MISSING: Final = "\N{EM DASH}"
 _TYPOGRAPHIC = (
@@ -31,9 +32,7 @@ def _shown(value: Any, dimension: Dimension, digits: int, currency: str = "EUR")
     text = format_quantity(number, dimension, digits, currency)
     if dimension is Dimension.MONEY:
         return text.replace(" ", "\N{NO-BREAK SPACE}")
-    for plain, printed in _TYPOGRAPHIC:
-        text = text.replace(plain, printed)
-    return text.replace(" ", "\N{NO-BREAK SPACE}")
+    return _typeset(text)
 
 
 def length(value: Any, digits: int = 4) -> str:
@@ -131,23 +130,11 @@ def si_quantity(value: Any, unit: str, digits: int = 4) -> str:
 
 
 def with_uncertainty(value: float, uncertainty: float | None, unit: str) -> str:
-    """An SI estimate and its standard uncertainty in one unit: `87.1 ms ± 0.3 ms`.
+    """An SI estimate and its standard uncertainty in one unit, `87.1 ± 0.3 ms`, typeset."""
+    return _typeset(estimates.figure(value, uncertainty, unit))
 
-    The uncertainty keeps two figures, the estimate ends where the uncertainty does (GUM 7.2.6).
-    """
-    dimension = _DIMENSIONS.get(unit, Dimension.DIMENSIONLESS)
-    if uncertainty is None or uncertainty <= 0.0:
-        text = _shown(value, dimension, 4)
-        return text if dimension is not Dimension.DIMENSIONLESS else f"{text} {unit}".strip()
-    size = max(abs(value), uncertainty)
-    shown = unit
-    factor = 1.0
-    if dimension is not Dimension.DIMENSIONLESS:
-        shown = format_quantity(size, dimension).rpartition(" ")[2]
-        factor = float(UNITS[shown][1])
-    decimals = max(0, 1 - math.floor(math.log10(uncertainty / factor)))
-    body = f"{value / factor:.{decimals}f} \N{PLUS-MINUS SIGN} {uncertainty / factor:.{decimals}f}"
-    text = f"{body} {shown}".strip()
+
+def _typeset(text: str) -> str:
     for plain, printed in _TYPOGRAPHIC:
         text = text.replace(plain, printed)
     return text.replace(" ", "\N{NO-BREAK SPACE}")

@@ -1,4 +1,8 @@
-"""Figures for people: a value with its standard uncertainty in the unit that reads best."""
+"""Estimates for people: a value with its standard uncertainty in the unit that reads best.
+
+The one formatter of what `diagnose` finds: console, JSON (`text`), HTML and Markdown all print its
+words, so that a finding reads the same wherever it stands.
+"""
 
 from __future__ import annotations
 

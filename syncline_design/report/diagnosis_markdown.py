@@ -1,0 +1,53 @@
+"""A diagnosis as Markdown, for a pull request comment or a job summary."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from syncline_design.report.diagnosis_page import (
+    DIAGNOSES,
+    finding_words,
+    gap_table,
+    plain_text,
+    remaining_text,
+    sentence_text,
+)
+from syncline_design.report.markdown import markdown_table
+from syncline_design.report.text import markdown_safe
+from syncline_design.report.verdict_words import Json, items, part
+
+
+def render_diagnosis_markdown(data: Json) -> str:
+    """Outcome, every finding with its figures, the gap, what it means for the design."""
+    outcome = DIAGNOSES.get(str(data.get("verdict")), DIAGNOSES["unexplained"])
+    name = part(data, "spec").get("name") or "Measured log against simulation"
+    lines = [f"## {outcome.mark} {markdown_safe(name)}: {outcome.word}", ""]
+    found = items(data, "findings")
+    if not found:
+        lines += [markdown_safe(sentence_text(data)), ""]
+    for number, entry in enumerate(found, 1):
+        lines += [*_finding(number, entry), ""]
+    left = remaining_text(data)
+    if left:
+        lines += [markdown_safe(left), ""]
+    gap = gap_table(data)
+    if gap is not None:
+        lines += [f"**{markdown_safe(gap.caption)}**", "", markdown_table(gap)]
+    means = [plain_text(line) for line in part(data, "design").get("text") or ()]
+    if means:
+        lines += ["**What it means for the design**", ""]
+        lines += [f"- {markdown_safe(line.strip())}" for line in means]
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def _finding(number: int, entry: Json) -> Iterator[str]:
+    words = finding_words(entry)
+    yield f"{number}. **{markdown_safe(words['sentence'] or words['title'])}**"
+    yield f"   - {markdown_safe(words['title'])} ({markdown_safe(words['place'])})"
+    for name, text in words["parameters"]:
+        yield f"   - {markdown_safe(name)}: {markdown_safe(text)}"
+    if words["evidence"]:
+        yield f"   - evidence: {markdown_safe(words['evidence'])}"
+    if words["aliases"]:
+        separated = f"; to separate them: {words['separated_by']}" if words["separated_by"] else ""
+        yield f"   - not told apart from {markdown_safe(words['aliases'] + separated)}"
