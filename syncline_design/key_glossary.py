@@ -1,4 +1,4 @@
-"""What the keys of specs and catalogs mean, one line each: what an editor shows on hover."""
+"""What the keys of specs, catalogs and studies mean: the line an editor shows on hover."""
 
 from __future__ import annotations
 
@@ -87,4 +87,26 @@ KEYS: dict[str, str] = {
     "values": "Measured errors, each equally likely.",
     "vehicle": "Name of the vehicle, where several stages share one.",
     "waiver": "Lets a missed requirement pass until a day, with a reason.",
+}
+
+# Where a study means something else by a key, or has one of its own.
+STUDY_KEYS: dict[str, str] = {
+    "base": "The specs that are varied; paths relative to this file.",
+    "check": "How each case is checked.",
+    "count": "How many values or samples.",
+    "grid": "Key path to the values it takes: a list, or {low, high, count, scale}.",
+    "heat_map": "The two key paths of the map of least cost.",
+    "high": "Upper end of a range, with its unit.",
+    "low": "Lower end of a range, with its unit.",
+    "meets_when": "The study passes when all, or any, cases meet, or when each is decided.",
+    "method": "latin_hypercube; below check the road of the choice: auto, front, milp, enumerate.",
+    "monte_carlo": "Whether cases simulate; left out: where a requirement needs it.",
+    "over": "Key path to a range such as 0.1 m .. 0.5 m, or a list to pick from.",
+    "sample": "A Latin hypercube over ranges, instead of every combination.",
+    "scale": "linear, or log for equal ratios.",
+    "seed": "Seed of the sample.",
+    "study": "Version of this file format.",
+    "time_limit": "Longest time for the choice of one case.",
+    "x": "Key path across.",
+    "y": "Key path upwards.",
 }

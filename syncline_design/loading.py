@@ -37,7 +37,8 @@ class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the p
     """What is wrong with a user's files; printing it gives one line per problem."""
 
     def __init__(self, problems: tuple[Problem, ...]) -> None:
-        self.problems = tuple(sorted(set(problems), key=lambda p: (p.file, p.line, p.column)))
+        # By place, then by text: the order of a set differs from run to run.
+        self.problems = tuple(sorted(set(problems), key=_place_and_text))
         super().__init__(self._lines())
 
     def _lines(self) -> str:
@@ -45,6 +46,10 @@ class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the p
         if len(self.problems) > MAX_SHOWN:
             lines.append(f"... and {len(self.problems) - MAX_SHOWN} more")
         return "\n".join(lines)
+
+
+def _place_and_text(problem: Problem) -> tuple[str, int, int, str]:
+    return problem.file, problem.line, problem.column, str(problem)
 
 
 @dataclass(frozen=True)

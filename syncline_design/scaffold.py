@@ -1,4 +1,4 @@
-"""`init`: a starter spec that runs, with its schema beside it for the editor."""
+"""`init`: a starter spec and study that run, with their schemas beside them for the editor."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from syncline_design.yaml_reader import Problem
 
 SPEC_NAME = "system.yaml"
 SCHEMA_NAME = "syncline-spec.schema.json"
+STUDY_NAME = "studies/distance.yaml"
+STUDY_SCHEMA_NAME = "syncline-study.schema.json"
 
 STARTER = f"""\
 # yaml-language-server: $schema=./{SCHEMA_NAME}
@@ -53,18 +55,47 @@ objective: cost                      # or mass, power, error
 # catalogs: [my_sensors.yaml]
 """
 
+STUDY = f"""\
+# yaml-language-server: $schema=../{STUDY_SCHEMA_NAME}
+#
+# A trade study: the spec over every combination of these values. Run it with:
+#   syncline-design study {STUDY_NAME} --output html:study.html
+study: 1                             # format version
+name: Distance against accuracy
+base: [../{SPEC_NAME}]
+
+# Key paths name places of the spec; a list, or a range such as
+# {{low: 40 m, high: 120 m, count: 5}}, scale: log for equal ratios.
+grid:
+  "stages[uav].distance": [40 m, 70 m, 100 m]
+  "requirements[ACC-1].limit": [0.1 m, 0.2 m, 0.3 m]
+
+# Instead of every combination, a sample:
+# sample:
+#   count: 50
+#   over: {{"stages[uav].v_max": 10 m/s .. 30 m/s}}
+
+# The study passes when all cases meet, any case meets, or each case is decided.
+meets_when: decided
+"""
+
 
 def init_project(directory: str | Path) -> tuple[Path, ...]:
-    """Write the starter spec and its schema into a folder; nothing is ever overwritten."""
+    """Write the starter spec, study and schemas into a folder; nothing is ever overwritten."""
     folder = Path(directory)
-    contents = {folder / SPEC_NAME: STARTER, folder / SCHEMA_NAME: schema_text("spec")}
+    contents = {
+        folder / SPEC_NAME: STARTER,
+        folder / SCHEMA_NAME: schema_text("spec"),
+        folder / STUDY_NAME: STUDY,
+        folder / STUDY_SCHEMA_NAME: schema_text("study"),
+    }
     taken = [path for path in contents if os.path.lexists(path)]
     if taken:
         raise BadInput(tuple(_refused(path, "this file is there already") for path in taken))
     written: list[Path] = []
     try:
-        folder.mkdir(parents=True, exist_ok=True)
         for path, text in contents.items():
+            path.parent.mkdir(parents=True, exist_ok=True)
             with path.open("x", encoding="utf-8", newline="\n") as stream:
                 written.append(path)
                 stream.write(text)

@@ -1,4 +1,4 @@
-"""JSON Schema of specs and catalogs, for editors.
+"""JSON Schema of specs, catalogs and studies, for editors.
 
 Draft-07, which yaml-language-server reads.  The schema is the models' own, put into that draft:
 quantities become shared definitions, keys that may be absent lose their `null`.
@@ -7,37 +7,47 @@ quantities become shared definitions, keys that may be absent lose their `null`.
 from __future__ import annotations
 
 import json
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any, Final, Literal
 
-from syncline_design.key_glossary import KEYS
+from pydantic import BaseModel
+
+from syncline_design.key_glossary import KEYS, STUDY_KEYS
 from syncline_design.spec import LIMIT_DIMENSIONS
 from syncline_design.units import Dimension
 from syncline_design.values import quantity_schema
 
-SchemaName = Literal["spec", "catalog"]
+SchemaName = Literal["spec", "catalog", "study"]
+_TITLES: Final = {"spec": "system spec", "catalog": "catalog", "study": "trade study"}
 DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
 def json_schema(name: SchemaName) -> dict[str, Any]:
     """The schema of one kind of file as plain data."""
-    from syncline_design.catalog import CatalogFile
-    from syncline_design.spec import Spec
-
-    model = Spec if name == "spec" else CatalogFile
+    model = _model(name)
+    words = {**KEYS, **STUDY_KEYS} if name == "study" else KEYS
     raw = model.model_json_schema(mode="validation", ref_template="#/definitions/{model}")
     definitions = raw.pop("$defs", {})
     if "Requirement" in definitions:
         _limit_by_kind(definitions["Requirement"])
     quantities: dict[str, Any] = {}
-    body = _draft_07(raw, quantities)
-    parts = {key: _draft_07(value, quantities) for key, value in definitions.items()}
-    title = "syncline-design system spec" if name == "spec" else "syncline-design catalog"
+    body = _draft_07(raw, quantities, words)
+    parts = {key: _draft_07(value, quantities, words) for key, value in definitions.items()}
     return {
         "$schema": DRAFT,
         **body,
-        "title": title,
+        "title": f"syncline-design {_TITLES[name]}",
         "definitions": dict(sorted({**parts, **quantities}.items())),
     }
+
+
+def _model(name: SchemaName) -> type[BaseModel]:
+    from syncline_design.catalog import CatalogFile
+    from syncline_design.spec import Spec
+    from syncline_design.study.definition import StudyFile
+
+    models: dict[str, type[BaseModel]] = {"spec": Spec, "catalog": CatalogFile, "study": StudyFile}
+    return models[name]
 
 
 def schema_text(name: SchemaName) -> str:
@@ -66,10 +76,10 @@ def _limit_by_kind(requirement: dict[str, Any]) -> None:
     requirement["else"] = {"not": {"required": ["quantile"]}}
 
 
-def _draft_07(node: Any, quantities: dict[str, Any]) -> Any:
+def _draft_07(node: Any, quantities: dict[str, Any], words: Mapping[str, str]) -> Any:
     """One schema node in draft-07; quantities are moved out into shared definitions."""
     if isinstance(node, list):
-        return [_draft_07(item, quantities) for item in node]
+        return [_draft_07(item, quantities, words) for item in node]
     if not isinstance(node, dict):
         return node
     if "pattern" in node and ", NUMBER UNIT" in node.get("description", ""):
@@ -80,19 +90,19 @@ def _draft_07(node: Any, quantities: dict[str, Any]) -> Any:
     for key, value in node.items():
         if key == "properties":
             result[key] = {
-                name: _described(name, _draft_07(item, quantities)) for name, item in value.items()
+                name: _described(words[name], _draft_07(item, quantities, words))
+                for name, item in value.items()
             }
         elif key == "anyOf":
-            choices = [_draft_07(c, quantities) for c in value if c != {"type": "null"}]
+            choices = [_draft_07(c, quantities, words) for c in value if c != {"type": "null"}]
             result.update(choices[0] if len(choices) == 1 else {"anyOf": choices})
         elif not (key == "default" and value is None) and not (key == "title" and _is_field(node)):
-            result[key] = _draft_07(value, quantities)
+            result[key] = _draft_07(value, quantities, words)
     return result
 
 
-def _described(name: str, node: dict[str, Any]) -> dict[str, Any]:
+def _described(description: str, node: dict[str, Any]) -> dict[str, Any]:
     """A property with the line that an editor shows; draft-07 ignores what stands beside $ref."""
-    description = KEYS[name]
     if "$ref" in node:
         reference = {"$ref": node["$ref"]}
         rest = {key: value for key, value in node.items() if key != "$ref"}

@@ -71,25 +71,11 @@ def check_file(path: str | Path, settings: CheckSettings | None = None) -> Json:
 
 
 def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
-    """Verdicts of specs and of the specs in folders; a refused file stands among them as such.
+    """Verdicts of specs, in the order given; a refused file stands among them as such.
 
     Refused: {"verdict": "refused", "file", "problems"}, and nothing of that spec is computed.
     """
-    return [_check_or_refuse(path, settings) for path in spec_files(paths)]
-
-
-def spec_files(paths: Sequence[Path]) -> list[Path]:
-    """Files as given, folders as the YAML files directly in them, by name."""
-    found: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            inside = sorted(p for p in path.iterdir() if p.suffix in (".yaml", ".yml"))
-            if not inside:
-                raise BadInput((Problem(str(path), 0, 0, "", "no spec (*.yaml) in this folder"),))
-            found += inside
-        else:
-            found.append(path)
-    return found
+    return [_check_or_refuse(path, settings) for path in paths]
 
 
 def _check_or_refuse(path: Path, settings: CheckSettings) -> Json:

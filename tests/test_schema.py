@@ -10,9 +10,15 @@ from typing import Any
 import jsonschema
 import pytest
 
-from syncline_design.key_glossary import KEYS
+from syncline_design.key_glossary import KEYS, STUDY_KEYS
 from syncline_design.loading import BadInput, load
-from syncline_design.scaffold import SCHEMA_NAME, SPEC_NAME, init_project
+from syncline_design.scaffold import (
+    SCHEMA_NAME,
+    SPEC_NAME,
+    STUDY_NAME,
+    STUDY_SCHEMA_NAME,
+    init_project,
+)
 from syncline_design.schema import json_schema, schema_text
 from syncline_design.yaml_reader import read
 
@@ -44,7 +50,7 @@ def validator(name: Any) -> jsonschema.Draft7Validator:
     return jsonschema.Draft7Validator(json.loads(schema_text(name)))
 
 
-@pytest.mark.parametrize("name", ["spec", "catalog"])
+@pytest.mark.parametrize("name", ["spec", "catalog", "study"])
 def test_the_schema_is_valid_draft_07(name: Any) -> None:
     schema = json_schema(name)
     assert schema["$schema"] == "http://json-schema.org/draft-07/schema#"
@@ -100,7 +106,8 @@ def test_a_wrong_catalog_does_not_satisfy_it() -> None:
 def test_the_starter_spec_is_accepted_by_loader_and_schema(tmp_path: Path) -> None:
     folder = tmp_path / "new" / "project"
     written = init_project(folder)
-    assert [path.name for path in written] == [SPEC_NAME, SCHEMA_NAME]
+    names = [SPEC_NAME, SCHEMA_NAME, STUDY_NAME, STUDY_SCHEMA_NAME]
+    assert [str(path.relative_to(folder)) for path in written] == names
     spec = load(folder / SPEC_NAME)
     assert spec.spec.stages
     assert spec.text.startswith(f"# yaml-language-server: $schema=./{SCHEMA_NAME}\n")
@@ -108,7 +115,57 @@ def test_the_starter_spec_is_accepted_by_loader_and_schema(tmp_path: Path) -> No
     jsonschema.Draft7Validator(schema).validate(plain(read(folder / SPEC_NAME).data))
 
 
-@pytest.mark.parametrize("taken", [SPEC_NAME, SCHEMA_NAME])
+def test_the_starter_study_runs_and_satisfies_its_schema(tmp_path: Path) -> None:
+    from syncline_design.study import load_study
+
+    init_project(tmp_path)
+    study = tmp_path / STUDY_NAME
+    assert len(load_study(study)) == 9
+    named = read(study).text.partition("$schema=")[2].partition("\n")[0]
+    schema = json.loads((study.parent / named).read_text(encoding="utf-8"))
+    jsonschema.Draft7Validator(schema).validate(plain(read(study).data))
+
+
+@pytest.mark.parametrize("path", sorted(ROOT.glob("specs/studies/*.yaml")), ids=lambda p: p.stem)
+def test_shipped_studies_satisfy_the_schema(path: Path) -> None:
+    validator("study").validate(plain(read(path).data))
+
+
+STUDY_PARTS: dict[str, tuple[dict[str, Any], bool]] = {
+    "one base as text": ({"base": "a.yaml"}, True),
+    "a range of the grid": ({"grid": {"x": {"low": "1 m", "high": "2 m", "count": 3}}}, True),
+    "a range without a count": ({"grid": {"x": {"low": "1 m", "high": "2 m"}}}, False),
+    "a value that is no list": ({"grid": {"x": "40 m"}}, False),
+    "no values": ({"grid": {"x": []}}, False),
+    "nothing to vary": ({"grid": {}}, False),
+    "a sampled span": ({"sample": {"count": 5, "over": {"x": "1 m .. 2 m"}}}, True),
+    "a sampled figure": ({"sample": {"count": 5, "over": {"x": "1 m"}}}, False),
+    "a sample without a count": ({"sample": {"over": {"x": "1 m .. 2 m"}}}, False),
+    "an unknown rule": ({"meets_when": "most"}, False),
+    "a key that is none": ({"gird": {"x": [1]}}, False),
+}
+
+
+@pytest.mark.parametrize("what", STUDY_PARTS)
+def test_the_study_schema_sees_slips_of_shape(what: str) -> None:
+    part, fits = STUDY_PARTS[what]
+    data = {"study": 1, "name": "x", "base": ["a.yaml"], **part}
+    assert validator("study").is_valid(data) is fits
+
+
+def test_every_key_of_a_study_has_its_line() -> None:
+    schema = json_schema("study")
+    used = {
+        key: node["description"]
+        for part in (schema, *schema["definitions"].values())
+        for key, node in part.get("properties", {}).items()
+        if "description" in node
+    }
+    assert {"grid", "sample", "over", "meets_when", "heat_map"} <= set(used)
+    assert used == {key: {**KEYS, **STUDY_KEYS}[key] for key in used}
+
+
+@pytest.mark.parametrize("taken", [SPEC_NAME, SCHEMA_NAME, STUDY_SCHEMA_NAME])
 def test_init_never_overwrites(tmp_path: Path, taken: str) -> None:
     (tmp_path / taken).write_text("mine", encoding="utf-8")
     with pytest.raises(BadInput, match="there already"):

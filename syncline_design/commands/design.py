@@ -9,11 +9,14 @@ from typing import Annotated, Any, Literal
 import typer
 
 from syncline_design.commands.shared import (
+    CheckOutput,
+    DiffOutput,
     MethodOption,
-    OutputOption,
+    OptimizeOutput,
     QuietOption,
     SeedOption,
     SpecArgument,
+    StudyOutput,
     TimeLimitOption,
     emit,
     guarded,
@@ -25,36 +28,47 @@ from syncline_design.commands.shared import (
 
 @guarded
 def check(
-    spec: Annotated[list[Path], typer.Argument(help="Specs, or folders of specs.")],
-    output: OutputOption = None,
+    spec: Annotated[list[Path], typer.Argument(help="Specs; of a folder, the specs in it.")],
+    output: CheckOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
     method: MethodOption = "auto",
     time_limit: TimeLimitOption = None,
+    skip_others: Annotated[
+        bool, typer.Option("--skip-others", help="Pass over named files that are no specs too.")
+    ] = False,
 ) -> int:
     """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
     from syncline_design.report.checks import CHECK_FORMATS, render_checks
     from syncline_design.report.console import verdict_text
+    from syncline_design.report.several import skipped_text, summary_line
     from syncline_design.report.write import STDOUT
+    from syncline_design.spec_folders import spec_files
     from syncline_design.verify import CheckSettings, check_files, exit_code
 
-    targets = output_targets(output, CHECK_FORMATS, spec)
+    found = spec_files(spec, skip_others=skip_others)
+    targets = output_targets(output, CHECK_FORMATS, found.files)
     settings = CheckSettings(seed=seed, method=road(method), time_limit_s=time_limit)
-    verdicts = check_files(spec, settings)
+    verdicts = check_files(found.files, settings)
     refused = [verdict for verdict in verdicts if verdict["verdict"] == "refused"]
     for verdict in refused:
         print(verdict["text"], file=sys.stderr)
     if refused:  # no file is written; what goes to standard output may say so
         targets = [target for target in targets if target.path == STDOUT]
     text = "\n".join(verdict_text(v) for v in verdicts if v not in refused)
+    if len(found.files) != 1 or any(path.is_dir() for path in spec):
+        summary = summary_line(verdicts)
+        text = f"{text}\n{summary}\n" if text else f"{summary}\n"
+    if found.skipped and not quiet:
+        print(skipped_text(found.skipped), file=sys.stderr)
     emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
-    return max(exit_code(verdict) for verdict in verdicts)
+    return max((exit_code(verdict) for verdict in verdicts), default=0)
 
 
 @guarded
 def optimize(
     spec: SpecArgument,
-    output: OutputOption = None,
+    output: OptimizeOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
     method: MethodOption = "auto",
@@ -104,11 +118,14 @@ def study(
     study_file: Annotated[
         Path, typer.Argument(metavar="STUDY", help="Study (YAML).", show_default=False)
     ],
-    output: OutputOption = None,
+    output: StudyOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
     output_format: Annotated[
-        str | None, typer.Option("--format", help="Print this format to standard output.")
+        str | None,
+        typer.Option(
+            "--format", metavar="FORMAT", help="Print this format (as --output) to standard output."
+        ),
     ] = None,
     workers: Annotated[int, typer.Option(min=1, help="Local worker processes.")] = 2,
     store: Annotated[
@@ -137,7 +154,7 @@ def study(
 def diff(
     old: Annotated[Path, typer.Argument(help="Spec, or verdict written as JSON.")],
     new: Annotated[Path, typer.Argument(help="Spec, or verdict written as JSON.")],
-    output: OutputOption = None,
+    output: DiffOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
 ) -> int:

@@ -11,9 +11,11 @@ from typing import Annotated, Any
 import typer
 
 from syncline_design.commands.shared import (
-    OutputOption,
+    DiagnoseOutput,
     QuietOption,
+    ReproduceOutput,
     SeedOption,
+    SimulateOutput,
     SpecArgument,
     emit,
     guarded,
@@ -24,7 +26,7 @@ from syncline_design.commands.shared import (
 @guarded
 def simulate(
     spec: SpecArgument,
-    output: OutputOption = None,
+    output: SimulateOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
     samples: Annotated[
@@ -56,7 +58,7 @@ def diagnose(
         list[Path] | None,
         typer.Argument(help="Measured logs (CSV, Parquet); default: the spec's `log: files:`."),
     ] = None,
-    output: OutputOption = None,
+    output: DiagnoseOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
     write_spec: Annotated[
@@ -114,12 +116,15 @@ def _progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
 
 
 @guarded
-def reproduce(output: OutputOption = None, quiet: QuietOption = False) -> int:
+def reproduce(
+    output: ReproduceOutput = None, seed: SeedOption = 0, quiet: QuietOption = False
+) -> int:
     """Compute every table and figure of the paper and compare it with what is printed."""
     from syncline_design import reproduce as paper
+    from syncline_design.report.formats import REPRODUCE_FORMATS
 
-    targets = output_targets(output, ("json", "html"))
-    data = paper.reproduce()
+    targets = output_targets(output, REPRODUCE_FORMATS)
+    data = paper.reproduce(seed=seed)
     emit(paper.text(data), targets, lambda name: _reproduction(name, data), quiet=quiet)
     return 0 if data.ok else 1
 

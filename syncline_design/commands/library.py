@@ -47,9 +47,11 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 
 @guarded
 def schema(
-    name: Annotated[Literal["spec", "catalog"], typer.Argument(help="spec or catalog")],
+    name: Annotated[
+        Literal["spec", "catalog", "study"], typer.Argument(help="spec, catalog or study")
+    ],
 ) -> int:
-    """Print the JSON Schema of specs or catalogs, for editors."""
+    """Print the JSON Schema of specs, catalogs or studies, for editors."""
     from syncline_design.schema import schema_text
 
     sys.stdout.write(schema_text(name))
@@ -58,9 +60,9 @@ def schema(
 
 @guarded
 def init(
-    directory: Annotated[Path, typer.Argument(help="Folder for the starter spec.")],
+    directory: Annotated[Path, typer.Argument(help="Folder for the starter files.")],
 ) -> int:
-    """Write a commented starter spec and its schema into a folder."""
+    """Write a commented starter spec, a study over it and their schemas into a folder."""
     from syncline_design.scaffold import init_project
 
     for path in init_project(directory):

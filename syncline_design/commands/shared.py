@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
 
 import typer
 
+from syncline_design.report import formats
+
 if TYPE_CHECKING:
     from syncline_design.report.write import Target
 
@@ -20,21 +22,32 @@ DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal 
 P = ParamSpec("P")
 
 SpecArgument = Annotated[Path, typer.Argument(help="System spec (YAML).", show_default=False)]
-OutputOption = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--output",
-        "-o",
-        metavar="FORMAT:PATH",
-        help="Write the result too; repeatable; `-` is standard output.",
-    ),
-]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of every random number.")]
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No text, only the exit code.")]
 MethodOption = Annotated[str, typer.Option(help="auto, front, milp or enumerate.")]
 TimeLimitOption = Annotated[
     float | None, typer.Option(min=0.0, help="Seconds for the choice; beyond: no verdict.")
 ]
+
+
+def output_option(formats: tuple[str, ...]) -> Any:
+    """`--output` of a command, its help naming the formats that it knows."""
+    return typer.Option(
+        "--output",
+        "-o",
+        metavar="FORMAT:PATH",
+        help=f"Write the result too; formats: {', '.join(formats)}; repeatable; path `-` is "
+        "standard output.",
+    )
+
+
+CheckOutput = Annotated[list[str] | None, output_option(formats.CHECK_FORMATS)]
+OptimizeOutput = Annotated[list[str] | None, output_option(formats.OPTIMIZE_FORMATS)]
+SimulateOutput = Annotated[list[str] | None, output_option(formats.SIMULATE_FORMATS)]
+DiagnoseOutput = Annotated[list[str] | None, output_option(formats.DIAGNOSE_FORMATS)]
+StudyOutput = Annotated[list[str] | None, output_option(formats.STUDY_FORMATS)]
+DiffOutput = Annotated[list[str] | None, output_option(formats.DIFF_FORMATS)]
+ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FORMATS)]
 
 
 def refuse(message: str, code: int = BAD_INPUT) -> NoReturn:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, Final
+from typing import Any
 
-CHECK_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown", "csv")
+from syncline_design.report.formats import CHECK_FORMATS as CHECK_FORMATS
 
 
 def render_checks(name: str, verdicts: Sequence[dict[str, Any]]) -> str:

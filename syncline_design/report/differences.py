@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any, Final
+from typing import Any
 
 from syncline_design.report import numbers
+from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.text import markdown_safe, sentence_list, visible
 from syncline_design.report.verdict_words import OUTCOMES, Json, items, part
-
-DIFF_FORMATS: Final = ("json", "markdown", "github")
 
 
 def render_diff(name: str, data: Json) -> str:
@@ -19,6 +18,10 @@ def render_diff(name: str, data: Json) -> str:
             from syncline_design.report.json_out import json_text
 
             return json_text(data)
+        case "html":
+            from syncline_design.report.difference_page import render_difference
+
+            return render_difference(data)
         case "markdown":
             return _markdown(data)
         case "github":
@@ -33,7 +36,7 @@ def render_diff(name: str, data: Json) -> str:
 
 def headline(data: Json) -> str:
     """`stages[uav].distance 100 m to 60 m: payload changes, -26 500 EUR, still meets.`"""
-    causes = [_cause_words(cause) for cause in items(data, "causes")]
+    causes = [cause_words(cause) for cause in items(data, "causes")]
     if not causes:
         lead = "Nothing in the files differs"
     elif len(causes) <= 3:
@@ -49,7 +52,7 @@ def effect_words(data: Json) -> str:
     cost = next((s for s in items(data, "sums") if s.get("name") == "cost"), {})
     change = numbers.finite(cost.get("change"))
     if change:
-        parts.append(signed_money(change, str(data.get("currency"))))
+        parts.append(signed_change(change, str(data.get("currency"))))
     error = numbers.finite(part(data, "error").get("change"))
     if error and abs(error) > 1e-12:
         word = "larger" if error > 0 else "smaller"
@@ -77,13 +80,13 @@ def _verdict_words(verdict: Json) -> str:
     return f"now {words.get(new, new)} (before: {words.get(old, old)})"
 
 
-def signed_money(change: float, currency: str) -> str:
-    """`+1 900 EUR` or `-300 EUR`, the sign typeset."""
-    sign = "+" if change > 0 else "\N{MINUS SIGN}"
-    return sign + numbers.money(abs(change), currency)
+def signed_change(change: float, unit: str) -> str:
+    """`+1 900 EUR` or `-12 mm`, the sign typeset; 0 has none."""
+    sign = "" if change == 0 else "+" if change > 0 else "\N{MINUS SIGN}"
+    return sign + numbers.in_unit(abs(change), unit)
 
 
-def _cause_words(cause: Json) -> str:
+def cause_words(cause: Json) -> str:
     key, old, new = cause.get("key"), cause.get("old"), cause.get("new")
     if old is None:
         return f"{key} added ({new})"
@@ -124,16 +127,16 @@ def _causes(data: Json) -> Iterator[str]:
     for cause in items(data, "causes"):
         effect = part(cause, "effect")
         alone = f"; alone: {effect_words(effect)}" if effect else ""
-        yield _cause_words(cause) + alone
+        yield cause_words(cause) + alone
 
 
 def _payload(data: Json) -> Iterator[str]:
     for entry in items(data, "payload"):
-        old, new = _pick(part(entry, "old")), _pick(part(entry, "new"))
+        old, new = pick_words(part(entry, "old")), pick_words(part(entry, "new"))
         yield f"{entry.get('role')}: {old} to {new}"
 
 
-def _pick(entry: Json) -> str:
+def pick_words(entry: Json) -> str:
     if not entry:
         return "nothing"
     name = entry.get("name") or entry.get("sensor")
@@ -145,8 +148,13 @@ def _sums(data: Json) -> Iterator[str]:
         old, new = entry.get("old"), entry.get("new")
         if old != new:
             unit = str(entry.get("unit"))
-            name = "worst-case error" if entry.get("name") == "error" else entry.get("name")
-            yield f"{name}: {numbers.in_unit(old, unit)} to {numbers.in_unit(new, unit)}"
+            yield f"{sum_name(entry)}: {numbers.in_unit(old, unit)} to {numbers.in_unit(new, unit)}"
+
+
+def sum_name(entry: Json) -> str:
+    """The word for one of the sums."""
+    name = str(entry.get("name"))
+    return "worst-case error" if name == "error" else name
 
 
 def _margins(data: Json) -> Iterator[str]:

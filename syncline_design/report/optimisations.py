@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from syncline_design.optimisation import Optimisation, optimisation_csv, optimisation_json
+from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 
-OPTIMIZE_FORMATS: Final = ("json", "html", "csv")
 _HINGES: Final = ("staircase", "slack", "tolerances", "measure_next")
 
 

@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Final
-
+from syncline_design.report.formats import SIMULATE_FORMATS as SIMULATE_FORMATS
 from syncline_design.simulate.summary import grid_csv
 from syncline_design.simulated_spec import SimulatedSpec
-
-SIMULATE_FORMATS: Final = ("json", "html", "csv")
 
 
 def render_simulate(name: str, run: SimulatedSpec) -> str:

@@ -2,13 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Final
-
+from syncline_design.report.formats import STUDY_FORMATS as STUDY_FORMATS
 from syncline_design.study.result import StudyResult
-
-STUDY_FORMATS: Final = (
-    "csv", "parquet", "json", "html", "junit", "sarif", "github", "markdown",
-)  # fmt: skip
 
 
 def render_study(name: str, result: StudyResult) -> str | bytes:

@@ -31,9 +31,9 @@ _VERDICT_WORDS = {
     "indeterminate": "got no verdict",
 }
 _WHEN = {
-    "all": "every case has to meet its requirements",
-    "any": "one case has to meet its requirements",
-    "decided": "every case has to get an answer",
+    "all": "every case meets its requirements",
+    "any": "at least one case meets its requirements",
+    "decided": "every case gets an answer",
 }
 
 

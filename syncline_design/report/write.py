@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from syncline_design.report.formats import NOT_FOR_A_TERMINAL
 from syncline_design.result_files import OutputError, descriptor_of, is_stream, write_files
 
 __all__ = [
@@ -18,6 +19,8 @@ __all__ = [
 ]  # fmt: skip
 
 STDOUT: Final = "-"
+_KINDS: Final = {"html": "page of HTML", "parquet": "binary table"}
+_EXAMPLES: Final = {"html": "report.html", "parquet": "cases.parquet"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +34,8 @@ class Target:
 def parse_target(argument: str, known: Sequence[str]) -> Target:
     """`html:out/report.html` -> Target; OutputError for an unknown format or an empty path.
 
-    A bare format means standard output, as in `--output json`.
+    A bare format means standard output, as in `--output json`; pages and binary tables want a
+    path (or `-`, said on purpose), since they are of no use on a terminal.
     """
     name, separator, path = argument.partition(":")
     if name not in known:
@@ -43,6 +47,11 @@ def parse_target(argument: str, known: Sequence[str]) -> Target:
         raise OutputError(
             f"--output {argument}: no path after the colon; expected {name}:PATH, or {name}:- "
             "for standard output"
+        )
+    if not separator and name in NOT_FOR_A_TERMINAL:
+        raise OutputError(
+            f"--output {argument}: a {_KINDS[name]} would flood a terminal; give it a path, as in "
+            f"--output {name}:{_EXAMPLES[name]}, or say {name}:- for standard output"
         )
     return Target(name, STDOUT if not separator or descriptor_of(path) == 1 else path)
 

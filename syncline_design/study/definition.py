@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from syncline_design.values import (
     AtLeastOne,
@@ -35,7 +35,41 @@ def _read_mapping(value: Any) -> Any:
     return value
 
 
-Varied = Annotated[dict[str, Any], BeforeValidator(_read_mapping)]
+_END: dict[str, Any] = {"type": ["number", "string"]}
+_RANGE: dict[str, Any] = {
+    "type": "object",
+    "properties": {"low": _END, "high": _END, "scale": {"enum": ["linear", "log"]}},
+    "required": ["low", "high"],
+    "additionalProperties": False,
+}
+_COUNTED: dict[str, Any] = {
+    **_RANGE,
+    "properties": {
+        **_RANGE["properties"],
+        "count": {"type": "integer", "minimum": 2, "maximum": 100_000},
+    },
+    "required": ["low", "high", "count"],
+}
+_LISTED: dict[str, Any] = {"type": "array", "minItems": 1}
+_SPAN: dict[str, Any] = {"type": "string", "pattern": r" \.\. "}
+
+
+def _mapping_of(*shapes: dict[str, Any]) -> WithJsonSchema:
+    """The JSON Schema of a mapping from key paths to values of these shapes."""
+    entry = {"anyOf": list(shapes)}
+    return WithJsonSchema({"type": "object", "minProperties": 1, "additionalProperties": entry})
+
+
+_BASE_SCHEMA: dict[str, Any] = {
+    "anyOf": [
+        {"type": "string", "minLength": 1},
+        {"type": "array", "minItems": 1, "items": {"type": "string", "minLength": 1}},
+    ]
+}
+Grid = Annotated[dict[str, Any], BeforeValidator(_read_mapping), _mapping_of(_LISTED, _COUNTED)]
+Over = Annotated[
+    dict[str, Any], BeforeValidator(_read_mapping), _mapping_of(_LISTED, _RANGE, _SPAN)
+]
 
 
 class SampleChoice(Record):
@@ -44,7 +78,7 @@ class SampleChoice(Record):
     method: Literal["latin_hypercube"] = "latin_hypercube"
     count: Annotated[int, Field(ge=1, le=MAX_CASES)]
     seed: Annotated[int, Field(ge=0)] = 0
-    over: Varied
+    over: Over
 
 
 class CheckChoice(Record):
@@ -71,8 +105,10 @@ class StudyFile(Record):
     study: Literal[1]
     name: Text
     note: str = ""
-    base: Annotated[tuple[Text, ...], AtLeastOne, BeforeValidator(_read_base)]
-    grid: Varied | None = None
+    base: Annotated[
+        tuple[Text, ...], AtLeastOne, BeforeValidator(_read_base), WithJsonSchema(_BASE_SCHEMA)
+    ]
+    grid: Grid | None = None
     sample: SampleChoice | None = None
     check: CheckChoice = Field(default_factory=CheckChoice)
     heat_map: HeatMapChoice | None = None

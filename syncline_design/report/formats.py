@@ -1,0 +1,18 @@
+"""Which output formats each command knows; nothing is imported here, so that help stays quick."""
+
+from __future__ import annotations
+
+from typing import Final
+
+CHECK_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown", "csv")
+OPTIMIZE_FORMATS: Final = ("json", "html", "csv")
+SIMULATE_FORMATS: Final = ("json", "html", "csv")
+DIAGNOSE_FORMATS: Final = ("json", "html", "markdown")
+STUDY_FORMATS: Final = (
+    "csv", "parquet", "json", "html", "junit", "sarif", "github", "markdown",
+)  # fmt: skip
+DIFF_FORMATS: Final = ("json", "html", "markdown", "github")
+REPRODUCE_FORMATS: Final = ("json", "html")
+
+# Pages and binary tables are for files; a bare format name does not send them to a terminal.
+NOT_FOR_A_TERMINAL: Final = ("html", "parquet")

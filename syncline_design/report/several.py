@@ -1,0 +1,33 @@
+"""Several verdicts in a line, and the files that were passed over on the way to them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+
+from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.verdict_words import Json
+from syncline_design.spec_folders import Skipped
+
+_WORDS = {
+    "meets": ("meets its requirements", "meet their requirements"),
+    "fails": ("does not meet them", "do not meet them"),
+    "infeasible": ("is infeasible", "are infeasible"),
+    "indeterminate": ("has no verdict", "have no verdict"),
+    "refused": ("is refused", "are refused"),
+}
+
+
+def summary_line(verdicts: Sequence[Json]) -> str:
+    """`5 specs: 3 meet their requirements, 1 is infeasible and 1 is refused.`"""
+    if not verdicts:
+        return "No spec to check."
+    counts = Counter(str(verdict.get("verdict")) for verdict in verdicts)
+    parts = [f"{counts[word]} {_WORDS[word][counts[word] > 1]}" for word in _WORDS if counts[word]]
+    many = "spec" if len(verdicts) == 1 else "specs"
+    return f"{len(verdicts)} {many}: {sentence_list(parts)}."
+
+
+def skipped_text(skipped: Sequence[Skipped]) -> str:
+    """One line per file that is no spec, and what it is."""
+    return "\n".join(f"skipped, no spec: {visible(one.file)} ({one.what})" for one in skipped)

@@ -1,0 +1,123 @@
+"""What every command promises of `--output`, `--seed` and `--help`."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+TRACK, USV = "specs/position_track.yaml", "specs/usv_mapping.yaml"
+# command -> arguments that make it run, and the formats that its page in docs/ promises
+COMMANDS = {
+    "check": ([TRACK], {"json", "html", "junit", "sarif", "github", "markdown", "csv"}),
+    "optimize": ([TRACK], {"json", "html", "csv"}),
+    "simulate": ([TRACK, "--samples", "500"], {"json", "html", "csv"}),
+    "diagnose": ([TRACK, "x.csv"], {"json", "html", "markdown"}),
+    "study": (["specs/studies/usv_speed.yaml"], {"csv", "parquet", "json", "html", "junit",
+                                                 "sarif", "github", "markdown"}),
+    "diff": ([TRACK, TRACK], {"json", "html", "markdown", "github"}),
+    "reproduce": ([], {"json", "html"}),
+}  # fmt: skip
+
+
+def run(*arguments: str) -> subprocess.CompletedProcess[str]:
+    environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200", "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        [sys.executable, "-m", "syncline_design.cli", *arguments],
+        cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_names_the_formats_and_the_options_of_every_command(command: str) -> None:
+    help_text = run(command, "--help").stdout
+    for option in ("--output", "--seed", "--quiet"):
+        assert option in help_text
+    listed = re.search(r"formats: ([a-z, ]+);", help_text)
+    assert listed is not None, help_text
+    assert set(listed[1].split(", ")) == COMMANDS[command][1]
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_page_without_a_path_is_refused_before_anything_is_computed(command: str) -> None:
+    done = run(command, *COMMANDS[command][0], "-o", "html")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "html:report.html" in done.stderr
+    assert "html:-" in done.stderr
+
+
+def test_text_formats_without_a_path_still_go_to_standard_output() -> None:
+    done = run("check", TRACK, "-o", "json")
+    assert done.returncode == 0
+    assert json.loads(done.stdout)["verdict"] == "meets"
+    table = run("study", "specs/studies/usv_speed.yaml", "-o", "parquet")
+    assert table.returncode == 2
+    assert "parquet:cases.parquet" in table.stderr
+
+
+class Rows(HTMLParser):
+    """The cells of every table row of a page, as text."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.rows: list[list[str]] = []
+        self.open = False
+
+    def handle_starttag(self, tag: str, _: object) -> None:
+        if tag == "tr":
+            self.rows.append([])
+        elif tag in ("td", "th") and self.rows:
+            self.rows[-1].append("")
+            self.open = True
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag in ("td", "th"):
+            self.open = False
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.rows and self.rows[-1]:
+            self.rows[-1][-1] += data
+
+
+def test_the_page_of_a_difference_says_what_its_data_say(tmp_path: Path) -> None:
+    page, data = tmp_path / "d.html", tmp_path / "d.json"
+    done = run("diff", USV, TRACK, "-o", f"html:{page}", "-o", f"json:{data}")
+    told = json.loads(data.read_text("utf-8"))
+    assert done.returncode == told["exit_code"] == 0
+    text = page.read_text("utf-8")
+    rows = Rows()
+    rows.feed(text)
+    cells = {row[0].strip(): [" ".join(cell.split()) for cell in row] for row in rows.rows if row}
+    assert "default-src 'none'" in text.replace("&#39;", "'")
+    cost = next(entry for entry in told["sums"] if entry["name"] == "cost")
+    figures = [float(re.sub(r"[^\d.]", "", c.replace("EUR", ""))) for c in cells["cost"][1:]]
+    assert figures == pytest.approx([cost["old"], cost["new"], abs(cost["change"])], abs=0.006)
+    assert cells["cost"][3].startswith("\u2212")
+    for entry in told["payload"]:
+        assert entry["role"] in cells
+    assert {entry["id"] for entry in told["requirements"]} <= set(cells)
+
+
+def test_reproduce_takes_a_seed_and_says_it() -> None:
+    runs = [json.loads(run("reproduce", "--seed", seed, "-o", "json:-").stdout) for seed in "07"]
+    assert [one["seed"] for one in runs] == [0, 7]
+    assert runs[0]["cells"] == runs[1]["cells"]  # printed figures know no chance
+    worst = [
+        [point["worst_case_m"] for figure in one["figures"] for point in figure["simulated"]]
+        for one in runs
+    ]
+    assert worst[0] == pytest.approx(worst[1], rel=1e-3)
+
+
+def test_no_page_installs_from_an_index_that_does_not_have_it() -> None:
+    for page in [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]:
+        for line in page.read_text("utf-8").splitlines():
+            if "pip install" in line:
+                assert re.search(r"install (--\S+ |-\S+ )*['\"]?(\.|git\+)", line), (page, line)
