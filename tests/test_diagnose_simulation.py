@@ -23,7 +23,7 @@ from syncline_design.spec_writer import with_effects_text, write_spec
 from tests.world import SILENT, Hidden, WorldLog, hidden, make_log, scenario
 
 LEFT = 0.03  # share of the effect's error that second-order terms and splines may leave
-LAG_LEFT = 0.06  # the lag's series is cut after its second term
+LAG_LEFT = 0.06  # the lag is exact for a steady turn and acceleration only
 
 CASES: tuple[tuple[str, str, dict[str, float]], ...] = (
     ("latency", "position", {"latency_s": 0.12}),

@@ -1,4 +1,4 @@
-"""The ranging sensor's mount bends under acceleration."""
+"""The ranging sensor's mount bends under its load: acceleration and gravity."""
 
 from __future__ import annotations
 
@@ -20,23 +20,40 @@ from syncline_design.effects.base import (
 )
 from syncline_design.model.system import Stage
 
+GRAVITY_MPS2 = 9.80665
+
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
-    """true lever arm = spec + (x a_x, y a_y, z a_z) [m], body."""
+    """true lever arm = spec + (x f_x, y f_y, z f_z) [m], body, f the specific force."""
     bend = np.array([values["x"], values["y"], values["z"]])
-    return Departures(ranging_m=bend * rows.acceleration_mps2)
+    return Departures(ranging_m=bend * _specific_force(rows))
+
+
+def _specific_force(rows: StageRows) -> Array:
+    """f = a - g [m/s2], body, (n, 3): what an accelerometer feels and what loads the mount.
+
+    At rest and level f = (0, 0, -9.81): the spec's arm is that of the unloaded mount.
+    """
+    down = GRAVITY_MPS2 * rows.rotation[:, 2, :]  # R' (0, 0, g)
+    force: Array = rows.acceleration_mps2 - down
+    return force
 
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
-    """d error / d C_k = -R e_k a_k [m/s2]; (n, 3, 3)."""
-    return -rows.rotation * rows.acceleration_mps2[:, None, :]
+    """d error / d C_k = -R e_k f_k [m/s2]; (n, 3, 3)."""
+    return -rows.rotation * _specific_force(rows)[:, None, :]
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
-    """|C| v omega: the bend in the platform's hardest turn."""
-    bend = math.hypot(values["x"], values["y"], values["z"])
+    """The sag of the tilt at which it is largest, and the bend of the platform's hardest turn.
+
+    g sqrt((z cos t)^2 + (max(x, y) sin t)^2), t up to the horizon's tilt, + max(x, y, z) v omega.
+    """
+    across, along = max(abs(values["x"]), abs(values["y"])), abs(values["z"])
+    tilt = min(basis.horizon.tilt_rad, 0.5 * math.pi) if across > along else 0.0
+    sag = GRAVITY_MPS2 * math.hypot(along * math.cos(tilt), across * math.sin(tilt))
     turn = stage.platform.v_max_mps * stage.platform.omega_max_radps
-    return Contribution(systematic_m=bend * turn)
+    return Contribution(systematic_m=sag + max(across, along) * turn)
 
 
 EFFECT = Effect(
@@ -45,9 +62,9 @@ EFFECT = Effect(
     kind="deterministic",
     parameters=tuple(Parameter(axis, 1e-5, 0.5, "m/(m/s2)") for axis in "xyz"),
     sentence="the ranging sensor's mount bends by {x}, {y}, {z} forward, right, down",
-    confused_with="filter_lag, acceleration_tilt",
-    separated_by="accelerations along each axis at different ranges",
-    source="linear elasticity: displacement proportional to acceleration, per axis",
+    confused_with="filter_lag, acceleration_tilt; lever_arm (level at constant speed)",
+    separated_by="accelerations along each axis and tilts, at different ranges",
+    source="linear elasticity: displacement proportional to the specific force a - g, per axis",
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,

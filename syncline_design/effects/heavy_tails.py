@@ -19,26 +19,34 @@ from syncline_design.effects.base import (
 )
 from syncline_design.model.system import Stage
 
-OUTLIER_FACTOR = 10.0  # an outlier's standard deviation over the others'
+OUTLIER_FACTOR = 10.0  # an outlier's standard deviation over the spec's
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
-    """Noise times sqrt(nu / chi2_nu) per row, and ten times that in a share of the rows."""
+    """Noise times sqrt(nu / chi2_nu) per row; a share of the rows are outliers instead.
+
+    An outlier is normal with ten times the spec's standard deviation: Student's tails and outliers
+    are two parts of a mixture, no row is struck by both.
+    """
     if rng is None:
         return Departures()
     freedom = values["degrees_of_freedom"]
     factor = np.sqrt(freedom / rng.chisquare(freedom, len(rows)))
     struck = rng.random(len(rows)) < values["outlier_rate"]
-    return Departures(position_noise=factor * np.where(struck, OUTLIER_FACTOR, 1.0) - 1.0)
+    return Departures(position_noise=np.where(struck, OUTLIER_FACTOR, factor) - 1.0)
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
-    """What the standard deviation grows by: sqrt(nu / (nu - 2) (1 + 99 rate)) - 1 times sigma_p."""
+    """What the standard deviation of the mixture grows by, times sigma_p.
+
+    Var = (1 - rate) nu / (nu - 2) + rate 100, over the spec's variance.
+    """
     if stage.position is None:
         return Contribution()
     freedom = max(values["degrees_of_freedom"], LEAST_FREEDOM)
-    outliers = 1.0 + (OUTLIER_FACTOR**2 - 1.0) * values["outlier_rate"]
-    growth = math.sqrt(freedom / (freedom - 2.0) * outliers) - 1.0
+    rate = values["outlier_rate"]
+    variance = (1.0 - rate) * freedom / (freedom - 2.0) + rate * OUTLIER_FACTOR**2
+    growth = math.sqrt(variance) - 1.0
     return Contribution(systematic_m=growth * math.hypot(*stage.position.sigma))
 
 

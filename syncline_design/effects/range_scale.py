@@ -39,7 +39,7 @@ EFFECT = Effect(
     kind="deterministic",
     parameters=(Parameter("scale", 1e-6, 0.2),),
     sentence="ranges are too long by a share of {scale}",
-    confused_with="range_bias; sound_speed, which is the same to any log",
+    confused_with="range_bias; sound_speed, straight below the array",
     separated_by="a spread of ranges",
     source="paper, eq. bear_posvec; measured = true (1 + scale)",
     depart=_depart,

@@ -31,11 +31,9 @@ def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
-    """tau grows by k std, k = 3 as in a normal error's bound."""
-    return Contribution(tau_s=COVERAGE_FACTOR * abs(values["std_s"]))
+    """tau grows by k std, k the coverage factor of every normal timing error's bound."""
+    return Contribution(tau_s=basis.coverage_factor * abs(values["std_s"]))
 
-
-COVERAGE_FACTOR = 3.0
 
 EFFECT = Effect(
     name="timestamp_jitter",

@@ -119,9 +119,10 @@ def _range_scale(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) ->
 
 
 def _sound_speed(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:
-    """The processing's sound speed is too high by a share; the travel time is what was measured."""
-    used = SOUND_MPS * (1.0 + effect.number("relative_error"))
-    faults.range_added.append(lambda t, r: used * (r / SOUND_MPS) - r)
+    """The processing's sound speed is too high by a share; times and delays are as measured."""
+    used = 1.0 + effect.number("relative_error")
+    faults.range_added.append(lambda t, r: used * SOUND_MPS * (r / SOUND_MPS) - r)
+    faults.sound_used *= used
 
 
 def _turnaround(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:

@@ -45,6 +45,7 @@ class Faults:
     scan_period_s: float = 0.0
     yaw_added: list[PerRow] = field(default_factory=list)  # channel: true yaw
     range_added: list[PerRow] = field(default_factory=list)  # channel: true range
+    sound_used: float = 1.0  # the processing's sound speed over the water's
     azimuth_bias_rad: float = 0.0
     elevation_bias_rad: float = 0.0
     target_listed: list[Callable[[Array], Array]] = field(default_factory=list)
