@@ -10,11 +10,14 @@ from scipy.stats import chi2, multivariate_normal
 from syncline_design.diagnose.covariance import factored, inverse_3x3
 from syncline_design.diagnose.gross import whole_seconds
 from syncline_design.diagnose.noise import (
+    Directed,
+    NoiseLevel,
     Slow,
     Structure,
     White,
     first_guess,
     fit_noise,
+    marginal_variance,
     precision,
     spec_bounds,
 )
@@ -68,6 +71,69 @@ def test_the_slow_part_is_the_conditional_mean() -> None:
     expected = slow_only @ np.linalg.solve(dense(*example()), error.ravel())
     found = factored(white, loading, time_s, constants).slow_part(error)
     assert found.ravel() == pytest.approx(expected, abs=1e-9)
+
+
+def common_noise(time_s: Array, own: Array, common: Array, slow: Array, last_s: float) -> Array:
+    """Covariance (3 n, 3 n) of rows that share stamps, written out pair by pair.
+
+    own (n, 3, 3): a row's own; common (n, 3, k): one draw a stamp; slow (n, 3, m): Gauss-Markov.
+    """
+    n = len(time_s)
+    total = np.zeros((n, 3, n, 3))
+    for i in range(n):
+        total[i, :, i, :] += own[i]
+        for j in range(n):
+            if time_s[i] == time_s[j]:
+                total[i, :, j, :] += common[i] @ common[j].T
+            decay = np.exp(-abs(time_s[i] - time_s[j]) / last_s)
+            total[i, :, j, :] += decay * slow[i] @ slow[j].T
+    return total.reshape(3 * n, 3 * n)
+
+
+STAMPS = (
+    (0.0, 0.0, 0.0, 0.1, 0.3, 0.3, 5.0, 9.0, 9.0, 9.0, 9.0),
+    (0.0, 1.0, 1.0),
+    (2.0, 2.0),
+    (0.0, 0.5, 1.0, 1.5),
+)
+
+
+@pytest.mark.parametrize("stamps", STAMPS, ids=len)
+def test_rows_of_one_stamp_share_the_vehicle_s_noise(stamps: tuple[float, ...]) -> None:
+    """Position, attitude and timing scatter are one draw a stamp, ranging one a row."""
+    rng, time_s, n = np.random.default_rng(6), np.array(stamps), len(stamps)
+    roots = [rng.standard_normal((n, 3, 3)) for _ in range(3)]
+    timing, direction = rng.standard_normal((n, 3, 1)), rng.standard_normal((n, 3, 1))
+    squares = [root @ np.swapaxes(root, 1, 2) for root in roots]
+    parts = Structure(
+        time_s,
+        tuple(
+            White(("uav", role), square, None if role == "ranging" else root)
+            for role, square, root in zip(
+                ("position", "attitude", "ranging"), squares, roots, strict=True
+            )
+        ),
+        (Slow(("uav", "position"), roots[0], True),),
+        0.01 * np.broadcast_to(np.eye(3), (n, 3, 3)),
+        (Directed("timestamp_jitter/attitude/0", direction),),
+        timing,
+    )
+    level = NoiseLevel((0.8, 1.1, 0.9), ((0.5, 0.4, 0.3),), ((3.0, 3.0, 3.0),), (0.7,))
+    full = common_noise(
+        time_s,
+        0.01 * np.eye(3) + 0.9**2 * squares[2],
+        np.concatenate([0.8 * roots[0], 1.1 * roots[1], timing, 0.7 * direction], axis=2),
+        1.0 * roots[0] * np.sqrt([0.5, 0.4, 0.3]),
+        3.0,
+    )
+    known, series = precision(parts, level), rng.standard_normal((n, 3, 4))
+    expected = np.linalg.solve(full, series.reshape(3 * n, 4)).reshape(n, 3, 4)
+    assert known.solve(series) == pytest.approx(expected, rel=1e-8, abs=1e-9)
+    error = series[:, :, 0]
+    density = multivariate_normal(np.zeros(3 * n), full).logpdf(error.ravel())
+    assert known.negative_log_likelihood(error) == pytest.approx(-density, rel=1e-10)
+    own = [full.reshape(n, 3, n, 3)[i, :, i, :].diagonal() for i in range(n)]
+    assert marginal_variance(parts, level) == pytest.approx(np.array(own))
 
 
 def test_cofactors_invert() -> None:

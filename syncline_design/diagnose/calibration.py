@@ -15,7 +15,15 @@ import numpy as np
 
 from syncline_design.diagnose.candidates import Signature, slopes
 from syncline_design.diagnose.fitting import Data, Model, inner, solve_scaled
-from syncline_design.diagnose.noise import fit_noise, loadings, precision, white_covariance
+from syncline_design.diagnose.noise import (
+    common_loading,
+    fit_noise,
+    loadings,
+    precision,
+    row_covariance,
+    white_covariance,
+)
+from syncline_design.diagnose.stamps import groups
 from syncline_design.effects.base import Array
 from syncline_design.effects.kinematics import gauss_markov
 
@@ -30,12 +38,19 @@ Gains = Callable[[Model], list[float]]
 def clean_errors(data: Data, model: Model, rng: np.random.Generator, count: int) -> Array:
     """Errors of clean logs drawn from the fitted noise, (count, n, 3) [m]."""
     n = len(data.view)
-    lower = np.linalg.cholesky(white_covariance(data.structure, model.level))
+    structure, level = data.structure, model.level
+    white = row_covariance if structure.shared else white_covariance
+    lower = np.linalg.cholesky(white(structure, level))
     draws = np.einsum("nij,bnj->bni", lower, rng.standard_normal((count, n, 3)))
-    loading, times = loadings(data.structure, model.level)
+    loading, times = loadings(structure, level)
     for k, time_s in enumerate(times):
-        walk = gauss_markov(data.view.log.time_s, float(time_s), rng.standard_normal((n, count)))
+        walk = gauss_markov(structure.time_s, float(time_s), rng.standard_normal((n, count)))
         draws += walk.T[:, :, None] * loading[None, :, :, k]
+    if structure.shared:
+        common, group = common_loading(structure, level), groups(structure.time_s)
+        for k in range(common.shape[2]):
+            drawn = rng.standard_normal((count, int(group[-1]) + 1))[:, group]
+            draws += drawn[:, :, None] * common[None, :, :, k]
     return np.asarray(draws)
 
 

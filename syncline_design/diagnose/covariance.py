@@ -5,7 +5,9 @@ unit-variance first-order Gauss-Markov processes, B (n, 3, m) their loadings.  T
 processes is banded, so by the matrix inversion lemma
     C^-1 = Sigma^-1 - Sigma^-1 B P^-1 B' Sigma^-1,   P = K^-1 + B' Sigma^-1 B  (banded),
     log|C| = log|Sigma| + log|P| - log|K^-1|.
-Uneven stamps and gaps need no care: correlation over dt is exp(-dt / T).
+Uneven stamps and gaps need no care: correlation over dt is exp(-dt / T).  Rows of one stamp share
+its states, so B' Sigma^-1 B is summed over them; T = 0 is noise that is new at every stamp and
+common to its rows.
 Source: Rue and Held, Gaussian Markov Random Fields (2005), ch. 2; Woodbury's identity.
 """
 
@@ -15,8 +17,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
+from syncline_design.diagnose.stamps import Index, groups, repeated, starts, summed
 from syncline_design.effects.base import Array
 
 _LEAST_STEP = 1e-9  # least dt / T: keeps 1 - phi^2 above rounding
@@ -40,32 +44,36 @@ class Precision:
 
     white_inverse: Array  # (n, 3, 3) Sigma^-1
     loading: Array  # (n, 3, m) B
-    factor: Array  # (m + 1, n m) banded Cholesky factor of P, lower form
+    factor: Array  # (m + 1, k m) banded Cholesky factor of P over k stamps, lower form
     log_determinant: float
+    slow: NDArray[np.bool_]  # (m,) which processes last from stamp to stamp
+    first: Index | None = None  # first row of every stamp, where rows share stamps
+    group: Index | None = None  # (n,) the stamp of every row
 
     def solve(self, series: Array) -> Array:
         """C^-1 Y, Y (n, 3, c)."""
-        n, _, m = self.loading.shape
         weighted: Array = self.white_inverse @ series
-        if m == 0:
+        if self.loading.shape[2] == 0:
             return weighted
-        states = self._states(weighted)
-        inside: Array = self.loading @ states.reshape(n, m, -1)
+        inside: Array = self.loading @ self._states(weighted)
         return weighted - self.white_inverse @ inside
 
     def _states(self, weighted: Array) -> Array:
-        n, _, m = self.loading.shape
+        """P^-1 B' Sigma^-1 Y at every row, (n, m, c)."""
+        m, c = self.loading.shape[2], weighted.shape[2]
         right = np.swapaxes(self.loading, 1, 2) @ weighted
-        states: Array = cho_solve_banded((self.factor, True), right.reshape(n * m, -1))
-        return states
+        if self.first is not None:
+            right = summed(self.first, right)
+        states: Array = cho_solve_banded((self.factor, True), right.reshape(-1, c))
+        states = states.reshape(-1, m, c)
+        return states if self.group is None else states[self.group]
 
     def slow_part(self, error: Array) -> Array:
-        """B x, x the posterior mean of the processes given the series (n, 3); (n, 3)."""
-        n, _, m = self.loading.shape
-        if m == 0:
+        """B x of the lasting processes, x their posterior mean given the series (n, 3); (n, 3)."""
+        if not np.any(self.slow):
             return np.zeros_like(error)
         states = self._states(self.white_inverse @ error[:, :, None])
-        slow: Array = (self.loading @ states.reshape(n, m, 1))[:, :, 0]
+        slow: Array = (self.loading[:, :, self.slow] @ states[:, self.slow])[:, :, 0]
         return slow
 
     def negative_log_likelihood(self, error: Array) -> float:
@@ -75,16 +83,21 @@ class Precision:
 
 
 def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array) -> Precision:
-    """Factor C for white (n, 3, 3), loading (n, 3, m) with std in it, T (m,) [s]."""
+    """Factor C for white (n, 3, 3), loading (n, 3, m) with std in it, T (m,) [s], 0 for none."""
     inverse, determinant = inverse_3x3(white)
     if np.any(~(determinant > 0.0)):
         raise LinAlgError("covariance of a row is not positive definite")
     log_det = float(np.sum(np.log(determinant)))
     m = loading.shape[2]
+    slow = time_constant_s > 0.0
     if m == 0:
-        return Precision(inverse, loading, np.zeros((1, 0)), log_det)
-    band, log_prior = _markov_precision(time_s, time_constant_s)
+        return Precision(inverse, loading, np.zeros((1, 0)), log_det, slow)
     inner = np.swapaxes(loading, 1, 2) @ inverse @ loading
+    first = group = None
+    if repeated(time_s):
+        first, group = starts(time_s), groups(time_s)
+        time_s, inner = time_s[first], summed(first, inner)
+    band, log_prior = _markov_precision(time_s, time_constant_s)
     for k in range(m):
         # column j of the lower band holds A[j + k, j]; inside a block only while j % m + k < m
         diagonal = np.zeros((inner.shape[0], m))
@@ -92,7 +105,7 @@ def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array
         band[k] += diagonal.ravel()
     factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
     log_det += 2.0 * float(np.sum(np.log(factor[0]))) - log_prior
-    return Precision(inverse, loading, factor, log_det)
+    return Precision(inverse, loading, factor, log_det, slow, first, group)
 
 
 def _markov_precision(time_s: Array, time_constant_s: Array) -> tuple[Array, float]:
@@ -102,7 +115,8 @@ def _markov_precision(time_s: Array, time_constant_s: Array) -> tuple[Array, flo
     g_{i-1} + phi_i^2 g_i (1 + phi_0^2 g_0 at the start) and the off-diagonal -phi_i g_i.
     """
     n, m = time_s.shape[0], time_constant_s.shape[0]
-    ratio = np.maximum(np.diff(time_s)[:, None] / time_constant_s, _LEAST_STEP)
+    with np.errstate(divide="ignore"):
+        ratio = np.maximum(np.diff(time_s)[:, None] / time_constant_s, _LEAST_STEP)
     fresh = -np.expm1(-2.0 * ratio)  # 1 - phi^2
     phi = np.exp(-ratio)
     band = np.zeros((m + 1, n * m))

@@ -27,8 +27,9 @@ def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
     """White and slow noise of every sensor, and the scatter of the spec's own timing errors."""
     white: list[White] = []
     slow: list[Slow] = []
-    fixed = np.zeros((len(view), 3, 3))
-    fixed += FLOOR_M**2 * np.eye(3)
+    fixed = FLOOR_M**2 * np.eye(3) + _unknown(view)
+    stamped: list[Array] = []
+    last = len(view.system.stages) - 1
     for index, stage in enumerate(view.system.stages):
         rows = view.rows[index]
         parts = {
@@ -40,13 +41,15 @@ def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
             if sensor is None or (role != "position" and view.log.kind == "position"):
                 continue
             loading = slopes * np.array(sensor.sigma)
-            white.append(White((stage.name, role), loading @ np.swapaxes(loading, 1, 2)))
-            fixed += _timing_scatter(rows, role, sensor)
+            own = role == "ranging" and index == last  # each target is a reading of its own
+            covariance = loading @ np.swapaxes(loading, 1, 2)
+            white.append(White((stage.name, role), covariance, None if own else loading))
+            stamped += _timing_scatter(rows, role, sensor)
             if role != "ranging":
                 slow.append(Slow((stage.name, role), loading, True))
-    fixed += _unknown(view)
     kept = tuple(s for s in slow if _matters(s, white))
-    return Structure(view.log.time_s, tuple(white), kept, fixed, directed)
+    common = np.concatenate(stamped, axis=2) if stamped else None
+    return Structure(view.log.time_s, tuple(white), kept, fixed, directed, common)
 
 
 def _matters(part: Slow, white: list[White]) -> bool:
@@ -87,14 +90,13 @@ def _ranging(rows: StageRows) -> Array:
     return np.stack([rotate(rows.rotation, c) for c in columns], axis=-1)
 
 
-def _timing_scatter(rows: StageRows, role: str, sensor: Sensor) -> Array:
-    """Var(mu) times the motion's outer product [m2], (n, 3, 3); mu anew in every row."""
+def _timing_scatter(rows: StageRows, role: str, sensor: Sensor) -> list[Array]:
+    """Std(mu) times the motion [m], (n, 3, 1) each; mu anew at every stamp."""
     deviation = timing_std(sensor.timing.distribution)
     if deviation == 0.0:
-        return np.zeros((1, 3, 3))
+        return []
     slope = deviation * shift_slope(rows, role)  # type: ignore[arg-type]
-    scatter: Array = slope[:, :, None] * slope[:, None, :]
-    return scatter
+    return [slope[:, :, None]]
 
 
 def timing_std(distribution: Distribution) -> float:

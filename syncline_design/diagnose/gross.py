@@ -14,6 +14,7 @@ import numpy as np
 from syncline_design.diagnose.log import Log, StageLog, Track
 from syncline_design.diagnose.merging import hermite
 from syncline_design.diagnose.simulation import Acting, Scene, acting, scene
+from syncline_design.diagnose.stamps import per_stamp
 from syncline_design.diagnose.trajectory import GAP_FACTOR
 from syncline_design.effects import registry
 from syncline_design.effects.base import Array, Target
@@ -64,16 +65,16 @@ def unslipped(log: Log, seconds: float) -> Log:
     """
     first = log.stages[0]
     assert first.antenna_m is not None
-    times = log.time_s
-    wanted = times + seconds
-    right = np.clip(np.searchsorted(times, wanted), 1, len(log) - 1)
+    times, antenna = per_stamp(log.time_s, first.antenna_m)
+    wanted = log.time_s + seconds
+    right = np.clip(np.searchsorted(times, wanted), 1, times.shape[0] - 1)
     step = times[right] - times[right - 1]
     inside = (wanted >= times[0]) & (wanted <= times[-1]) & (step <= GAP_FACTOR * log.interval_s)
-    track = first.velocity_track or Track(times, first.velocity_mps)
+    track = first.velocity_track or Track(*per_stamp(log.time_s, first.velocity_mps))
     moved = [
         hermite(
             times,
-            first.antenna_m[:, k],
+            antenna[:, k],
             np.interp(times - seconds, track.time_s, track.value[:, k]),
             wanted,
             right,

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.diagnose.stamps import usual_step_s
 from syncline_design.effects.base import Array
 
 Kind = Literal["georeference", "position"]
@@ -63,7 +64,7 @@ class StageLog:
 
 @dataclass(frozen=True, slots=True)
 class Log:
-    """A log, rows in rising time.
+    """A log, rows in rising time; rows of several targets may share a stamp.
 
     truth_m (n, 3) NED: surveyed target (georeference) or the better system's reference point
     (position); NaN components are not known and count for nothing.  rejected: rows dropped, by
@@ -94,8 +95,8 @@ class Log:
 
     @property
     def interval_s(self) -> float:
-        """Median time between rows [s]."""
-        return float(np.median(np.diff(self.time_s)))
+        """Median time between stamps [s]."""
+        return usual_step_s(self.time_s)
 
     @property
     def duration_s(self) -> float:

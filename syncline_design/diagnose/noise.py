@@ -15,6 +15,7 @@ from scipy.linalg import LinAlgError
 
 from syncline_design.diagnose.covariance import Precision, factored
 from syncline_design.diagnose.log import Rows
+from syncline_design.diagnose.stamps import repeated
 from syncline_design.effects.base import Array
 
 Sensor = tuple[str, str]  # (stage, role)
@@ -33,10 +34,20 @@ TIME_SPREAD = 1.0  # its standard deviation in log T
 
 @dataclass(frozen=True, slots=True)
 class White:
-    """White noise of one sensor as the spec has it: covariance (n, 3, 3) [m2] of the error."""
+    """White noise of one sensor as the spec has it: covariance (n, 3, 3) [m2] of the error.
+
+    loading (n, 3, k) with loading loading' = covariance for a sensor that reads once a stamp: its
+    noise is common to the rows of the stamp.  None where every row is a reading of its own.
+    """
 
     sensor: Sensor
     covariance: Array
+    loading: Array | None = None
+
+    def rows(self, index: Rows) -> White:
+        """The same noise on some of the rows."""
+        loading = None if self.loading is None else self.loading[index]
+        return White(self.sensor, self.covariance[index], loading)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +65,10 @@ class Slow:
 
 @dataclass(frozen=True, slots=True)
 class Directed:
-    """White noise along the motion: covariance size^2 direction direction' per row (n, 3, k)."""
+    """White noise along the motion: covariance size^2 direction direction' per row (n, 3, k).
+
+    It comes from errors of stamps, so the rows of one stamp share it.
+    """
 
     key: str
     direction: Array
@@ -62,22 +76,33 @@ class Directed:
 
 @dataclass(frozen=True, slots=True)
 class Structure:
-    """All parts that the covariance of a series can be made of, on its rows."""
+    """All parts that the covariance of a series can be made of, on its rows.
+
+    fixed (n, 3, 3) [m2]: what is known and not fitted, each row's own.  stamped (n, 3, k) [m]: the
+    same, common to the rows of a stamp: the spec's timing errors.
+    """
 
     time_s: Array
     white: tuple[White, ...]
     slow: tuple[Slow, ...]
-    fixed: Array  # (n, 3, 3) [m2] what is known and not fitted: the spec's timing errors
+    fixed: Array
     directed: tuple[Directed, ...] = ()
+    stamped: Array | None = None
+
+    @property
+    def shared(self) -> bool:
+        """Whether rows share stamps, and with them the vehicle's noise."""
+        return repeated(self.time_s)
 
     def rows(self, index: Rows) -> Structure:
         """The same structure on some of the rows."""
         return Structure(
             self.time_s[index],
-            tuple(White(w.sensor, w.covariance[index]) for w in self.white),
+            tuple(w.rows(index) for w in self.white),
             tuple(Slow(s.sensor, s.loading[index], s.shared_time) for s in self.slow),
             self.fixed[index],
             tuple(Directed(d.key, d.direction[index]) for d in self.directed),
+            None if self.stamped is None else self.stamped[index],
         )
 
 
@@ -164,14 +189,39 @@ def clipped(level: NoiseLevel, bounds: Bounds) -> NoiseLevel:
 
 
 def white_covariance(structure: Structure, level: NoiseLevel) -> Array:
-    """Sigma (n, 3, 3) [m2]."""
+    """Covariance of every row's white noise (n, 3, 3) [m2], whatever it shares with others."""
     total = structure.fixed.copy()
+    if structure.stamped is not None:
+        total += structure.stamped @ np.swapaxes(structure.stamped, 1, 2)
     for part, factor in zip(structure.white, level.factor, strict=True):
         total += factor**2 * part.covariance
     for directed, size in zip(structure.directed, level.size, strict=True):
         if size > 0.0:
             total += size**2 * (directed.direction @ np.swapaxes(directed.direction, 1, 2))
     return total
+
+
+def row_covariance(structure: Structure, level: NoiseLevel) -> Array:
+    """Sigma (n, 3, 3) [m2]: the white noise that a row has for itself."""
+    total = structure.fixed.copy()
+    for part, factor in zip(structure.white, level.factor, strict=True):
+        if part.loading is None:
+            total += factor**2 * part.covariance
+    return total
+
+
+def common_loading(structure: Structure, level: NoiseLevel) -> Array:
+    """White noise that is new at every stamp and common to its rows, (n, 3, k) [m]."""
+    columns = [np.zeros((structure.time_s.shape[0], 3, 0))]
+    if structure.stamped is not None:
+        columns.append(structure.stamped)
+    for part, factor in zip(structure.white, level.factor, strict=True):
+        if part.loading is not None:
+            columns.append(factor * part.loading)
+    for directed, size in zip(structure.directed, level.size, strict=True):
+        if size > 0.0:
+            columns.append(size * directed.direction)
+    return np.concatenate(columns, axis=2)
 
 
 def loadings(structure: Structure, level: NoiseLevel) -> tuple[Array, Array]:
@@ -189,7 +239,12 @@ def loadings(structure: Structure, level: NoiseLevel) -> tuple[Array, Array]:
 def precision(structure: Structure, level: NoiseLevel) -> Precision:
     """The factored covariance of the structure at a noise level."""
     loading, times = loadings(structure, level)
-    return factored(white_covariance(structure, level), loading, structure.time_s, times)
+    if not structure.shared:
+        return factored(white_covariance(structure, level), loading, structure.time_s, times)
+    common = common_loading(structure, level)
+    columns = np.concatenate([loading, common], axis=2)
+    times = np.concatenate([times, np.zeros(common.shape[2])])
+    return factored(row_covariance(structure, level), columns, structure.time_s, times)
 
 
 def marginal_variance(structure: Structure, level: NoiseLevel) -> Array:

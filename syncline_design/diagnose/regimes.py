@@ -11,6 +11,7 @@ from scipy.stats import chi2
 from syncline_design.diagnose.covariance import Precision
 from syncline_design.diagnose.fitting import inner, inverse_scaled
 from syncline_design.diagnose.simulation import Scene
+from syncline_design.diagnose.stamps import groups, per_stamp
 from syncline_design.effects.base import Array
 from syncline_design.effects.kinematics import rotate
 
@@ -72,11 +73,12 @@ def _smooth_angle(angle_rad: Array, view: Scene) -> Array:
     A regime must not be told by the very noise that is in the error: on a straight line the
     measured heading is nothing but that.
     """
+    times = view.log.time_s
     half = max(LEAST_HALF, round(0.5 * SMOOTH_S / view.log.interval_s))
     kernel = np.ones(2 * half + 1)
-    phasor = np.exp(1j * angle_rad)
+    _, phasor = per_stamp(times, np.exp(1j * angle_rad))
     total = np.convolve(np.pad(phasor, half, mode="edge"), kernel, mode="valid")
-    smooth: Array = np.angle(total)
+    smooth: Array = np.angle(total)[groups(times)]
     return smooth
 
 

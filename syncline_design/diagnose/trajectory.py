@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from syncline_design.diagnose.stamps import per_stamp
 from syncline_design.effects.base import Array
 from syncline_design.simulate.chain import rotation_exp
 
@@ -65,9 +66,10 @@ class SplinePieces:
 
 
 def pieces(time_s: Array, series: Array) -> SplinePieces:
-    """Splines of a series (n, k) over rising stamps, cut at gaps."""
+    """Splines of a series (n, k) over rising stamps, cut at gaps; one value a stamp, the mean."""
     from scipy.interpolate import CubicSpline
 
+    time_s, series = per_stamp(time_s, series)
     step = np.diff(time_s)
     cuts = np.flatnonzero(step > GAP_FACTOR * np.median(step)) + 1
     bounds = [0, *cuts.tolist(), time_s.shape[0]]
