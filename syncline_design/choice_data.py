@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import islice
 from typing import Any
 
 from syncline_design.choose.outcome import FrontPoint
 from syncline_design.design_data import design_json
-from syncline_design.design_space import Design, Problem
+from syncline_design.design_space import Design, Problem, ResourceName
 from syncline_design.effect_tables import design_budget
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked
+from syncline_design.references import parts_in_use
 
 Json = dict[str, Any]
 NEXT_BEST = 5
@@ -26,10 +27,11 @@ def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked) -> Json:
     assert picked.verified is not None
     chosen = picked.verified.design
     others = (d for d in best(problem, NEXT_BEST + 1) if d != chosen)
-    points = front(problem) if _priced(problem) else ()
+    points = front(problem)
     return {
         "proof": proof_json(picked),
         "front": front_json(loaded, problem, points),
+        "front_left_out": left_out(loaded, problem, "cost"),
         "staircase": [step.to_json() for step in staircase(points)],
         "next_best": designs_json(loaded, problem, islice(others, NEXT_BEST)),
         "excluded": excluded_json(problem),
@@ -86,12 +88,29 @@ def _with_error(loaded: LoadedSpec, problem: Problem, design: Design) -> Json:
     }
 
 
-def _priced(problem: Problem) -> bool:
-    """Whether every option and shared part has a cost, so that a front of cost exists."""
-    parts = [option.resources for table in problem.roles for option in table.options]
-    parts += [clock.resources for vehicle in problem.vehicles for clock in vehicle.clocks]
-    parts += [item.resources for item in problem.infrastructure]
-    return all(resources.cost is not None for resources in parts)
+def left_out(loaded: LoadedSpec, problem: Problem, resource: ResourceName) -> list[str]:
+    """What has no place on a front of a resource because its entry does not say how much it takes.
+
+    In words, as in `sensor my_gnss`; only entries that a design may use.
+    """
+    usable = {f"clock {clock.id}" for vehicle in problem.vehicles for clock in vehicle.clocks}
+    usable |= {f"shared hardware {item.id}" for item in problem.infrastructure}
+    for option in (option for table in problem.roles for option in table.options):
+        usable |= {f"sensor {option.sensor}", f"timestamping method {option.method}"}
+    return [
+        label
+        for _, label, entry in parts_in_use(loaded.spec, loaded.catalog)
+        if label in usable and getattr(entry, resource) is None
+    ]
+
+
+def left_out_text(labels: Sequence[str], resource: ResourceName) -> str:
+    """One line about what is not on a front."""
+    one = len(labels) == 1
+    return (
+        f"not on the front of {resource}: {', '.join(labels)} "
+        f"{'gives' if one else 'give'} no {resource}"
+    )
 
 
 def excluded_json(problem: Problem) -> list[Json]:

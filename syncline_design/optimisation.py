@@ -7,7 +7,14 @@ from itertools import islice
 from typing import Any
 
 from syncline_design import __version__
-from syncline_design.choice_data import designs_json, excluded_json, front_json, proof_json
+from syncline_design.choice_data import (
+    designs_json,
+    excluded_json,
+    front_json,
+    left_out,
+    left_out_text,
+    proof_json,
+)
 from syncline_design.choose import presentation
 from syncline_design.choose.decide import best
 from syncline_design.choose.explain import Explanation, explain
@@ -136,6 +143,7 @@ def optimisation_json(found: Optimisation) -> Json:
         data["verdict"] = "indeterminate"
     if found.settings.pareto:
         data["front"] = front_json(loaded, problem, found.front, found.settings.resource)
+        data["front_left_out"] = left_out(loaded, problem, found.settings.resource)
         data["staircase"] = [step.to_json() for step in found.prices]
     if found.hinges is not None:
         data["slack"] = [row.to_json() for row in found.hinges.slack]
@@ -160,6 +168,9 @@ def optimisation_text(found: Optimisation) -> str:
         table = presentation.front_table(problem, found.front, found.settings.resource, currency)
         prices = presentation.staircase_lines(found.prices, currency, found.settings.resource)
         blocks += [[title, *table], ["What accuracy costs:", *(f"  {line}" for line in prices)]]
+    if found.settings.pareto:
+        missing = left_out(found.loaded, problem, found.settings.resource)
+        blocks += [[left_out_text(missing, found.settings.resource)]] if missing else []
     if found.hinges is not None:
         blocks.append(
             ["How far each term may grow:", *presentation.slack_table(found.hinges.slack)]

@@ -125,13 +125,14 @@ def build_problem(
         for role in ROLES
         if not _is_empty(stage.role(role))
     )
+    vehicle_tables = tuple(_vehicle(loaded, name) for name in vehicles)
     rate = sum((motion.rate for motion in motions), Fraction(0))
     fixed = sum((Fraction(value) for _, _, value in systematic), Fraction(0))
     return Problem(
         roles=tables,
         pairs=_pairs(tables, motions),
-        vehicles=tuple(_vehicle(loaded, name) for name in vehicles),
-        infrastructure=tuple(_infrastructure(loaded)),
+        vehicles=vehicle_tables,
+        infrastructure=tuple(_infrastructure(loaded, _required(tables, vehicle_tables))),
         sync_rate_mps=float(rate),
         fixed_error_m=float(fixed),
         limits=limits,
@@ -348,14 +349,16 @@ def _resources(
     sums: dict[str, Fraction | None] = {}
     for name in RESOURCES:
         amounts = [getattr(entry, name) for entry in entries if entry is not None]
-        known = [_amount(loaded, name, amount) for amount in amounts if amount is not None]
+        said = [a for a in amounts if a is not None]
+        known = [a for one in said if (a := _amount(loaded, name, one)) is not None]
         sums[name] = sum(known, Fraction(0)) if len(known) == len(amounts) else None
     return Resources(**sums)
 
 
-def _amount(loaded: LoadedSpec, name: str, amount: float) -> Fraction:
+def _amount(loaded: LoadedSpec, name: str, amount: float) -> Fraction | None:
+    """The amount; None in a currency without a rate (loading refuses those of a spec's own)."""
     if name == "cost" and isinstance(amount, Quantity):
-        return loaded.spec.in_currency(amount)
+        return loaded.spec.in_currency(amount) if loaded.spec.can_convert(amount) else None
     return fraction_of(amount)
 
 
@@ -392,6 +395,17 @@ def _clock(loaded: LoadedSpec, identity: str, entry: ClockEntry) -> ClockOption:
     return ClockOption(identity, float(offset), _resources(loaded, entry), requires, offset)
 
 
-def _infrastructure(loaded: LoadedSpec) -> Iterator[Infrastructure]:
+def _required(tables: Sequence[RoleTable], vehicles: Sequence[VehicleTable]) -> set[str]:
+    """Shared hardware that any option or clock requires, excluded options included."""
+    back = [one.option for table in tables for one in table.excluded if one.option is not None]
+    needs = [option.requires for table in tables for option in table.options]
+    needs += [option.requires for option in back]
+    needs += [clock.requires for vehicle in vehicles for clock in vehicle.clocks]
+    return {name for requires in needs for name, _ in requires}
+
+
+def _infrastructure(loaded: LoadedSpec, required: set[str]) -> Iterator[Infrastructure]:
+    """Shared hardware that a design may buy: what is only on the shelf has no influence."""
     for identity, entry in loaded.catalog.infrastructure.items():
-        yield Infrastructure(identity, int(entry.channels), _resources(loaded, entry))
+        if identity in required:
+            yield Infrastructure(identity, int(entry.channels), _resources(loaded, entry))

@@ -30,6 +30,7 @@ from syncline_design.simulate import (
     decide,
 )
 from syncline_design.spec import Requirement
+from syncline_design.units import Quantity
 from syncline_design.verdict import (
     EXIT_CODES,
     SCHEMA,
@@ -123,7 +124,7 @@ def picked_design(loaded: LoadedSpec) -> tuple[DesignProblem, Design]:
 
 def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
     """Choose, then verify; without any design say why and what would help."""
-    from syncline_design.choice_data import choice_json
+    from syncline_design.choice_data import choice_json, left_out_text
     from syncline_design.open_choice import pick
 
     picked = pick(
@@ -138,6 +139,9 @@ def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSetti
     data = _verdict_json(loaded, problem, picked.verified, settings, choice)
     if picked.verified.word != "meets" and not picked.exhausted:
         data["verdict"] = "indeterminate"
+    if choice["front_left_out"]:
+        text = left_out_text(choice["front_left_out"], "cost")
+        data["warnings"].append({"code": "unpriced", "message": text})
     if picked.passed_over:
         data["warnings"].insert(0, _passed_over(picked))
     return data
@@ -166,9 +170,11 @@ def _unmet(loaded: LoadedSpec, one: Requirement, in_conflict: bool) -> Requireme
     quantile = None if one.quantile is None else float(one.quantile)
     status: Status = "fail" if in_conflict else "indeterminate"
     note = "part of the conflict" if in_conflict else "no design to judge it by"
-    limit = float(one.limit)
+    limit = one.limit
+    if one.kind == "cost" and isinstance(limit, Quantity):
+        limit = float(loaded.spec.in_currency(limit))
     return RequirementResult(
-        one.id, one.kind, status, None, limit, unit, quantile=quantile, note=note
+        one.id, one.kind, status, None, float(limit), unit, quantile=quantile, note=note
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -18,7 +19,6 @@ from syncline_design.design_space import (
     Option,
     Problem,
     ResourceName,
-    Resources,
     RoleTable,
 )
 
@@ -69,10 +69,10 @@ class Scaled:
     denominator: int
     dtype: Any
 
-    def whole(self, amount: Fraction | None) -> int:
-        """An amount in that unit; what the catalog does not say counts nothing."""
+    def whole(self, amount: Fraction | None) -> int | float:
+        """An amount in that unit; infinite where the catalog does not say."""
         if amount is None:
-            return 0
+            return math.inf
         top, bottom = amount.as_integer_ratio()
         return top * (self.denominator // bottom)
 
@@ -98,8 +98,7 @@ def tabulate(problem: Problem, primary: ResourceName) -> Tables:
         [table.options[i] for i in order]
         for table, order in zip(problem.roles, orders, strict=True)
     ]
-    spent = [[option.resources for option in role] for role in options]
-    amounts = {name: _Amounts(problem, name, spent) for name in RESOURCES}
+    amounts = {name: _Amounts(problem, name, options) for name in RESOURCES}
     ties = [n for n in RESOURCES if n not in names and amounts[n].matter]
     tracked = _tracked(problem, options)
     roles = tuple(
@@ -123,19 +122,23 @@ def _by_name(table: RoleTable) -> tuple[int, ...]:
 class _Amounts:
     """One resource of all options as integer columns, with the scale they share."""
 
-    def __init__(self, problem: Problem, name: ResourceName, spent: list[list[Resources]]) -> None:
+    def __init__(self, problem: Problem, name: ResourceName, options: list[list[Option]]) -> None:
+        spent = [[option.resources for option in role] for role in options]
         amount_of = attrgetter(name)
         others = [c.resources for v in problem.vehicles for c in v.clocks]
-        others += [item.resources for item in problem.infrastructure]
+        others += [problem.infrastructure[i].resources for i in _tracked(problem, options)]
+        known = all(amount_of(r) is not None for r in itertools.chain(others, *spent))
         rest = [a for a in (*map(amount_of, others), problem.limits.budget(name)) if a is not None]
         ratios = [_ratios(list(map(amount_of, role))) for role in spent]
         denominator = math.lcm(
             *(b for _, bottoms in ratios for b in set(bottoms)), *(a.denominator for a in rest)
         )
-        largest = max((max(map(abs, tops), default=0) for tops, _ in ratios), default=0)
+        largest = max(
+            (abs(top) for tops, _ in ratios for top in tops if top != math.inf), default=0
+        )
         largest = max(largest * denominator, *(int(abs(a * denominator)) for a in rest), 0)
-        self.matter = any(any(tops) for tops, _ in ratios) or any(rest)
-        fits = largest * _most_terms(problem) < INT64_ROOM
+        self.matter = any(any(tops) for tops, _ in ratios) or any(rest) or not known
+        fits = known and largest * _most_terms(problem) < INT64_ROOM
         self.scaled = Scaled(name, denominator, np.int64 if fits else object)
         self.columns = [
             _whole(*ratio, len(role), self.scaled)
@@ -143,16 +146,18 @@ class _Amounts:
         ]
 
 
-def _ratios(amounts: list[Fraction | None]) -> tuple[Sequence[int], Sequence[int]]:
-    """Numerators and denominators; what the catalog does not say counts nothing."""
-    if not any(amounts):
+def _ratios(amounts: list[Fraction | None]) -> tuple[Sequence[int | float], Sequence[int]]:
+    """Numerators and denominators; infinite where the catalog does not say."""
+    if all(amount is not None and not amount for amount in amounts):
         return (), ()
-    pairs = [(0, 1) if a is None else a.as_integer_ratio() for a in amounts]
+    pairs = [(math.inf, 1) if a is None else a.as_integer_ratio() for a in amounts]
     tops, bottoms = zip(*pairs, strict=True)
     return tops, bottoms
 
 
-def _whole(tops: Sequence[int], bottoms: Sequence[int], count: int, scaled: Scaled) -> Column:
+def _whole(
+    tops: Sequence[int | float], bottoms: Sequence[int], count: int, scaled: Scaled
+) -> Column:
     if not tops:
         return np.zeros(count, dtype=np.int64)
     column = np.array(tops, dtype=scaled.dtype)

@@ -187,17 +187,22 @@ def error_key(error_m: float) -> float:
     return float(f"{error_m:.12g}") if math.isfinite(error_m) else error_m
 
 
-Rank = tuple[Fraction | float, float, Fraction, Fraction, Fraction, tuple[tuple[str, ...], ...]]
+def known_or_more(amount: Fraction | None) -> Fraction | float:
+    """An amount as the order sees it: one that no catalog gives comes after every known one."""
+    return math.inf if amount is None else amount
+
+
+Amount = Fraction | float
+Rank = tuple[Amount, float, Amount, Amount, Amount, tuple[tuple[str, ...], ...]]
 
 
 def rank(problem: Problem, design: Design, found: Evaluation) -> Rank:
     """The order of designs: objective, error, cost, mass, power, then names by role and clock."""
     error = error_key(found.error_m)
-    zero = Fraction(0)
-    sums = [found.amount(name) or zero for name in RESOURCES]
+    sums = [known_or_more(found.amount(name)) for name in RESOURCES]
     first: Fraction | float = error
     if problem.objective != "error":
-        first = found.amount(problem.objective) or zero
+        first = known_or_more(found.amount(problem.objective))
     names: list[tuple[str, ...]] = [o.names for o in chosen_options(problem, design)]
     names += [(clock.id or "",) for clock in chosen_clocks(problem, design)]
     return (first, error, sums[0], sums[1], sums[2], tuple(names))

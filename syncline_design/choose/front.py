@@ -23,9 +23,10 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choose.arrays import MARGIN, Tables, tabulate, tie_order, useful_options
-from syncline_design.choose.evaluate import Rank, error_key, evaluate, rank
+from syncline_design.choose.evaluate import Rank, error_key, evaluate, known_or_more, rank
 from syncline_design.choose.labels import Labels, concatenate, total_m
 from syncline_design.choose.merge import Ceiling, Merge, lowered
+from syncline_design.choose.narrowed import stated
 from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choose.pareto import Bools, Columns, Floats, Indices, undominated
 from syncline_design.choose.rounded_once import total_errors_m
@@ -44,9 +45,14 @@ class _Finished:
 def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint, ...]:
     """The exact front of a resource against error, over designs that meet all but accuracy.
 
-    By rising amount and falling error; errors that agree to 12 figures count as equal.
+    By rising amount and falling error; errors that agree to 12 figures count as equal.  What does
+    not say how much of the resource it takes has no place on it.
     """
-    return merged_front(problem, resource, accuracy=False)
+    priced = stated(problem, resource)
+    if priced.is_empty:
+        return ()
+    points = merged_front(priced.problem, resource, accuracy=False)
+    return tuple(replace(point, design=priced.whole(point.design)) for point in points)
 
 
 def merged_front(
@@ -203,8 +209,8 @@ def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
 
 def _replaces(one: ClockOption, other: ClockOption, earlier: bool) -> bool:
     """Whether a clock is nowhere worse, and better in resources or earlier by name."""
-    ours = [getattr(one.resources, n) or 0 for n in ("cost", "mass", "power")]
-    theirs = [getattr(other.resources, n) or 0 for n in ("cost", "mass", "power")]
+    ours = [known_or_more(getattr(one.resources, n)) for n in ("cost", "mass", "power")]
+    theirs = [known_or_more(getattr(other.resources, n)) for n in ("cost", "mass", "power")]
     worse = any(a > b for a, b in zip(ours, theirs, strict=True))
     if worse or one.offset_bound_s > other.offset_bound_s:
         return False
@@ -219,7 +225,10 @@ def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoin
     designs = _designs(tables, finished, kept)
     errors = total_errors_m(tables.problem, designs)
     bottom = tables.keys[0].denominator
-    amounts = [Fraction(a, bottom) for a in finished.labels.resources[0][kept].tolist()]
+    amounts = [
+        a if math.isinf(a) else Fraction(a, bottom)
+        for a in finished.labels.resources[0][kept].tolist()
+    ]
     return _joined(list(map(FrontPoint, amounts, errors, designs)), tables.problem)
 
 

@@ -6,6 +6,7 @@ dominated partial designs are dropped on the way.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -231,7 +232,11 @@ class Merge:
             for sums, scales in ((keys, self.tables.keys), (ties, self.tables.ties)):
                 for i, scale in enumerate(scales):
                     each = scale.whole(hardware.resources.of(scale.name))
-                    sums[i] = sums[i] + units.astype(scale.dtype) * each
+                    if each == math.inf:  # none bought is nothing to know
+                        bought: Column = np.where(units > 0, np.array(each, dtype=object), 0)
+                    else:
+                        bought = units.astype(scale.dtype) * each
+                    sums[i] = sums[i] + bought
             used[at] = np.zeros_like(used[at])
         return replace(labels, resources=tuple(keys), ties=tuple(ties), used=tuple(used))
 

@@ -41,9 +41,12 @@ class Deadline:
 
 @dataclass(frozen=True, slots=True)
 class FrontPoint:
-    """One point of the exact front: the least of a resource for this error, and the design."""
+    """One point of the exact front: the least of a resource for this error, and the design.
 
-    amount: Fraction
+    amount: infinite where a catalog entry does not say (only off the fronts that are shown).
+    """
+
+    amount: Fraction | float
     error_m: float
     design: Design
 

@@ -29,7 +29,7 @@ UNITS = {
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
-def amount_text(amount: Fraction | None, resource: ResourceName, currency: str) -> str:
+def amount_text(amount: Fraction | float | None, resource: ResourceName, currency: str) -> str:
     """`59 862.35 EUR`, `1.2 kg`; `unknown` where a catalog entry does not say."""
     if amount is None:
         return "unknown"
@@ -161,10 +161,11 @@ def designs_csv(problem: Problem, designs: Iterable[Design]) -> str:
     return _csv(headers, rows)
 
 
-def _plain(amount: Fraction | None) -> str:
+def _plain(amount: Fraction | float | None) -> str:
     if amount is None:
         return ""
-    return str(amount.numerator) if amount.denominator == 1 else repr(float(amount))
+    exact = Fraction(amount)
+    return str(exact.numerator) if exact.denominator == 1 else repr(float(exact))
 
 
 def _design_headers(problem: Problem) -> Iterator[str]:

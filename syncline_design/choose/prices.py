@@ -21,10 +21,10 @@ class Step:
     extra: what this step costs more than the one before it (None: the cheapest).
     """
 
-    amount: Fraction
+    amount: Fraction | float
     tightest_m: float
     looser_than_m: float | None
-    extra: Fraction | None
+    extra: Fraction | float | None
 
     def to_json(self) -> dict[str, Any]:
         """The entry under `staircase`."""

@@ -10,19 +10,21 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
 
 import numpy as np
 
 from syncline_design.choose.arrays import MARGIN, RoleArrays, Scaled, tabulate
-from syncline_design.choose.evaluate import broken, error_key, evaluate, rank
+from syncline_design.choose.evaluate import Amount, broken, error_key, evaluate, rank
 from syncline_design.choose.outcome import Deadline, TooLarge
 from syncline_design.choose.pareto import Bools, Column, Columns, Floats, Indices, undominated
 from syncline_design.design_space import RESOURCES, Design, Problem, ResourceName, VehicleTable
 
-Key = tuple[Fraction | float, float, Fraction, Fraction, Fraction, tuple[int, ...]]
+Key = tuple[Amount, float, Amount, Amount, Amount, tuple[int, ...]]
 
 
 def iter_best(
@@ -43,7 +45,7 @@ class _Node:
     clocks: tuple[int, ...]
     places: tuple[int, ...]
     error: float
-    sums: tuple[int, ...]  # cost, mass, power in whole units
+    sums: tuple[int | float, ...]  # cost, mass, power in whole units
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +119,7 @@ class _Search:
         )
         return [known.get(name, np.zeros(len(role), dtype=np.int64)) for name in RESOURCES]
 
-    def _clock_sums(self, clocks: tuple[int, ...]) -> tuple[int, ...]:
+    def _clock_sums(self, clocks: tuple[int, ...]) -> tuple[int | float, ...]:
         chosen = [
             v.clocks[order[i]]
             for v, order, i in zip(self.problem.vehicles, self.clock_order, clocks, strict=True)
@@ -229,7 +231,7 @@ class _Search:
 
     def _child(self, block: _Block, at: int) -> _Node:
         place = int(block.order[at])
-        sums = tuple(int(s[place]) for s in block.sums)
+        sums = tuple(_plain(s[place]) for s in block.sums)
         places = (*block.node.places, place)
         return _Node(block.node.clocks, places, float(block.error[place]), sums)
 
@@ -238,7 +240,7 @@ class _Search:
             return
         place = int(block.order[at])
         sums = [
-            Fraction(0) if s is None else Fraction(int(c[place]), s.denominator)
+            Fraction(0) if s is None else _amount(_plain(c[place]), s.denominator)
             for s, c in zip(self.scales, block.least, strict=True)
         ]
         error = error_key(float(block.total[place]))
@@ -246,7 +248,7 @@ class _Search:
         key: Key = (first, error, sums[0], sums[1], sums[2], (*block.node.places, place))
         heapq.heappush(heap, (key, next(self.counter), block, at, None))
 
-    def _of_objective(self, sums: list[Fraction]) -> Fraction:
+    def _of_objective(self, sums: list[Amount]) -> Amount:
         return sums[self.main]
 
     def _push_design(self, heap: list[Entry], node: _Node) -> None:
@@ -259,6 +261,15 @@ class _Search:
         ranked = rank(self.problem, design, found)
         key: Key = (*ranked[:5], (*node.places, *node.clocks))
         heapq.heappush(heap, (key, next(self.counter), None, 0, design))
+
+
+def _plain(whole: Any) -> int | float:
+    """An element of a column as a number of Python's own."""
+    return math.inf if whole == math.inf else int(whole)
+
+
+def _amount(whole: int | float, denominator: int) -> Amount:
+    return whole if isinstance(whole, float) else Fraction(whole, denominator)
 
 
 def _by_id(vehicle: VehicleTable) -> list[int]:
