@@ -13,6 +13,7 @@ import typer
 
 from syncline_design import __version__
 from syncline_design.commands import design, evidence, library
+from syncline_design.processes import forget_working_folder
 
 app = typer.Typer(
     name="syncline-design",
@@ -57,6 +58,7 @@ def _options(
 
 def main() -> None:
     """Entry point of the `syncline-design` command."""
+    forget_working_folder()
     _start_quickly()
     app()
 

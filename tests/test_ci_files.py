@@ -93,6 +93,34 @@ def test_the_action_passes_what_meets(repository: Path) -> None:
     assert "::error" not in stdout
 
 
+GOOD, MISSED = "specs/position_track.yaml", "specs/infeasible_example.yaml"
+
+
+@pytest.mark.parametrize(
+    ("specs", "wanted"),
+    [
+        (f"{GOOD}\n{MISSED}\n", 1),
+        (f"{MISSED}\n{GOOD}", 1),
+        (f"\n  {GOOD}\t{GOOD}\r\n\r\n{GOOD}  {MISSED}\r\n", 1),
+        (f"{GOOD}\nspecs/absent.yaml\n{MISSED}\n", 2),
+        (f"{GOOD}\nspecs/*.yaml\n", 2),  # a name with a star in it, which is not there
+        (f"{GOOD}\n\n{GOOD}\n", 0),
+        (" \n\t\n", 2),
+    ],
+    ids=["two lines", "worst first", "blanks", "one absent", "no globbing", "good", "nothing"],
+)
+def test_the_action_checks_every_line_and_ends_with_the_worst_code(
+    repository: Path, specs: str, wanted: int
+) -> None:
+    (repository / "syncline-reports").mkdir()
+    (repository / "syncline-reports" / "summary.md").write_text("all is well")
+    code, stdout, summary = run_action(repository, specs=specs, args="--seed\n2")
+    assert code == wanted, stdout
+    missed = f"::error file={MISSED},line=" in stdout
+    assert missed == (MISSED in specs)
+    assert not summary.exists() or "all is well" not in summary.read_text()
+
+
 def test_inputs_of_the_action_are_not_run(repository: Path) -> None:
     code, _, _ = run_action(repository, specs="$(touch owned) ; touch owned", args="`touch owned`")
     assert code == 2

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final
 from xml.etree import ElementTree
 
+from syncline_design.report.matplotlib_import import load_matplotlib
 from syncline_design.report.palette import INK, MUTED, VARIABLES
 
 if TYPE_CHECKING:
@@ -81,12 +82,15 @@ def draw(
     size: width and height in SVG units.  build: draws into the figure; returns the axes whose
     box the page's script needs, or None.
     """
-    from matplotlib import rc_context
+    load_matplotlib()
+    from matplotlib import rc_context, rcdefaults, rcParams
     from matplotlib.figure import Figure
 
     stream = io.StringIO()
     style: Any = _STYLE
-    with rc_context(style), warnings.catch_warnings():
+    with rc_context(), warnings.catch_warnings():
+        rcdefaults()  # whatever the user's own settings are
+        rcParams.update(style)
         # A name may hold characters the metrics font lacks; the browser's font draws them.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure = Figure(figsize=(size[0] / _DPI, size[1] / _DPI), dpi=_DPI, layout="constrained")

@@ -1,22 +1,32 @@
 """Long runs on several processes: the parent hands out shares, each child counts its own.
 
-A child runs `main` of this module by the same interpreter; it reads one pickled Share from
-standard input and writes its counts to standard output.  Counts are whole numbers and add up to
-the same sums whatever the number of children.
+A child runs `main` of this module by the same interpreter, which does not look for programs in the
+working folder; it reads one pickled Share from standard input and writes its counts to standard
+output.  The parent holds the child's input open: a child whose parent is gone ends.  Counts are
+whole numbers and add up to the same sums whatever the number of children.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
 import pickle
 import subprocess
 import sys
 import threading
+from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import IO
 
 import numpy as np
 
 from syncline_design.effects.base import Array
 from syncline_design.model.system import System
+from syncline_design.processes import (
+    end_with_stream,
+    ended_by_signals,
+    python_command,
+)
 from syncline_design.simulate.distribution import Counts, add_counts, no_counts
 from syncline_design.simulate.kernel import norm
 from syncline_design.simulate.sampling import JOB, job_errors, keep_freed_memory, run_jobs, workers
@@ -64,20 +74,15 @@ def tally(
 
 
 def _tally_on_processes(shares: list[Share]) -> tuple[Counts, int]:
-    command = [sys.executable, "-c", f"from {__name__} import main; main()"]
-    pipe = subprocess.PIPE
-    children = [subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe) for _ in shares]
-    try:
-        for child, share in zip(children, shares, strict=True):
-            assert child.stdin is not None
-            child.stdin.write(pickle.dumps(share))
-            child.stdin.close()
-            child.stdin = None
-        answers = [child.communicate() for child in children]
-    finally:
-        for child in children:
-            child.kill()
-            child.wait()
+    children: list[subprocess.Popen[bytes]] = []
+    with ExitStack() as lifelines, ended_by_signals():
+        try:
+            children.extend(_started(share, lifelines) for share in shares)
+            answers = [child.communicate() for child in children]
+        finally:
+            for child in children:
+                child.kill()
+                child.wait()
     for child, (_, complaint) in zip(children, answers, strict=True):
         if child.returncode != 0:
             raise RuntimeError(f"a simulation process failed: {complaint.decode(errors='replace')}")
@@ -87,6 +92,26 @@ def _tally_on_processes(shares: list[Share]) -> tuple[Counts, int]:
         counts += numbers[1:]
         within += int(numbers[0])
     return counts, within
+
+
+def _started(share: Share, lifelines: ExitStack) -> subprocess.Popen[bytes]:
+    """A child at work on its share; its input stays open until the stack is unwound."""
+    pipe = subprocess.PIPE
+    command = python_command(f"from {__name__} import main; main()")
+    child = subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe)
+    assert child.stdin is not None
+    lifeline, child.stdin = child.stdin, None  # or `communicate` would close it
+    lifelines.callback(_closed, lifeline)
+    content = pickle.dumps(share)
+    with contextlib.suppress(BrokenPipeError):  # its complaint is read with its answer
+        lifeline.write(len(content).to_bytes(8, "little") + content)
+        lifeline.flush()
+    return child
+
+
+def _closed(stream: IO[bytes]) -> None:
+    with contextlib.suppress(OSError):
+        stream.close()
 
 
 def count_share(share: Share) -> tuple[Counts, int]:
@@ -102,7 +127,23 @@ def count_share(share: Share) -> tuple[Counts, int]:
     return counts, within
 
 
+def _exactly(source: io.RawIOBase, size: int) -> bytes:
+    """`size` bytes of an unbuffered stream (what is buffered would hold a lock at exit)."""
+    parts: list[bytes] = []
+    while size > 0:
+        part = source.read(min(size, 2**20))
+        if not part:
+            raise EOFError("the parent is gone")
+        parts.append(part)
+        size -= len(part)
+    return b"".join(parts)
+
+
 def main() -> None:
     """Answer one share: the count within the limit, then the bins' counts, as int64."""
-    counts, within = count_share(pickle.load(sys.stdin.buffer))
+    source = io.FileIO(sys.stdin.fileno(), closefd=False)
+    size = int.from_bytes(_exactly(source, 8), "little")
+    share: Share = pickle.loads(_exactly(source, size))
+    end_with_stream(sys.stdin.fileno())
+    counts, within = count_share(share)
     sys.stdout.buffer.write(np.concatenate([[within], counts]).astype(np.int64).tobytes())

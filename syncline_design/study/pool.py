@@ -1,8 +1,8 @@
 """Cases on local worker processes; one that dies is replaced and its cases are done again.
 
 Results do not depend on which process computes a case, so a retry gives the same numbers.  Each
-worker holds a few cases in hand so that it never waits for the parent.  When the parent dies, the
-workers' connections close and they end.
+worker holds a few cases in hand so that it never waits for the parent.  Workers end with
+the parent, whatever ends it, and do not look for programs in the working folder.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from syncline_design.processes import end_with_parent, ended_by_signals, starting_safely
 from syncline_design.study.case import CaseSettings, canonical, check_case
 from syncline_design.study.loading import Study
 
@@ -46,6 +47,7 @@ def encoded_case(study: Study, index: int, settings: CaseSettings) -> str:
 def _work(connection: Connection) -> None:
     """Body of a worker: the study in, then indices in and records out, until the line closes."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent answers Ctrl-C
+    end_with_parent()
     with contextlib.suppress(EOFError, BrokenPipeError, ConnectionResetError):
         connection.send(None)  # up and running
         study, settings = connection.recv()
@@ -73,14 +75,15 @@ class Pool:
     def run(self, indices: Iterable[int]) -> Iterator[Result]:
         """Records as they come in, in no particular order."""
         queue = deque(indices)
-        try:
-            while len(self._workers) < min(self._count, len(queue)):
-                self._workers.append(self._start())
-            while queue or any(worker.cases for worker in self._workers):
-                yield from self._collect(queue)
-                self._hand_out(queue)
-        finally:
-            self._end()
+        with ended_by_signals():
+            try:
+                while len(self._workers) < min(self._count, len(queue)):
+                    self._workers.append(self._start())
+                while queue or any(worker.cases for worker in self._workers):
+                    yield from self._collect(queue)
+                    self._hand_out(queue)
+            finally:
+                self._end()
 
     def _start(self) -> _Worker:
         ours, theirs = self._context.Pipe()
@@ -88,7 +91,8 @@ class Pool:
         # starts would leave the parent writing to nobody for ever.
         process = self._context.Process(target=_work, args=(theirs,), daemon=True)
         try:
-            process.start()
+            with starting_safely():
+                process.start()
         except OSError as error:
             reason = error.strerror or error
             raise PoolError(f"cannot start a worker process: {reason}") from None
