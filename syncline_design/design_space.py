@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Literal
+from typing import Literal, Protocol
 
 from syncline_design.model.system import RoleName
 
@@ -170,6 +170,41 @@ class Limits:
 
 
 @dataclass(frozen=True, slots=True)
+class Judgement:
+    """What simulation says of one design: ids of the requirements it fails or leaves open."""
+
+    failed: tuple[str, ...] = ()
+    undecided: tuple[str, ...] = ()
+
+    @property
+    def passed(self) -> bool:
+        """Whether every simulated requirement is met."""
+        return not self.failed and not self.undecided
+
+
+class Judge(Protocol):
+    """Requirements that sums do not decide: those on simulated quantiles.
+
+    limits: (requirement id, limit [m]) of each.
+    """
+
+    @property
+    def limits(self) -> tuple[tuple[str, float], ...]: ...
+
+    def judge(self, problem: Problem, design: Design) -> Judgement:
+        """Simulate one design of a problem against every limit."""
+        ...
+
+    def reached_m(self, problem: Problem, design: Design, requirement: str) -> float:
+        """A limit [m] that one design keeps, as near to its quantile as simulation tells."""
+        ...
+
+    def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
+        """The same with other limits; a requirement that is not named is lifted."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     roles: tuple[RoleTable, ...]
     pairs: tuple[Pair, ...]
@@ -182,6 +217,7 @@ class Problem:
     objective: Objective
     exact_sync_rate_mps: Fraction | None = None
     exact_fixed_error_m: Fraction | None = None
+    judge: Judge | None = field(default=None, compare=False)  # None: sums decide everything
 
     def fixed_error(self) -> Fraction:
         """Systematic terms that every design has [m], exactly."""

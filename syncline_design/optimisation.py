@@ -7,6 +7,7 @@ from itertools import islice
 from typing import Any
 
 from syncline_design import __version__
+from syncline_design.acceptance import Simulations
 from syncline_design.choice_data import (
     designs_json,
     excluded_json,
@@ -29,7 +30,6 @@ from syncline_design.choose.tolerance import (
     tolerance_verdict,
 )
 from syncline_design.design_space import Design, Problem, ResourceName
-from syncline_design.effect_tables import problem_of
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked, pick
 from syncline_design.problem import selection_of
@@ -84,14 +84,13 @@ class Optimisation:
         found = self.picked.verified
         if found is None:
             return 1
-        if found.word == "meets":
-            return 0
-        return 1 if self.picked.exhausted else 3
+        return 0 if found.word == "meets" else 3
 
 
 def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     """The best designs of a spec; pinned roles stay as they are."""
-    problem = problem_of(loaded)
+    build = Simulations(settings.seed).problem_of
+    problem = build(loaded)
     simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
     checking = CheckSettings(seed=settings.seed, monte_carlo=simulated)
     picked = pick(
@@ -104,15 +103,15 @@ def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     designs: tuple[Design, ...] = ()
     hinges = explanation = None
     if picked.verified is None:
-        explanation = explain(loaded, problem, problem_of)
+        explanation = explain(loaded, problem, build)
     else:
         chosen = picked.verified.design
         others = (d for d in best(problem, settings.count + 1) if d != chosen)
         designs = (chosen, *islice(others, settings.count - 1))
         hinges = Hinges(
-            slack_ledger(loaded, problem, chosen, problem_of),
-            tolerance_verdict(loaded, problem, chosen, problem_of),
-            measure_next(loaded, problem, chosen, problem_of),
+            slack_ledger(loaded, problem, chosen, build),
+            tolerance_verdict(loaded, problem, chosen, build),
+            measure_next(loaded, problem, chosen, build),
         )
     return Optimisation(
         loaded, problem, settings, picked, designs, points, staircase(points), hinges,

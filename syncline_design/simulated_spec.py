@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
+from syncline_design.acceptance import refuse_trajectory, simulation_settings
 from syncline_design.chosen_system import system_of
 from syncline_design.known_effects import effect_entries
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.system import System
 from syncline_design.simulate import SimulationError, SimulationResult, simulate
 from syncline_design.verdict import files_json
-from syncline_design.verify import picked_design, refuse_trajectory, simulation_settings
+from syncline_design.verify import picked_design
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,7 +38,7 @@ def simulate_spec(
     loaded: LoadedSpec, seed: int = 0, samples: int | None = None, workers: int | None = None
 ) -> SimulatedSpec:
     """Simulate a spec as its `monte_carlo` part says; samples and workers override."""
-    system = system_of(loaded, *picked_design(loaded), effect_entries(loaded))
+    system = system_of(loaded, *picked_design(loaded, seed), effect_entries(loaded))
     settings = replace(simulation_settings(loaded, seed), workers=workers)
     if samples is not None:
         settings = replace(settings, samples=samples)

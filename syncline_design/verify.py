@@ -6,15 +6,20 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, Any
 
+from syncline_design.acceptance import (
+    MOST_SIMULATED,
+    Simulations,
+    refuse_trajectory,
+    simulation_settings,
+)
 from syncline_design.cautions import cautions
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
 from syncline_design.design_space import Problem as DesignProblem
 from syncline_design.effect_tables import problem_of
-from syncline_design.input_files import FileContent
 from syncline_design.known_effects import effect_entries, known_of
 from syncline_design.loading import BadInput, LoadedSpec, Problem, load
 from syncline_design.model.budget import budget
@@ -25,7 +30,6 @@ from syncline_design.simulate import (
     Decision,
     MonteCarlo,
     SimulationError,
-    SimulationSettings,
     cross_check,
     decide,
 )
@@ -46,6 +50,7 @@ from syncline_design.verdict import (
 
 if TYPE_CHECKING:
     from syncline_design.choose.outcome import Method
+    from syncline_design.choose.variations import Build
     from syncline_design.open_choice import Picked
 
 Json = dict[str, Any]
@@ -94,18 +99,26 @@ def _check_or_refuse(path: Path, settings: CheckSettings) -> Json:
 
 def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
     """The verdict of a loaded spec."""
-    problem = problem_of(loaded)
+    build = _build(settings)
+    problem = build(loaded)
     sole = sole_design(problem)
     if sole is not None:
         problem, design = sole
         verified = verify(loaded, problem, design, settings)
         return _verdict_json(loaded, problem, verified, settings, {})
-    return _check_open(loaded, problem, settings)
+    return _check_open(loaded, problem, settings, build)
 
 
-def picked_design(loaded: LoadedSpec) -> tuple[DesignProblem, Design]:
+def _build(settings: CheckSettings) -> Build:
+    """How a spec becomes a problem: with simulated requirements, unless nothing is simulated."""
+    if not settings.monte_carlo:
+        return problem_of
+    return Simulations(settings.seed, settings.today).problem_of
+
+
+def picked_design(loaded: LoadedSpec, seed: int = 0) -> tuple[DesignProblem, Design]:
     """The only design of a pinned spec, or the best of an open one; BadInput when there is none."""
-    problem = problem_of(loaded)
+    problem = Simulations(seed).problem_of(loaded)
     sole = sole_design(problem)
     if sole is not None:
         return sole
@@ -122,7 +135,9 @@ def picked_design(loaded: LoadedSpec) -> tuple[DesignProblem, Design]:
     return problem, choice.design
 
 
-def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
+def _check_open(
+    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+) -> Json:
     """Choose, then verify; without any design say why and what would help."""
     from syncline_design.choice_data import choice_json, left_out_text
     from syncline_design.open_choice import pick
@@ -134,7 +149,7 @@ def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSetti
         lambda design: verify(loaded, problem, design, settings),
     )
     if picked.verified is None:
-        return _infeasible_json(loaded, problem, settings)
+        return _infeasible_json(loaded, problem, settings, build)
     choice = choice_json(loaded, problem, picked)
     data = _verdict_json(loaded, problem, picked.verified, settings, choice)
     if picked.verified.word != "meets" and not picked.exhausted:
@@ -147,12 +162,14 @@ def _check_open(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSetti
     return data
 
 
-def _infeasible_json(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
+def _infeasible_json(
+    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+) -> Json:
     """Why there is no design, and which single changes would help."""
     from syncline_design.choice_data import excluded_json
     from syncline_design.choose.explain import explain
 
-    found = explain(loaded, problem, problem_of)
+    found = explain(loaded, problem, build)
     data = frame(loaded, problem, "infeasible", settings.seed)
     data["infeasibility"] = found.to_json() | {"text": found.lines()}
     conflict = {m.id for members in (found.conflict, *found.further) for m in members}
@@ -179,17 +196,13 @@ def _unmet(loaded: LoadedSpec, one: Requirement, in_conflict: bool) -> Requireme
 
 
 def _passed_over(picked: Picked) -> Json:
-    from syncline_design.open_choice import MOST_SIMULATED
-
     count = f"{picked.passed_over} design{'s' if picked.passed_over > 1 else ''}"
-    met = picked.verified is not None and picked.verified.word == "meets"
-    message = (
-        f"{count} that come before this one meet the Syncline but not the Monte Carlo requirements"
-        if met
-        else f"{count} meet the Syncline requirements, none of them the Monte Carlo ones; "
-        "shown is the first"
-        + ("" if picked.exhausted else f"; the search stopped after {MOST_SIMULATED} designs")
-    )
+    message = f"{count} that come before this one keep every sum but not the Monte Carlo limits"
+    if not picked.exhausted:
+        message = (
+            f"{count} keep every sum but not the Monte Carlo limits; shown is the first; the "
+            f"search stopped after {MOST_SIMULATED} simulated designs"
+        )
     return {"code": "passed-over", "message": message}
 
 
@@ -211,23 +224,6 @@ def verify(
     return Verified(design, system, figures, exact, found, results, trouble)
 
 
-def simulation_settings(loaded: LoadedSpec, seed: int) -> SimulationSettings:
-    """How a spec wants to be simulated; the target is its tightest accuracy (or other) limit."""
-    choice = loaded.spec.monte_carlo
-    limits = [float(r.limit) for r in loaded.spec.requirements if r.kind == "accuracy"]
-    limits = limits or [float(r.limit) for r in loaded.spec.requirements if r.kind == "monte_carlo"]
-    trajectory: str | FileContent | None = loaded.trajectory
-    if trajectory is None and choice.trajectory is not None:
-        trajectory = choice.trajectory.manoeuvre
-    return SimulationSettings(
-        samples=choice.samples,
-        seed=seed,
-        envelope=choice.envelope,
-        limit_m=min(limits) if limits else None,
-        trajectory=trajectory,
-    )
-
-
 def _monte_carlo(
     loaded: LoadedSpec, system: System, settings: CheckSettings
 ) -> tuple[MonteCarlo | None, str]:
@@ -240,13 +236,6 @@ def _monte_carlo(
         if loaded.spec.monte_carlo.trajectory is not None:
             refuse_trajectory(loaded, str(error))
         return None, str(error)
-
-
-def refuse_trajectory(loaded: LoadedSpec, message: str) -> NoReturn:
-    """A trajectory that cannot be flown, as bad input at its place."""
-    place = ("monte_carlo", "trajectory")
-    line, column = loaded.positions.get(place, (0, 0))
-    raise BadInput((Problem(str(loaded.path), line, column, ".".join(place), message),))
 
 
 def _results(

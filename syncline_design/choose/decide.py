@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 
+from syncline_design.choose.acceptable import iter_acceptable, judgement
 from syncline_design.choose.enumerate import best_by_enumeration
 from syncline_design.choose.evaluate import broken, error_key, evaluate, rank
 from syncline_design.choose.front import merged_front
@@ -16,6 +19,7 @@ from syncline_design.choose.outcome import (
     NoVerdict,
     Proof,
     TooLarge,
+    Unfinished,
 )
 from syncline_design.choose.ranked import iter_best
 from syncline_design.design_space import Design, Problem, ResourceName
@@ -40,6 +44,41 @@ def choose(
         return Infeasible(Proof("tables", True, True), empty)
     deadline = Deadline(time_limit_s)
     deadline.check()
+    found = _by_sums(problem, method, deadline)
+    if problem.judge is None or isinstance(found, Infeasible):
+        return found
+    return _simulated(problem, found, deadline)
+
+
+def _simulated(problem: Problem, first: Choice, deadline: Deadline) -> Choice | Infeasible:
+    """The first design in the order that simulation accepts as well.
+
+    Where it accepts none, the first one that it leaves open.
+    """
+    left_open: Choice | None = None
+    proof = first.proof
+    try:
+        found = judgement(problem, first.design)
+        if found.passed:
+            return first
+        passed_over = 0
+        for design in itertools.chain((first.design,), _others(problem, first.design, deadline)):
+            found = judgement(problem, design)
+            if found.passed:
+                return Choice(design, proof, passed_over)
+            if left_open is None and not found.failed:
+                left_open = Choice(design, proof, passed_over, found.undecided)
+            passed_over += 1
+    except Unfinished:
+        return Choice(first.design, proof, passed_over, exhausted=False)
+    return left_open or Infeasible(replace(proof, rechecked=True), passed_over=passed_over)
+
+
+def _others(problem: Problem, first: Design, deadline: Deadline) -> Iterator[Design]:
+    return (design for design in iter_best(problem, deadline) if design != first)
+
+
+def _by_sums(problem: Problem, method: Method, deadline: Deadline) -> Choice | Infeasible:
     if method == "auto":
         return _auto(problem, deadline)
     if method == "enumerate":
@@ -128,7 +167,7 @@ def best(problem: Problem, count: int) -> Iterator[Design]:
     primitive or clock alone is the same design, shown in its best form.
     """
     seen: set[tuple[tuple[str, str], ...]] = set()
-    for design in iter_best(problem):
+    for design, _ in iter_acceptable(problem):
         options = zip(problem.roles, design.options, strict=True)
         shown = tuple((t.options[i].sensor, t.options[i].method) for t, i in options)
         if shown in seen:

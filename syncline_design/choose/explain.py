@@ -3,26 +3,27 @@ cannot hold together, and the smallest single changes that help."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import Any
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from syncline_design.choose.fixes import (
     Fix,
-    is_feasible,
     method_fixes,
-    platform_fixes,
     requirement_fixes,
+    with_requirements,
 )
 from syncline_design.choose.joint import joint_fixes
 from syncline_design.choose.outcome import NoVerdict
+from syncline_design.choose.parts import Part, is_feasible, lifted, parts_of
+from syncline_design.choose.platform_fixes import platform_fixes
 from syncline_design.choose.variations import Build
-from syncline_design.design_space import Limits, Problem, RoleTable, with_limits
+from syncline_design.design_space import Problem, RoleTable
 from syncline_design.loading import LoadedSpec
 from syncline_design.problem import build_problem
 
-KINDS = ("accuracy", "sync", "cost", "mass", "power")
+Found = TypeVar("Found")
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,9 +67,9 @@ class ConflictMember:
 class Explanation:
     """Why a spec is infeasible.  minimal: proven that any one of the conflict left out helps.
 
-    further: conflicts that remain once the first is lifted; where there are any, no single change
-    helps and `joint` holds changes that help together.  simulated: ids of Monte Carlo requirements,
-    which a changed spec still has to meet.
+    further: conflicts that remain once the first is lifted; where there are any, no requirement
+    alone can be moved far enough.  joint: changes that help together.  each_suffices: whether the
+    spec has a design without any one requirement of the conflict.
     """
 
     gaps: tuple[RoleGap, ...]
@@ -77,7 +78,7 @@ class Explanation:
     fixes: tuple[Fix, ...]
     further: tuple[tuple[ConflictMember, ...], ...] = ()
     joint: tuple[tuple[Fix, ...], ...] = ()
-    simulated: tuple[str, ...] = ()
+    each_suffices: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The value of `infeasibility`."""
@@ -94,28 +95,26 @@ class Explanation:
         out = ["No design meets this spec."]
         out += [f"  {gap.text}" for gap in self.gaps]
         if self.conflict:
-            out.append(f"  {_conflict_text(self.conflict, self.minimal, bool(self.further))}")
-        out += [f"  Apart from that, {_conflict_text(one, True, True)}" for one in self.further]
+            out.append(f"  {_conflict_text(self.conflict, self.minimal, self.each_suffices)}")
+        out += [f"  Apart from that, {_conflict_text(one, True, False)}" for one in self.further]
         if self.fixes:
             out.append("Any one of these changes makes it feasible (each solved again):")
             out += [f"  - {fix.text}" for fix in self.fixes]
         else:
-            out.append("No single change of a requirement, platform or method makes it feasible.")
+            out.append("No single change of a requirement, platform or method was found to help.")
         if self.joint:
             out.append("Changes that do so together (solved again):")
             out += ["  - " + " and ".join(f.text for f in together) for together in self.joint]
-        if self.simulated and (self.fixes or self.joint):
-            out.append(f"Then {_listed(self.simulated)} has still to be met by simulation.")
         return out
 
 
-def _conflict_text(members: Sequence[ConflictMember], minimal: bool, more: bool) -> str:
+def _conflict_text(members: Sequence[ConflictMember], minimal: bool, each_suffices: bool) -> str:
     names = [member.words for member in members]
     if len(names) == 1:
         return f"{names[0]} alone cannot be met by any combination of the candidates."
     if not minimal:
         return f"{_listed(names)} cannot all hold together (a smaller set was not ruled out)."
-    ending = "" if more else "; without any one of them a design exists"
+    ending = "; without any one of them a design exists" if each_suffices else ""
     return f"{_listed(names)} cannot hold together{ending}."
 
 
@@ -130,38 +129,63 @@ def _members_json(members: Sequence[ConflictMember]) -> list[dict[str, Any]]:
 def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) -> Explanation:
     """Reasons and remedies for a problem that has no design.
 
-    build: how a changed spec becomes a problem (with the known effects, where there are any).
+    build: how a changed spec becomes a problem (with the known effects and simulated requirements,
+    where there are any).
     """
     gaps = tuple(_gap(table, problem.limits.sync) for table in problem.roles if not table.options)
     conflict, minimal = _conflict(problem)
     further = _further(problem, conflict)
-    members, *others = (
-        tuple(_member(loaded, problem, kind) for kind in kinds)
-        for kind_sets in ((conflict,), further)
-        for kinds in kind_sets
+    moves = _proven(lambda: requirement_fixes(loaded, problem, build))
+    fixes = [fix for together in moves if len(together) == 1 for fix in together]
+    joint = tuple(together for together in moves if len(together) > 1)
+    if not moves:
+        joint = joint_fixes(loaded, problem, build)
+    fixes += _proven(lambda: method_fixes(loaded, build, problem))
+    fixes += _proven(lambda: platform_fixes(loaded, build))
+    return Explanation(
+        gaps,
+        tuple(_member(loaded, part) for part in conflict),
+        minimal,
+        tuple(fixes),
+        tuple(tuple(_member(loaded, part) for part in parts) for parts in further),
+        joint,
+        _each_suffices(loaded, problem, build, conflict),
     )
-    fixes: list[Fix] = []
-    sources: tuple[Callable[[], Any], ...] = (
-        lambda: requirement_fixes(loaded, problem),
-        lambda: method_fixes(loaded, build, problem),
-        lambda: platform_fixes(loaded, build),
-    )
-    for source in sources:
-        try:
-            fixes += source()
-        except NoVerdict:  # a remedy that cannot be proven is not offered
-            continue
-    joint = joint_fixes(loaded, problem, (conflict, *further)) if further and not fixes else ()
-    simulated = tuple(r.id for r in loaded.spec.requirements if r.kind == "monte_carlo")
-    return Explanation(gaps, members, minimal, tuple(fixes), tuple(others), joint, simulated)
 
 
-def _further(problem: Problem, first: tuple[str, ...]) -> tuple[tuple[str, ...], ...]:
+def _proven(source: Callable[[], Iterable[Found]]) -> list[Found]:
+    """What a source finds until it can prove no more."""
+    found: list[Found] = []
+    with suppress(NoVerdict):  # a remedy that cannot be proven is not offered
+        found.extend(source())
+    return found
+
+
+def _each_suffices(
+    loaded: LoadedSpec, problem: Problem, build: Build, conflict: Sequence[Part]
+) -> bool:
+    """Whether the spec has a design without any one requirement of the conflict, as it would be
+    written: another requirement of the kind stays, and without a sync requirement 1.0 is implied.
+    """
+
+    def helps(part: Part) -> bool:
+        if part.id is None:
+            return is_feasible(lifted(problem, [part]))
+        rest = [one for one in loaded.spec.requirements if one.id != part.id]
+        return is_feasible(build(with_requirements(loaded, rest)))
+
+    try:
+        return bool(conflict) and all(map(helps, conflict))
+    except NoVerdict:
+        return False
+
+
+def _further(problem: Problem, first: tuple[Part, ...]) -> tuple[tuple[Part, ...], ...]:
     """Conflicts that remain, one after the other, once those before them are lifted."""
-    found: list[tuple[str, ...]] = []
-    lifted = list(first)
-    while lifted:
-        rest = with_limits(problem, _without(problem.limits, lifted))
+    found: list[tuple[Part, ...]] = []
+    gone = list(first)
+    while gone:
+        rest = lifted(problem, gone)
         try:
             conflict = () if is_feasible(rest) else _conflict(rest)[0]
         except NoVerdict:
@@ -169,7 +193,7 @@ def _further(problem: Problem, first: tuple[str, ...]) -> tuple[tuple[str, ...],
         if not conflict:
             break
         found.append(conflict)
-        lifted += conflict
+        gone += conflict
     return tuple(found)
 
 
@@ -191,48 +215,31 @@ def _gap(table: RoleTable, sync_limit: float) -> RoleGap:
     return RoleGap(table.stage_name, table.role, None, None, text)
 
 
-def _conflict(problem: Problem) -> tuple[tuple[str, ...], bool]:
-    """A set of requirement kinds that cannot hold together, none of which can be left out."""
-    active = [kind for kind in KINDS if _is_active(problem.limits, kind)]
+def _conflict(problem: Problem) -> tuple[tuple[Part, ...], bool]:
+    """A set of requirements that cannot hold together, none of which can be left out."""
+    every = parts_of(problem)
+    active = list(every)
     try:
-        if not is_feasible(with_limits(problem, _without(problem.limits, active))):
+        if not is_feasible(lifted(problem, active)):
             return (), False
     except NoVerdict:
         return tuple(active), False
     minimal = True
-    for kind in list(active):
-        absent = [k for k in KINDS if k not in active or k == kind]
+    for part in every:
+        absent = [one for one in every if one not in active or one == part]
         try:
-            feasible = is_feasible(with_limits(problem, _without(problem.limits, absent)))
+            feasible = is_feasible(lifted(problem, absent))
         except NoVerdict:
             minimal, feasible = False, True
         if not feasible:
-            active.remove(kind)
+            active.remove(part)
     return tuple(active), minimal
 
 
-def _is_active(limits: Limits, kind: str) -> bool:
-    if kind == "sync":
-        return math.isfinite(limits.sync)
-    return (limits.accuracy_m if kind == "accuracy" else getattr(limits, kind)) is not None
-
-
-def _without(limits: Limits, kinds: list[str]) -> Limits:
-    """Limits with some kinds lifted."""
-    changes: dict[str, Any] = {}
-    for kind in kinds:
-        if kind == "sync":
-            changes["sync"] = math.inf
-        else:
-            changes["accuracy_m" if kind == "accuracy" else kind] = None
-    return replace(limits, **changes)
-
-
-def _member(loaded: LoadedSpec, problem: Problem, kind: str) -> ConflictMember:
-    name = dict(problem.limits.ids).get(kind)
+def _member(loaded: LoadedSpec, part: Part) -> ConflictMember:
     line = None
     for index, requirement in enumerate(loaded.spec.requirements):
-        if requirement.id == name:
+        if requirement.id == part.id:
             place = loaded.positions.get(("requirements", index))
             line = place[0] if place else None
-    return ConflictMember(kind, name, line)
+    return ConflictMember(part.kind, part.id, line)

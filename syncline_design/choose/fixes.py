@@ -1,51 +1,49 @@
-"""Smallest single changes that make an infeasible spec feasible, each solved again."""
+"""Smallest changes that make an infeasible spec feasible, each solved again as it would be written.
+
+A fix is applied to the loaded spec (its limit, its platform, its methods) and the whole choice is
+made anew, simulation and known effects included, before it is offered.
+"""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, Literal
 
-from syncline_design.choose.decide import choose
-from syncline_design.choose.evaluate import Evaluation, evaluate
-from syncline_design.choose.outcome import Choice
-from syncline_design.choose.variations import (
-    PLATFORM_FIGURES,
-    Build,
-    PlatformFigure,
-    platform_figure,
-    quantity,
-    with_methods,
-    with_platform_figure,
-)
-from syncline_design.design_space import RESOURCES, Objective, Problem, ResourceName, with_limits
+from syncline_design.choose.outcome import NoVerdict
+from syncline_design.choose.parts import SIMULATED, Part, is_feasible, least, parts_of, solve
+from syncline_design.choose.variations import Build, with_methods
+from syncline_design.choose.written import in_unit_of, money, plain
+from syncline_design.design_space import Problem
 from syncline_design.loading import LoadedSpec
 from syncline_design.resolution import candidate_sensors, timestamping_of, usable_primitives
-from syncline_design.spec import InlineTimestamping
-from syncline_design.units import UNITS, Dimension, format_quantity
+from syncline_design.spec import InlineTimestamping, Requirement
+from syncline_design.units import Dimension, Quantity, format_quantity
 
-FixKind = Literal["accuracy", "sync", "cost", "mass", "power", "platform", "timestamping"]
-DIGITS = 3
-STEPS = 40
-CLOSE = 1e-4
-LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
+FixKind = Literal[
+    "accuracy", "sync", "cost", "mass", "power", "monte_carlo", "platform", "timestamping"
+]
 MOST_METHODS = 3
-LARGEST_RATIO = 1e12
-DIMENSIONS: dict[ResourceName, Dimension] = {
-    "cost": Dimension.MONEY,
+TRIES = 6
+WIDENING = Fraction(1, 100)  # by which a simulated limit is widened when it does not hold yet
+IMPLIED = "SYNC"
+DIMENSIONS = {
+    "accuracy": Dimension.LENGTH,
+    "monte_carlo": Dimension.LENGTH,
     "mass": Dimension.MASS,
     "power": Dimension.POWER,
 }
+UNITS_OF = {"accuracy": "m", "monte_carlo": "m", "sync": "1", "mass": "kg", "power": "W"}
 
 
 @dataclass(frozen=True, slots=True)
 class Fix:
     """One change that was solved again and does make the spec feasible.
 
-    requirement: id of the requirement it changes, None where it changes something else.
-    before, after: the figure in SI (None: not a figure).
+    requirement: id of the requirement it changes, None where it changes something else; figure and
+    stage: of the platform figure that it changes.  before, after: the figure in SI or the spec's
+    currency (None: not a figure), unit: theirs.
     """
 
     kind: FixKind
@@ -53,168 +51,139 @@ class Fix:
     before: float | None
     after: float | None
     text: str
+    figure: str | None = None
+    stage: str | None = None
+    unit: str | None = None
 
     def to_json(self) -> dict[str, Any]:
         """The entry under `fixes`."""
         return {
             "kind": self.kind,
             "requirement": self.requirement,
+            "figure": self.figure,
+            "stage": self.stage,
             "from": self.before,
             "to": self.after,
+            "unit": self.unit,
             "text": self.text,
             "proven": True,
         }
 
 
-def solve(problem: Problem) -> Evaluation | None:
-    """The best design's sums; None when there is none."""
-    found = choose(problem, "front")
-    return evaluate(problem, found.design) if isinstance(found, Choice) else None
+Move = tuple[Requirement | None, float, Quantity]  # requirement (None: implied), before, after
 
 
-def is_feasible(problem: Problem) -> bool:
-    """Whether any design meets the spec."""
-    return solve(problem) is not None
+def requirement_fixes(
+    loaded: LoadedSpec, problem: Problem, build: Build
+) -> Iterator[tuple[Fix, ...]]:
+    """For each requirement alone the least relaxation that helps.
+
+    Several fixes at once where two requirements of a kind stand in the way.
+    """
+    for part in parts_of(problem):
+        try:
+            value = least(problem, part)
+            found = value and proven(loaded, problem, build, {part: value})
+        except NoVerdict:  # a remedy that cannot be proven is not offered
+            continue
+        if found:
+            yield found
 
 
-def requirement_fixes(loaded: LoadedSpec, problem: Problem) -> Iterator[Fix]:
-    """For each requirement alone the least relaxation that helps."""
-    names, currency = dict(problem.limits.ids), loaded.spec.currency
-    written = {r.id: getattr(r.limit, "text", "") for r in loaded.spec.requirements}
-    if problem.limits.accuracy_m is not None:
-        name = names.get("accuracy", "accuracy")
-        yield from _accuracy_fix(problem, name, written.get(name, ""))
-    yield from _sync_fix(problem, names.get("sync"))
-    for resource in RESOURCES:
-        if problem.limits.budget(resource) is not None:
-            yield from _budget_fix(problem, resource, names.get(resource, resource), currency)
-
-
-def _towards(problem: Problem, objective: Objective, **limits: Any) -> Evaluation | None:
-    """Sums of the best design for an objective under changed limits."""
-    changed = with_limits(problem, replace(problem.limits, **limits))
-    return solve(replace(changed, objective=objective))
-
-
-def _accuracy_fix(problem: Problem, name: str, text: str) -> Iterator[Fix]:
-    best = _towards(problem, "error", accuracy_m=None)
-    before = problem.limits.accuracy_m
-    if best is None or before is None:
-        return
-    after = rounded(best.error_m, up=True)
-    if _towards(problem, problem.objective, accuracy_m=after) is None:
-        after = best.error_m
-    shown = [in_unit_of(text, v, Dimension.LENGTH) for v in (before, after)]
-    yield Fix("accuracy", name, before, after, f"{name} from {shown[0]} to {shown[1]}")
-
-
-def _sync_fix(problem: Problem, name: str | None) -> Iterator[Fix]:
-    def holds(limit: float) -> bool:
-        return is_feasible(with_limits(problem, replace(problem.limits, sync=limit)))
-
-    before = problem.limits.sync
-    if not holds(math.inf):
-        return
-    high = 2.0 * before
-    while not holds(high) and high < LARGEST_RATIO:
-        high *= 4.0
-    if not holds(high):
-        return
-    after = _bisect(holds, before, high, up=True)
-    shown = f"{before:.6g} to {after:.6g}"
-    text = f"{name} from {shown}"
-    if name is None:
-        text = f"the implied sync limit from {shown}: write {{kind: sync, limit: {after:.6g}}}"
-    yield Fix("sync", name, before, after, text)
-
-
-def _budget_fix(
-    problem: Problem, resource: ResourceName, name: str, currency: str
-) -> Iterator[Fix]:
-    least = _towards(problem, resource, **{resource: None})
-    before = problem.limits.budget(resource)
-    amount = least.amount(resource) if least is not None else None
-    if before is None or amount is None:
-        return
-    after = Fraction(math.ceil(amount)) if resource == "cost" else amount
-    if resource != "cost":
-        after = max(amount, Fraction(rounded(float(amount), up=True)))
-    if _towards(problem, problem.objective, **{resource: after}) is None:
-        return
-    dimension = {"cost": Dimension.MONEY, "mass": Dimension.MASS, "power": Dimension.POWER}[
-        resource
-    ]
-    shown = [
-        format_quantity(float(v), dimension, DIGITS + 2, currency)
-        for v in (after - before, before, after)
-    ]
-    text = f"{name} by {shown[0]}, from {shown[1]} to {shown[2]}"
-    yield Fix(resource, name, float(before), float(after), text)
-
-
-def platform_fixes(loaded: LoadedSpec, build: Build) -> Iterator[Fix]:
-    """Slower, nearer or turning less: the least reduction of one figure of one stage that helps."""
-    for index, stage in enumerate(loaded.spec.stages):
-        for figure, (words, dimension) in PLATFORM_FIGURES.items():
-            found = _platform_fix(loaded, build, index, figure, dimension)
-            if found is not None:
-                before, after = found
-                written = getattr(before, "text", "")
-                shown = [in_unit_of(written, v, dimension) for v in (before, after)]
-                text = f"{words} of {stage.name} from {shown[0]} to {shown[1]}"
-                yield Fix("platform", None, float(before), after, text)
-
-
-def _platform_fix(
-    loaded: LoadedSpec, build: Build, stage: int, figure: PlatformFigure, dimension: Dimension
-) -> tuple[float, float] | None:
-    before = platform_figure(loaded, stage, figure)
-    if before <= 0.0:
-        return None
-
-    def holds(value: float) -> bool:
-        changed = with_platform_figure(loaded, stage, figure, quantity(value, dimension))
-        return is_feasible(build(changed))
-
-    unit = 180.0 / math.pi if dimension is Dimension.ANGULAR_RATE else 1.0
-    last = before
-    for share in (0.9, 0.7, 0.5, 0.3, 0.1, 0.03, 0.01, LEAST_SHARE):
-        if holds(share * before):
-            return before, _bisect(holds, last, share * before, up=False, unit=unit)
-        last = share * before
+def proven(
+    loaded: LoadedSpec, problem: Problem, build: Build, values: Mapping[Part, Fraction]
+) -> tuple[Fix, ...] | None:
+    """The changes that bring limits to these values, if the spec so written has a design."""
+    for attempt in range(TRIES):
+        moves = [
+            move
+            for part, value in values.items()
+            for move in _moves(loaded, problem, part, _widened(part, value, attempt))
+        ]
+        if moves and is_feasible(build(with_moves(loaded, moves))):
+            return tuple(_fix(loaded, move) for move in moves)
+        if not any(part.kind == SIMULATED for part in values):
+            return None
     return None
 
 
-def _bisect(
-    holds: Callable[[float], bool], fails: float, works: float, *, up: bool, unit: float = 1.0
-) -> float:
-    """The value nearest to `fails` that works, to 1e-4 and then three figures in its unit."""
-    for _ in range(STEPS):
-        if abs(works - fails) <= CLOSE * abs(works):
-            break
-        middle = 0.5 * (works + fails)
-        works, fails = (middle, fails) if holds(middle) else (works, middle)
-    shown = rounded(works * unit, up=up) / unit
-    return shown if holds(shown) else works
+def _widened(part: Part, value: Fraction, attempt: int) -> Fraction:
+    return value * (1 + attempt * WIDENING) if part.kind == SIMULATED else value
 
 
-def in_unit_of(written: str, value: float, dimension: Dimension) -> str:
-    """A figure in the unit that the user wrote, such as `5 cm`; else in a usual one."""
-    unit = written.partition(" ")[2].strip()
-    known = UNITS.get(unit)
-    if known is None or known[0] is not dimension:
-        return format_quantity(value, dimension, DIGITS + 2)
-    return f"{value / float(known[1]):.5g} {unit}"
+def _moves(loaded: LoadedSpec, problem: Problem, part: Part, value: Fraction) -> Iterator[Move]:
+    """Requirements whose limit has to move for the kind's to reach a value, and where to."""
+    if part.kind == "sync" and part.id is None:
+        yield None, problem.limits.sync, plain(value, up=True)
+        return
+    for requirement in loaded.spec.requirements:
+        if requirement.kind != part.kind or (part.kind == SIMULATED and requirement.id != part.id):
+            continue
+        before = _limit(loaded, requirement)
+        if before < value:
+            yield requirement, float(before), _rounded_up(loaded, requirement, value)
 
 
-def rounded(value: float, *, up: bool) -> float:
-    """Three significant figures, rounded up or down."""
-    if value == 0.0 or not math.isfinite(value):
-        return value
-    power = DIGITS - 1 - math.floor(math.log10(abs(value)))
-    scaled = Fraction(value) * Fraction(10) ** power
-    whole = math.ceil(scaled) if up else math.floor(scaled)
-    return float(whole / Fraction(10) ** power)
+def _limit(loaded: LoadedSpec, requirement: Requirement) -> Fraction:
+    """A requirement's limit in SI or the spec's currency."""
+    limit = requirement.limit
+    if requirement.kind == "cost" and isinstance(limit, Quantity):
+        return loaded.spec.in_currency(limit)
+    return limit.exact if isinstance(limit, Quantity) else Fraction(limit)
+
+
+def _rounded_up(loaded: LoadedSpec, requirement: Requirement, value: Fraction) -> Quantity:
+    limit = requirement.limit
+    if requirement.kind == "sync":
+        return plain(value, up=True)
+    if requirement.kind == "cost":
+        currency = getattr(limit, "currency", None) or loaded.spec.currency
+        rate = loaded.spec.in_currency(Quantity(Fraction(1), "", None, currency))
+        return money(value, rate, currency)
+    return in_unit_of(getattr(limit, "text", ""), value, DIMENSIONS[requirement.kind], up=True)
+
+
+def with_moves(loaded: LoadedSpec, moves: Sequence[Move]) -> LoadedSpec:
+    """The spec with other limits."""
+    limits = {requirement.id: after for requirement, _, after in moves if requirement is not None}
+    requirements = [
+        one.model_copy(update={"limit": limits[one.id]}) if one.id in limits else one
+        for one in loaded.spec.requirements
+    ]
+    for requirement, _, after in moves:
+        if requirement is None:
+            requirements.append(Requirement.model_construct(id=IMPLIED, kind="sync", limit=after))
+    return with_requirements(loaded, requirements)
+
+
+def with_requirements(loaded: LoadedSpec, requirements: Sequence[Requirement]) -> LoadedSpec:
+    """The spec with other requirements."""
+    spec = loaded.spec.model_copy(update={"requirements": tuple(requirements)})
+    return replace(loaded, spec=spec)
+
+
+def _fix(loaded: LoadedSpec, move: Move) -> Fix:
+    requirement, before, after = move
+    if requirement is None:
+        text = (
+            f"the implied sync limit from {before:.6g} to {after.text}: "
+            f"write {{kind: sync, limit: {after.text}}}"
+        )
+        return Fix("sync", None, before, float(after), text, unit="1")
+    name, kind = requirement.id, requirement.kind
+    written = getattr(requirement.limit, "text", f"{before:.6g}")
+    unit = UNITS_OF.get(kind, loaded.spec.currency)
+    if kind != "cost":
+        text = f"{name} from {written} to {after.text}"
+        return Fix(kind, name, before, float(after), text, unit=unit)
+    exact = requirement.limit.exact if isinstance(requirement.limit, Quantity) else Fraction(0)
+    currency = after.currency or loaded.spec.currency
+    shown = [
+        format_quantity(float(v), Dimension.MONEY, currency=currency)
+        for v in (after.exact - exact, exact, after.exact)
+    ]
+    text = f"{name} by {shown[0]}, from {shown[1]} to {shown[2]}"
+    return Fix(kind, name, before, float(loaded.spec.in_currency(after)), text, unit=unit)
 
 
 def method_fixes(loaded: LoadedSpec, build: Build, problem: Problem) -> Iterator[Fix]:
@@ -241,4 +210,4 @@ def method_fixes(loaded: LoadedSpec, build: Build, problem: Problem) -> Iterator
                 found.append((float(best.cost or 0), name))
         for _, name in sorted(found)[:MOST_METHODS]:
             text = f"let {table.role} of {stage.name} be stamped by {name}"
-            yield Fix("timestamping", None, None, None, text)
+            yield Fix("timestamping", None, None, None, text, stage=stage.name)

@@ -52,6 +52,10 @@ def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint
     if priced.is_empty:
         return ()
     points = merged_front(priced.problem, resource, accuracy=False)
+    if problem.judge is not None:
+        from syncline_design.choose.simulated_front import accepted_front
+
+        points = accepted_front(priced.problem, resource, points)
     return tuple(replace(point, design=priced.whole(point.design)) for point in points)
 
 

@@ -22,6 +22,10 @@ class TooLarge(NoVerdict):
     """One road gives up; another may still do it."""
 
 
+class Unfinished(NoVerdict):
+    """So many designs were simulated that the search gave up."""
+
+
 class Deadline:
     """A point in time after which a road gives up."""
 
@@ -44,11 +48,13 @@ class FrontPoint:
     """One point of the exact front: the least of a resource for this error, and the design.
 
     amount: infinite where a catalog entry does not say (only off the fronts that are shown).
+    undecided: ids of simulated requirements that its samples leave open.
     """
 
     amount: Fraction | float
     error_m: float
     design: Design
+    undecided: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,18 +73,34 @@ class Proof:
 
 @dataclass(frozen=True, slots=True)
 class Choice:
-    """The best design."""
+    """The best design.
+
+    passed_over: how many better ones by the sums fail in simulation, or are left open by it.
+    undecided: ids of simulated requirements that are open for the design itself; then no design
+    is known to meet them.  exhausted: False when the search ended before every design was tried;
+    the design is then the first by the sums alone.
+    """
 
     design: Design
     proof: Proof
+    passed_over: int = 0
+    undecided: tuple[str, ...] = ()
+    exhausted: bool = True
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the design meets every requirement."""
+        return self.exhausted and not self.undecided
 
 
 @dataclass(frozen=True, slots=True)
 class Infeasible:
     """No design meets every requirement.
 
-    proof: the road that showed it; empty_roles: roles that have no option at all.
+    proof: the road that showed it; empty_roles: roles that have no option at all; passed_over: how
+    many designs keep every sum and fail in simulation.
     """
 
     proof: Proof
     empty_roles: tuple[int, ...] = ()
+    passed_over: int = 0
