@@ -20,7 +20,7 @@ from syncline_design.choose import presentation
 from syncline_design.choose.decide import best
 from syncline_design.choose.explain import Explanation, explain
 from syncline_design.choose.front import front
-from syncline_design.choose.outcome import FrontPoint, Method
+from syncline_design.choose.outcome import ROADS, FrontPoint, Method
 from syncline_design.choose.prices import Step, staircase
 from syncline_design.choose.slack import Slack, slack_ledger
 from syncline_design.choose.tolerance import (
@@ -34,7 +34,6 @@ from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked, pick
 from syncline_design.problem import selection_of
 from syncline_design.spec_writer import PinnedRole, pinned_spec_text
-from syncline_design.units import Dimension, format_quantity
 from syncline_design.verdict import files_json
 from syncline_design.verify import CheckSettings, verify
 from syncline_design.yaml_reader import printable
@@ -181,12 +180,13 @@ def optimisation_text(found: Optimisation) -> str:
 
 def _proof_line(found: Optimisation) -> str:
     proof = found.picked.choice.proof
-    others = f", confirmed by {' and '.join(proof.agrees_with)}" if proof.agrees_with else ""
+    confirmed = " and ".join(ROADS.get(road, road) for road in proof.agrees_with)
+    others = f", confirmed by {confirmed}" if confirmed else ""
     passed = found.picked.passed_over
     skipped = f"; {passed} better ones fail the Monte Carlo requirements" if passed else ""
     return (
         f"Best of {problem_size(found.problem)} combinations by {found.loaded.spec.objective}: "
-        f"proven by {proof.method}{others}, rechecked exactly{skipped}"
+        f"proven by {ROADS.get(proof.method, proof.method)}{others}, rechecked exactly{skipped}"
     )
 
 
@@ -202,15 +202,10 @@ def _measure_lines(hinges: Hinges) -> list[str]:
     lines = ["What to measure next (a single figure that changes the choice):"]
     for one in hinges.measure_next:
         spread = " (20 % assumed)" if one.assumed else ""
-        now, then = (_figure_text(one.figure, value) for value in (one.value, one.at))
-        lines.append(f"  {one.figure} from {now} to {then}{spread}: {one.becomes}")
+        lines.append(
+            f"  {one.figure} from {one.value_text} to {one.at_text}{spread}: {one.becomes}"
+        )
     return lines
-
-
-def _figure_text(figure: str, value: float) -> str:
-    """A sensor's figure with its unit: angles for attitude and bearing, lengths otherwise."""
-    angular = "sigma_attitude" in figure or "sigma_bearing" in figure
-    return format_quantity(value, Dimension.ANGLE if angular else Dimension.LENGTH)
 
 
 def optimisation_csv(found: Optimisation) -> str:

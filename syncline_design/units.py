@@ -320,6 +320,17 @@ def format_quantity(
     return f"{_figure(si_value / float(UNITS[chosen][1]), digits)} {chosen}"
 
 
+def format_like(written: str, si_value: float, digits: int = 4) -> str:
+    """A figure in the unit in which another one was written: `0.04 deg` beside `0.05 deg +/- 20 %`.
+
+    Text without a known unit gives the bare figure.
+    """
+    unit = next((part for part in written.split() if part in UNITS and part != "%"), None)
+    if unit is None:
+        return _figure(si_value, digits)
+    return f"{_figure(si_value / float(UNITS[unit][1]), digits)} {unit}"
+
+
 def _figure(value: float, digits: int) -> str:
     """`digits` significant figures without exponent where that stays readable, zeros trimmed."""
     rounded = float(f"{value:.{digits - 1}e}")

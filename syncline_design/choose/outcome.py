@@ -12,6 +12,12 @@ from syncline_design.design_space import Design
 
 Method = Literal["auto", "front", "milp", "enumerate"]
 METHODS: tuple[Method, ...] = ("auto", "front", "milp", "enumerate")
+# The roads in words, for every text that says how a design was proven best.
+ROADS: dict[str, str] = {
+    "front": "the exact Pareto front",
+    "milp": "an integer program",
+    "enumerate": "enumeration of all designs",
+}
 
 
 class NoVerdict(Exception):  # noqa: N818 - an outcome with its own exit code, not a failure

@@ -30,6 +30,7 @@ from syncline_design.design_space import RESOURCES, Design, Problem
 from syncline_design.loading import LoadedSpec
 from syncline_design.problem import build_problem, selection_of, with_everything
 from syncline_design.selection import RoleSelection
+from syncline_design.units import format_like
 
 Word = Literal["always", "sometimes", "never"]
 ASSUMED_SPREAD = Fraction(1, 5)  # where a datasheet gives no tolerance, for `measure_next` only
@@ -173,6 +174,7 @@ def _span(
 class Measurement:
     """A datasheet figure that alone changes the choice when it lies at one end of its range.
 
+    value and at are in SI; value_text is the figure as written, at_text the other end in its unit.
     assumed: the datasheet gives no tolerance and 20 % to either side was tried.
     """
 
@@ -182,6 +184,8 @@ class Measurement:
     assumed: bool
     becomes: str
     objective_change: float | None
+    value_text: str
+    at_text: str
 
     def to_json(self) -> dict[str, Any]:
         """The entry under `measure_next`."""
@@ -189,6 +193,8 @@ class Measurement:
             "figure": self.figure,
             "value": self.value,
             "at": self.at,
+            "value_text": self.value_text,
+            "at_text": self.at_text,
             "assumed_tolerance": self.assumed,
             "becomes": self.becomes,
             "objective_change": self.objective_change,
@@ -236,7 +242,7 @@ def _flips(
         other = build(with_figure(loaded, figure, quantity(end, figure.dimension)))
         outcome = choose(other, "front")
         if not isinstance(outcome, Choice):
-            yield Measurement(figure.name, float(value), end, assumed, "infeasible", None)
+            yield _measurement(figure, end, assumed, "infeasible", None)
             continue
         then = payload(other, outcome.design)
         if then != now:
@@ -246,7 +252,17 @@ def _flips(
                 if (sensor, method) != before
             ]
             change = _objective(other, outcome.design) - _objective(problem, design)
-            yield Measurement(figure.name, float(value), end, assumed, "; ".join(changes), change)
+            yield _measurement(figure, end, assumed, "; ".join(changes), change)
+
+
+def _measurement(
+    figure: Figure, end: float, assumed: bool, becomes: str, change: float | None
+) -> Measurement:
+    value = figure.quantity
+    return Measurement(
+        figure.name, float(value), end, assumed, becomes, change, value.text,
+        format_like(value.text, end),
+    )  # fmt: skip
 
 
 def _objective(problem: Problem, design: Design) -> float:

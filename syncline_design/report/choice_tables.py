@@ -69,16 +69,22 @@ def measure_next(verdict: Json) -> Table | None:
     rows = [
         (
             str(entry.get("figure")),
-            Cell(numbers.number(entry.get("value")), numbers.finite(entry.get("value"))),
-            Cell(numbers.number(entry.get("at")), numbers.finite(entry.get("at"))),
+            Cell(_written(entry, "value"), numbers.finite(entry.get("value"))),
+            Cell(_written(entry, "at"), numbers.finite(entry.get("at"))),
             "20 % tried, the datasheet gives none" if entry.get("assumed_tolerance")
             else "datasheet tolerance",
             str(entry.get("becomes") or ""),
         )
         for entry in items(source, "measure_next")
     ]  # fmt: skip
-    heads = ("Figure (SI)", "Now #", "Flips at #", "Range", "The choice becomes")
+    heads = ("Figure", "Now #", "Flips at #", "Range", "The choice becomes")
     return table("What to measure next", heads, rows) if rows else None
+
+
+def _written(entry: Json, key: str) -> str:
+    """A datasheet figure in the unit in which it was written."""
+    text = entry.get(f"{key}_text")
+    return str(text) if text else numbers.number(entry.get(key))
 
 
 def tolerance_sentence(verdict: Json) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+from syncline_design.choose.outcome import ROADS
 from syncline_design.report import (
     choice_tables,
     errata,
@@ -205,9 +206,7 @@ def _proof(verdict: Json) -> str:
     proof = part(part(verdict, "choice"), "proof")
     if not proof:
         return ""
-    methods = {"front": "the exact Pareto front", "milp": "an integer program",
-               "enumeration": "enumeration of all designs"}  # fmt: skip
-    method = methods.get(str(proof.get("method")), str(proof.get("method")))
+    method = ROADS.get(str(proof.get("method")), str(proof.get("method")))
     combinations = str(part(verdict, "spec").get("combinations") or "")
     among = f" among {_grouped(combinations)} combinations" if combinations.isdigit() else ""
     optimal = "proven optimal" if proof.get("optimal") else "not proven optimal"

@@ -96,10 +96,10 @@ def shared(verdict: Json) -> Table | None:
     ]
     rows += [
         (
-            f"clock: {entry.get('id')}",
+            f"clock: {entry.get('name') or entry.get('id')}",
             str(entry.get("vehicle")),
             Cell("1", 1.0),
-            Cell(numbers.MISSING),
+            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
         )
         for entry in items(design, "clocks")
         if entry.get("id")
