@@ -1,17 +1,22 @@
-"""Figures of a study: least cost over two factors, fronts side by side, a sampled study."""
+"""Figures of a study: least cost over two factors, fronts side by side, a sampled study.
+
+A cost is shown by the strength of one colour over the page's surface: the dearer, the stronger,
+which holds on a light and on a dark page alike.  A scale beside the cells says what is what.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
-from syncline_design.report.palette import BAD, GOOD, INK, MUTED, SERIES, SURFACE
+from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.svg import InlineFigure, add_axes, draw
 from syncline_design.report.text import shortened
+from syncline_design.study.scatter import Scatter, ScatterAxis
 from syncline_design.study.summary import HeatMap
 
 if TYPE_CHECKING:
@@ -37,6 +42,7 @@ def cost_map(heat: HeatMap, currency: str, name: str = "fig-heat") -> InlineFigu
         _label_axis(axes, "y", heat.y_labels)
         axes.set_xlabel(shortened(heat.x.key, 60))
         axes.set_ylabel(shortened(heat.y.key, 40))
+        _cost_scale(figure, costs, currency)
 
     spoken = "No case meets its requirements."
     if costs:
@@ -45,7 +51,7 @@ def cost_map(heat: HeatMap, currency: str, name: str = "fig-heat") -> InlineFigu
             f"{numbers.money(max(costs), currency)} in {len(costs)} of "
             f"{len(heat.x_labels) * len(heat.y_labels)} cells; in the others no case meets."
         )
-    height = 110.0 + 30.0 * min(len(heat.y_labels), 14)
+    height = 140.0 + 30.0 * min(len(heat.y_labels), 14)
     return draw(name, "Least cost over two factors", spoken, (WIDTH, height), build)
 
 
@@ -60,12 +66,9 @@ def _cell(
         axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=MUTED, linewidth=0.6))
         axes.text(x, y, "\u2715", ha="center", va="center", color=BAD)
         return
-    span = (max(costs) - min(costs)) or 1.0
-    share = (cost - min(costs)) / span
     axes.add_patch(
         Rectangle(
-            corner, 1, 1, facecolor=SERIES[0], alpha=_FAINT + (_STRONG - _FAINT) * share,
-            linewidth=0,
+            corner, 1, 1, facecolor=SERIES[0], alpha=_strength(cost, costs), linewidth=0
         )
     )  # fmt: skip
     axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=SURFACE, linewidth=1.2))
@@ -140,33 +143,82 @@ def _count_axis(axes: Axes) -> None:
     scales.set_ticks(axes, "x", places, numbers.count)
 
 
-@dataclass(frozen=True, slots=True)
-class Sampled:
-    """Where the cases of a sample lie in two factors, and which of them meet."""
-
-    x_label: str
-    y_label: str
-    points: tuple[tuple[float, float, bool], ...]  # (x, y, meets), in SI
+_VERDICTS = (  # verdicts, marker, colour, word
+    (("fails", "infeasible"), "x", BAD, "does not meet"),
+    (("indeterminate",), "^", WARN, "no verdict"),
+    (("refused",), "+", MUTED, "cannot be as combined"),
+)
 
 
-def sampled_cases(data: Sampled, name: str = "fig-sampled") -> InlineFigure:
-    """Cases over two sampled factors: discs meet, crosses do not."""
+def sampled_cases(data: Scatter, currency: str, name: str = "fig-sampled") -> InlineFigure:
+    """Computed cases over two factors: discs meet, the stronger the dearer; crosses do not."""
+    meeting = [point for point in data.points if point.verdict == "meets"]
+    costs = [point.cost for point in meeting if point.cost is not None]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        for meets, colour, marker, word in (
-            (True, GOOD, "o", "meets"),
-            (False, BAD, "x", "does not meet"),
-        ):
-            chosen = [(x, y) for x, y, met in data.points if met is meets]
+        for verdicts, marker, colour, word in _VERDICTS:
+            chosen = [(p.x, p.y) for p in data.points if p.verdict in verdicts]
             if chosen:
                 axes.plot(*zip(*chosen, strict=True), marker, color=colour, markersize=5,
                           label=f"{word} ({len(chosen)})")  # fmt: skip
-        axes.set_xlabel(shortened(data.x_label, 60))
-        axes.set_ylabel(shortened(data.y_label, 40))
+        for index, point in enumerate(meeting):
+            label = f"meets ({len(meeting)})" if index == 0 else None
+            axes.plot(point.x, point.y, "o", markersize=7, markerfacecolor=SERIES[0],
+                      markeredgecolor="none", alpha=_strength(point.cost, costs))  # fmt: skip
+            axes.plot(point.x, point.y, "o", markersize=7, markerfacecolor="none",
+                      markeredgecolor=SERIES[0], markeredgewidth=0.8, label=label)  # fmt: skip
+        _scatter_axis(axes, "x", data.x)
+        _scatter_axis(axes, "y", data.y)
         scales.grid(axes)
-        figure.legend(loc="outside lower left", ncols=2)
+        _cost_scale(figure, costs, currency)
+        figure.legend(loc="outside lower left", ncols=4, fontsize=9)
 
-    met = sum(point[2] for point in data.points)
-    spoken = f"{met} of {len(data.points)} sampled cases meet their requirements."
-    return draw(name, "Sampled cases over two factors", spoken, (WIDTH, 330.0), build)
+    spoken = f"{len(meeting)} of {len(data.points)} sampled cases meet their requirements."
+    height = 360.0 if not data.y.words else 190.0 + 40.0 * len(data.y.words)
+    return draw(name, "Sampled cases over two factors", spoken, (WIDTH, height), build)
+
+
+def _scatter_axis(axes: Axes, which: Literal["x", "y"], axis: ScatterAxis) -> None:
+    label = f"{shortened(axis.key, 60 if which == 'x' else 40)}" + (
+        f" [{axis.unit}]" if axis.unit else ""
+    )
+    if which == "x":
+        axes.set_xlabel(label)
+    else:
+        axes.set_ylabel(label)
+    if axis.words:
+        places = range(len(axis.words))
+        scales.set_ticks(axes, which, places, lambda p: shortened(axis.words[round(p)], 20))
+        limits = (-0.6, len(axis.words) - 0.4)
+        (axes.set_xlim if which == "x" else axes.set_ylim)(*limits)
+    elif axis.log:
+        (axes.set_xscale if which == "x" else axes.set_yscale)("log")
+        low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
+        scales.set_ticks(axes, which, scales.log_ticks(low, high), lambda p: f"{p:g}")
+
+
+def _strength(cost: float | None, costs: Sequence[float]) -> float:
+    """Opacity of a cost between the cheapest and the dearest."""
+    if cost is None or not costs:
+        return _FAINT
+    span = (max(costs) - min(costs)) or 1.0
+    return _FAINT + (_STRONG - _FAINT) * (cost - min(costs)) / span
+
+
+def _cost_scale(figure: Figure, costs: Sequence[float], currency: str) -> None:
+    """Five patches from the cheapest to the dearest, labelled; nothing where all cost the same."""
+    if len(set(costs)) < 2:
+        return
+    from matplotlib.patches import Rectangle
+
+    low, high = min(costs), max(costs)
+    steps = [low + (high - low) * step / 4 for step in range(5)]
+    patches = [
+        Rectangle((0, 0), 1, 1, facecolor=SERIES[0], alpha=_strength(cost, costs), linewidth=0)
+        for cost in steps
+    ]
+    words = [f"{_thousands(cost)}" for cost in steps]
+    words[-1] += f" {currency}"
+    figure.legend(patches, words, loc="outside upper left", ncols=5, fontsize=9,
+                  handlelength=1.6, columnspacing=1.0)  # fmt: skip

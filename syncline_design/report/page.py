@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import re
 from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
 
 _TEMPLATES: Final = "syncline_design.templates"
 MAX_BYTES: Final = 3_000_000
+_STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 
 
 def asset(name: str) -> str:
@@ -40,7 +42,7 @@ def _environment() -> Environment:
         """Every expression of every template passes here before it is escaped."""
         return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
 
-    return Environment(
+    environment = Environment(
         loader=FunctionLoader(asset),
         autoescape=True,  # select_autoescape() would miss .html.j2
         undefined=StrictUndefined,
@@ -48,6 +50,15 @@ def _environment() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
+    environment.filters["breakable"] = breakable
+    return environment
+
+
+def breakable(text: str) -> Any:
+    """A key path that may go on in the next line before each of its dots and brackets."""
+    from markupsafe import Markup, escape
+
+    return Markup("<wbr>").join(escape(part) for part in _STEP.split(visible(text)))
 
 
 def render_page(template: str, **content: Any) -> str:

@@ -6,8 +6,9 @@ from typing import Any
 
 from syncline_design import __version__
 from syncline_design.report import figures_study, numbers, page
-from syncline_design.report.study_rows import reason, si_unit
+from syncline_design.report.study_rows import reason
 from syncline_design.report.study_words import (
+    MOST_KEYS,
     boundary_table,
     heat_table,
     outcome,
@@ -15,11 +16,13 @@ from syncline_design.report.study_words import (
     winners_table,
 )
 from syncline_design.report.tables import Cell, Table, table
-from syncline_design.report.text import visible
+from syncline_design.report.text import sentence_list, visible
 from syncline_design.report.verdict_words import OUTCOMES
-from syncline_design.study.factors import figure_of
+from syncline_design.study.factors import Factor, figure_of
 from syncline_design.study.result import StudyResult
+from syncline_design.study.scatter import Scatter, scatter
 from syncline_design.study.summary import Brief, Front, Summary, heat_map, summarise, varied
+from syncline_design.yaml_reader import plain_scalar
 
 MOST_CASES = 500  # rows of the case table; CSV and Parquet have them all
 MOST_FRONTS = 8
@@ -30,12 +33,13 @@ def render_study_page(result: StudyResult) -> str:
     summary = summarise(result)
     currency = result.study.bases[0].currency
     heat = heat_map(summary)
+    sampled = scatter(summary) if heat is None else None
     shown = outcome(result)
     fronts = _distinct_fronts(summary)
     ends = boundary_table(summary)
     parts = {
         "heat": heat is not None,
-        "sampled": heat is None and _sampled(summary) is not None,
+        "sampled": sampled is not None,
         "winners": True,
         "ends": bool(ends.rows),
         "fronts": bool(fronts),
@@ -57,7 +61,10 @@ def render_study_page(result: StudyResult) -> str:
         facts=_facts(result),
         heat_figure=_svg(figures_study.cost_map(heat, currency)) if heat is not None else None,
         heat_table=heat_table(heat, currency) if heat is not None else None,
-        sampled_figure=_sampled_figure(summary) if parts["sampled"] else None,
+        sampled_figure=None
+        if sampled is None
+        else _svg(figures_study.sampled_cases(sampled, currency)),
+        sampled_caption="" if sampled is None else visible(_sampled_caption(sampled)),
         winners=winners_table(summary),
         ends=ends if ends.rows else None,
         fronts_figure=_fronts_figure(summary, fronts, currency) if fronts else None,
@@ -126,31 +133,17 @@ def _fronts_table(summary: Summary, currency: str) -> Table:
     return table("Fronts of cost against error", heads, rows, note)
 
 
-def _sampled(summary: Summary) -> figures_study.Sampled | None:
-    """Two numeric factors to place the cases in, when there is no grid for a heat map."""
-    numeric = [(i, f) for i, f in varied(summary) if si_unit(f) is not None][:2]
-    if len(numeric) < 2:
-        return None
-    (across, x), (up, y) = numeric
-    points = []
-    for brief in summary.briefs:
-        first, second = _figure(brief, across), _figure(brief, up)
-        if first is not None and second is not None:
-            points.append((first, second, brief.meets))
-    labels = [f"{factor.key} [{si_unit(factor)}]" for factor in (x, y)]
-    return figures_study.Sampled(labels[0], labels[1], tuple(points))
-
-
 def _figure(brief: Brief, place: int) -> float | None:
-    from syncline_design.yaml_reader import plain_scalar
-
     found = figure_of(plain_scalar(brief.labels[place]))
     return None if found is None else found[0]
 
 
-def _sampled_figure(summary: Summary) -> Any:
-    data = _sampled(summary)
-    return None if data is None else _svg(figures_study.sampled_cases(data))
+def _sampled_caption(data: Scatter) -> str:
+    text = (
+        "Computed cases only. A disc meets its requirements, the stronger its colour the dearer; "
+        "a cross does not."
+    )
+    return text + (f" Vary besides: {sentence_list(list(data.others))}." if data.others else "")
 
 
 def _case_table(summary: Summary, currency: str) -> Table:
@@ -165,13 +158,14 @@ def _case_table(summary: Summary, currency: str) -> Table:
         named = [Cell(result.study.bases[brief.base].name)] if many else []
         rows.append([
             Cell(str(brief.number), float(brief.number)), *named,
-            *(Cell(brief.labels[i], _sort(brief, i)) for i, _ in several),
+            *_setting_cells(brief, several),
             Cell(brief.verdict, tone=shown.tone, mark=shown.mark),
             Cell(numbers.money(brief.cost, currency), brief.cost),
             Cell(numbers.length(brief.error_m), brief.error_m),
             Cell(why),
         ])  # fmt: skip
-    varying = [*(["Base"] if many else []), *(factor.key for _, factor in several)]
+    keys = [factor.key for _, factor in several] if len(several) <= MOST_KEYS else ["Setting"]
+    varying = [*(["Base"] if many else []), *keys]
     ends = ["Verdict", "Price #", "Worst-case error #", "Payload, or why there is none"]
     heads = ["Case #", *varying, *ends]
     more = len(summary.briefs) - MOST_CASES
@@ -179,8 +173,11 @@ def _case_table(summary: Summary, currency: str) -> Table:
     return table("All cases", heads, rows, note)
 
 
-def _sort(brief: Brief, place: int) -> float | None:
-    return _figure(brief, place)
+def _setting_cells(brief: Brief, several: list[tuple[int, Factor]]) -> list[Cell]:
+    """What varies: a cell per key, or one cell that names them all."""
+    if len(several) <= MOST_KEYS:
+        return [Cell(brief.labels[i], _figure(brief, i)) for i, _ in several]
+    return [Cell("; ".join(f"{f.key} = {brief.labels[i]}" for i, f in several))]
 
 
 def _provenance(result: StudyResult) -> list[tuple[str, str]]:

@@ -22,7 +22,10 @@ from syncline_design.study.summary import (
 )
 
 MOST_ROWS = 200
-MOST_ACROSS, MOST_DOWN = 8, 20  # of tables on the console
+MOST_ACROSS = 8  # columns of figures in any table: more fit neither page nor console
+MOST_DOWN = 20  # of tables on the console
+MOST_KEYS = 3  # columns of their own for what varies; of more, one column names them all
+LEAST_COST = "Least cost of a payload that meets the requirements"
 _VERDICT_WORDS = {
     "meets": "meet their requirements",
     "fails": "do not meet them",
@@ -68,8 +71,9 @@ def study_text(result: StudyResult) -> str:
     lines = [f"{shown.mark} {visible(result.study.name)}: {shown.word}."]
     lines += [rule_sentence(result), ""]
     heat = heat_map(summary)
-    if heat is not None and len(heat.x_labels) <= MOST_ACROSS and len(heat.y_labels) <= MOST_DOWN:
-        lines += [plain_table(heat_table(heat, _currency(result))), ""]
+    costs = None if heat is None else heat_table(heat, _currency(result))
+    if costs is not None and len(costs.rows) <= MOST_DOWN:
+        lines += [plain_table(costs), ""]
     elif heat is not None:
         size = f"{len(heat.x_labels)} by {len(heat.y_labels)} values"
         lines += [f"Least cost over {size}: see --output html: or csv:", ""]
@@ -104,13 +108,36 @@ def _currency(result: StudyResult) -> str:
 
 
 def heat_table(heat: HeatMap, currency: str) -> Table:
-    """Least cost over two factors as a table."""
-    heads = [f"{heat.y.key} \\ {heat.x.key}", *(f"{text} #" for text in heat.x_labels)]
+    """Least cost over two factors as a table: across and down, or a row per cell where too wide."""
+    across, down, costs = heat.x, heat.y, heat.cost
+    names, sides = heat.x_labels, heat.y_labels
+    if len(names) > MOST_ACROSS and len(sides) <= MOST_ACROSS:
+        across, down, names, sides = down, across, sides, names
+        costs = tuple(zip(*heat.cost, strict=True))
+    if len(names) > MOST_ACROSS:
+        return _cell_table(heat, currency)
+    heads = [f"{down.key} \\ {across.key}", *(f"{text} #" for text in names)]
     rows = [
-        [Cell(name), *(_cost_cell(cost, currency) for cost in costs)]
-        for name, costs in zip(heat.y_labels, heat.cost, strict=True)
+        [Cell(name), *(_cost_cell(cost, currency) for cost in line)]
+        for name, line in zip(sides, costs, strict=True)
     ]
-    return table("Least cost of a payload that meets the requirements", heads, rows)
+    return table(LEAST_COST, heads, rows)
+
+
+def _cell_table(heat: HeatMap, currency: str) -> Table:
+    """The cells of a large map that a payload meets, a row each."""
+    rows = [
+        [Cell(y), Cell(x), _cost_cell(cost, currency), Cell(picks)]
+        for y, costs, payloads in zip(heat.y_labels, heat.cost, heat.picks, strict=True)
+        for x, cost, picks in zip(heat.x_labels, costs, payloads, strict=True)
+        if cost is not None
+    ]
+    left = len(heat.x_labels) * len(heat.y_labels) - len(rows)
+    more = max(0, len(rows) - MOST_ROWS)
+    note = f"In {left} cells no case meets." if left else ""
+    note += f" {more} further rows are left out." if more else ""
+    heads = (heat.y.key, heat.x.key, "Least cost #", "Payload")
+    return table(LEAST_COST, heads, rows[:MOST_ROWS], note.strip())
 
 
 def _cost_cell(cost: float | None, currency: str) -> Cell:
@@ -125,12 +152,21 @@ def winners_table(summary: Summary) -> Table:
     rows = [
         [
             Cell(w.pick.role), Cell(w.pick.name), Cell(w.pick.timestamping),
-            Cell(f"{w.cases} of {w.of}", float(w.cases)), *map(Cell, w.where),
+            Cell(f"{w.cases} of {w.of}", float(w.cases)), *_where_cells(several, w.where),
         ]
         for w in winners(summary)
     ]  # fmt: skip
-    heads = ["Role", "Sensor", "Timestamping", "Chosen in #", *(f"At {key}" for key in several)]
+    places = [f"At {key}" for key in several] if len(several) <= MOST_KEYS else ["At"]
+    heads = ["Role", "Sensor", "Timestamping", "Chosen in #", *places]
     return table("Which sensor and method wins where, of the cases that meet", heads, rows)
+
+
+def _where_cells(keys: list[str], where: tuple[str, ...]) -> list[Cell]:
+    """A cell per key, or one that leaves out the keys over which an option wins everywhere."""
+    if len(keys) <= MOST_KEYS:
+        return [Cell(text) for text in where]
+    told = [f"{key}: {text}" for key, text in zip(keys, where, strict=True) if text != "everywhere"]
+    return [Cell("; ".join(told) or "everywhere")]
 
 
 def boundary_table(summary: Summary, most: int = MOST_ROWS) -> Table:

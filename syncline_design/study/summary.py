@@ -11,7 +11,7 @@ from syncline_design.study.factors import Factor, figure_of, label
 from syncline_design.study.result import CaseResult, StudyResult
 
 MOST_FRONTS = 500
-MOST_CELLS = 40  # values per axis of the heat map; beyond that it is a scatter
+MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,17 +137,30 @@ def axis_values(factor: Factor) -> tuple[str, ...]:
 
 
 def heat_map(summary: Summary) -> HeatMap | None:
-    """The study's heat map: the factors it names, else its first two with several values."""
+    """The study's heat map: the factors it names, else its first two, those of the grid first.
+
+    None where a cell of it was never computed, as between the points of a sample: an empty cell
+    would read as one that nothing meets (`scatter` shows such a study).
+    """
     study = summary.result.study
-    several = [f for _, f in varied(summary)]
     if study.heat_map is not None:
         named = {f.key: f for f in study.factors}
         chosen = [named[study.heat_map.x], named[study.heat_map.y]]
     else:
+        several = sorted((f for _, f in varied(summary)), key=lambda f: f.origin != "grid")
         chosen = [f for f in several if len(axis_values(f)) <= MOST_CELLS][:2]
     if len(chosen) < 2 or any(len(axis_values(f)) > MOST_CELLS for f in chosen):
         return None
-    return _filled(summary, chosen[0], chosen[1])
+    x, y = chosen
+    return _filled(summary, x, y) if _covered(summary, x, y) else None
+
+
+def _covered(summary: Summary, x: Factor, y: Factor) -> bool:
+    """Whether every combination of the two factors' values was computed."""
+    factors = summary.result.study.factors
+    across, up = factors.index(x), factors.index(y)
+    computed = {(brief.labels[across], brief.labels[up]) for brief in summary.briefs}
+    return len(computed) == len(axis_values(x)) * len(axis_values(y))
 
 
 def _filled(summary: Summary, x: Factor, y: Factor) -> HeatMap:

@@ -1,0 +1,150 @@
+"""Pictures and tables of a study: only what was computed, costs by strength, nothing too wide."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from study_specs import write
+from syncline_design.report.figures_study import cost_map, sampled_cases
+from syncline_design.report.markdown import markdown_table
+from syncline_design.report.studies import render_study
+from syncline_design.report.study_words import MOST_ACROSS, heat_table, study_text
+from syncline_design.study import StudyResult, StudySettings, run_study
+from syncline_design.study.scatter import scatter
+from syncline_design.study.summary import HeatMap, heat_map, summarise
+from test_report_browser import Opened, browser  # noqa: F401  a fixture
+
+SAMPLE = """\
+study: 1
+name: Sample
+base: [spec.yaml]
+sample:
+  count: {count}
+  seed: 3
+  over:
+    "stages[uav].distance": 30 m .. 140 m
+    "stages[uav].v_max": {{low: 1 m/s, high: 60 m/s, scale: log}}
+{more}meets_when: decided
+"""
+WORDS = '    "stages[uav].ranging.sensor": [velodyne_hdl32e, riegl_vux1uav]\n'
+GRID = """\
+study: 1
+name: Grid
+base: [spec.yaml]
+grid:
+  "stages[uav].distance": {{low: 30 m, high: 140 m, count: {across}}}
+  "requirements[ACC-1].limit": {{low: 0.05 m, high: 0.5 m, count: {up}}}
+meets_when: decided
+"""
+
+
+def done(folder: Path, study: str) -> StudyResult:
+    return run_study(write(folder, study), StudySettings(workers=1))
+
+
+@pytest.mark.parametrize("count", [2, 7, 40])
+def test_a_sample_is_points_and_never_a_grid_with_empty_cells(tmp_path: Path, count: int) -> None:
+    result = done(tmp_path, SAMPLE.format(count=count, more=""))
+    summary = summarise(result)
+    assert heat_map(summary) is None
+    found = scatter(summary)
+    assert found is not None
+    rows = [(case.labels, case.verdict) for case in result.cases()]
+    assert len(found.points) == len(rows) == count
+    for point, (labels, verdict) in zip(found.points, rows, strict=True):
+        distance, speed = (float(text.split(" ")[0]) for text in labels.values())
+        assert (point.x, point.y, point.verdict) == (distance, speed, verdict)
+    assert (found.x.unit, found.y.unit, found.x.log) == ("m", "m/s", False)
+    svg = sampled_cases(found, "EUR").svg
+    missed = sum(verdict != "meets" for _, verdict in rows)
+    if missed:
+        assert f"does not meet ({missed})" in svg
+    if missed < count:
+        assert f">meets ({count - missed})<" in svg
+    page = str(render_study("html", result))
+    assert "no case meets" not in page
+    assert "Least cost" not in study_text(result)
+
+
+def test_named_axes_and_words_are_kept(tmp_path: Path) -> None:
+    axes = 'heat_map: {x: "stages[uav].distance", y: "stages[uav].ranging.sensor"}\n'
+    result = done(tmp_path, SAMPLE.format(count=9, more=WORDS + axes))
+    found = scatter(summarise(result))
+    assert found is not None
+    assert found.y.words == ("velodyne_hdl32e", "riegl_vux1uav")
+    assert {point.y for point in found.points} <= {0.0, 1.0}
+    assert found.others == ("stages[uav].v_max",)
+    picture = sampled_cases(found, "EUR").svg
+    assert "velodyne_hdl32e" in picture
+
+
+def test_a_sample_crossed_with_a_grid_keeps_its_map(tmp_path: Path) -> None:
+    """Every sampled height is computed at every limit: no cell of that map is empty."""
+    grid = 'grid: {"requirements[ACC-1].limit": [0.2 m, 0.3 m]}\n'
+    text = SAMPLE.format(count=5, more=grid)
+    speed = '    "stages[uav].v_max": {low: 1 m/s, high: 60 m/s, scale: log}\n'
+    result = done(tmp_path, text.replace(speed, ""))
+    heat = heat_map(summarise(result))
+    assert heat is not None
+    assert (len(heat.x_labels), len(heat.y_labels)) == (2, 5)
+
+
+def test_dearer_cells_are_stronger_whatever_the_theme(tmp_path: Path) -> None:
+    heat = heat_map(summarise(done(tmp_path, GRID.format(across=5, up=6))))
+    assert heat is not None
+    svg = cost_map(heat, "EUR").svg
+    cells = svg.partition('id="fig-heat-legend')[0]
+    strengths = [
+        float(found) for found in re.findall(r"fill: var\(--series-1\); opacity: ([\d.]+)", cells)
+    ]
+    costs = [cost for row in heat.cost for cost in row if cost is not None]
+    assert len(strengths) == len(costs)
+    assert len(set(costs)) > 1
+    order = sorted(range(len(costs)), key=lambda i: costs[i])
+    assert [strengths[i] for i in order] == sorted(strengths)
+    assert svg.count("\u2715") == sum(cost is None for row in heat.cost for cost in row)
+    page = str(render_study("html", done(tmp_path, GRID.format(across=5, up=6))))
+    assert "darker" not in page
+
+
+@pytest.mark.parametrize(("across", "up"), [(3, 12), (12, 3), (12, 12)])
+def test_tables_of_costs_have_few_columns_and_every_cost(
+    tmp_path: Path, across: int, up: int
+) -> None:
+    heat = heat_map(summarise(done(tmp_path, GRID.format(across=across, up=up))))
+    assert isinstance(heat, HeatMap)
+    shown = heat_table(heat, "EUR")
+    assert len(shown.heads) <= MOST_ACROSS + 1
+    assert markdown_table(shown)
+    costs = sorted(cost for row in heat.cost for cost in row if cost is not None)
+    sorts = [cell.sort for row in shown.rows for cell in row if cell.text.endswith("EUR")]
+    assert sorted(sort for sort in sorts if sort is not None) == costs
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_no_table_of_a_study_is_wider_than_the_page(
+    browser: Any,  # noqa: F811
+    tmp_path: Path,
+    theme: str,
+) -> None:
+    more = WORDS + (
+        '    "stages[uav].omega_max": 10 deg/s .. 90 deg/s\n'
+        '    "requirements[ACC-1].limit": 0.1 m .. 0.5 m\n'
+    )
+    studies = {"sample": SAMPLE.format(count=20, more=more), "grid": GRID.format(across=12, up=9)}
+    for name, text in studies.items():
+        page = tmp_path / f"{name}.html"
+        page.write_text(str(render_study("html", done(tmp_path, text))), encoding="utf-8")
+        size = {"width": 1200, "height": 900}
+        with Opened(browser, page, viewport=size, color_scheme=theme) as opened:
+            widths = opened.page.evaluate(
+                "[...document.querySelectorAll('.scroll')].map(e => e.scrollWidth - e.clientWidth)"
+            )
+            assert widths
+            assert max(widths) <= 0, name
+            assert opened.console == []
