@@ -75,9 +75,8 @@ def add_builtin(collection: Collection) -> None:
     for resource in sorted(folder.iterdir(), key=lambda r: r.name):
         if resource.name.endswith(".yaml"):
             path = Path(str(resource))
-            _add_document(
-                collection, read(path, f"builtin:{resource.name}"), path.parent, path.parent
-            )
+            shown = f"builtin:{resource.name}"
+            _add_document(collection, read(path, shown), path.parent, path.parent, shown)
 
 
 def add_own(collection: Collection, spec: Document, folder: Path) -> None:
@@ -101,14 +100,16 @@ def _add_listed(
             circle = "catalogs include each other in a circle: " + " -> ".join((*chain, shown))
             collection.problems.append(problem_at(lister, ("catalogs", index), circle))
             continue
-        if any(shown == digest.partition(" ")[2] for digest in collection.digests):
+        # Named from the spec's folder: the hash is the same wherever the command is run.
+        plain = inside.relative_to(root).as_posix()
+        if any(plain == digest.partition(" ")[2] for digest in collection.digests):
             continue  # drawn in already by another file
         document = read(inside, shown)
         if not document.sha256:  # never opened: say where it is named
             reason = f"{shown}: {document.problems[0].message}"
             collection.problems.append(problem_at(lister, ("catalogs", index), reason))
             continue
-        _add_document(collection, document, inside.parent, root)
+        _add_document(collection, document, inside.parent, root, plain)
         _add_listed(collection, document, inside.parent, root, (*chain, shown))
 
 
@@ -119,10 +120,10 @@ def inside_folder(
     wanted = "a file inside the spec's folder"
     if Path(name).is_absolute() or name.startswith(("~", "\\")) or ":" in name[:3]:
         return problem_at(document, path, "an absolute path", wanted, name, "write it relative")
+    note_place(folder / name)
     try:
         target = (folder / name).resolve()
         there = target.exists()
-        note_place(folder / name, target)
     except (OSError, RuntimeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         return problem_at(document, path, f"a path that cannot be followed: {reason}", wanted, name)
@@ -137,8 +138,10 @@ def inside_folder(
     return target
 
 
-def _add_document(collection: Collection, document: Document, folder: Path, root: Path) -> None:
-    collection.digests.append(f"{document.sha256} {document.file}")
+def _add_document(
+    collection: Collection, document: Document, folder: Path, root: Path, name: str
+) -> None:
+    collection.digests.append(f"{document.sha256} {name}")
     collection.problems.extend(document.problems)
     if document.data is None:
         return

@@ -104,12 +104,12 @@ def identity_of(path: Path) -> Identity | None:
     return (status.st_dev, status.st_ino) if stat.S_ISREG(status.st_mode) else None
 
 
-def note_place(path: Path, target: Path) -> None:
-    """A file that was looked for under this name and lies (or is missing) at `target`."""
+def note_place(path: Path) -> None:
+    """A file that was looked for under this name, whether it is there or not."""
     for noted in _ACTIVE.get():
         noted.places[str(path.absolute())] = place_of(path)
         with contextlib.suppress(OSError, ValueError):
-            noted.add(path, target.stat())
+            noted.add(path, path.stat())
 
 
 def place_of(path: Path) -> str:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from syncline_design.acceptance import (
     MOST_SIMULATED,
@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from syncline_design.open_choice import Picked
 
 Json = dict[str, Any]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +82,19 @@ def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
 
     Refused: {"verdict": "refused", "file", "problems"}, and nothing of that spec is computed.
     """
-    return [_check_or_refuse(path, settings) for path in paths]
+    read = [_or_refused(path, load) for path in paths]  # all of them before anything is computed
+    return [_check_or_refuse(item, settings) for item in read]
 
 
-def _check_or_refuse(path: Path, settings: CheckSettings) -> Json:
+def _check_or_refuse(read: LoadedSpec | Json, settings: CheckSettings) -> Json:
+    if isinstance(read, dict):
+        return read
+    return _or_refused(read.path, lambda _: check_loaded(read, settings))
+
+
+def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Json:
     try:
-        return check_file(path, settings)
+        return work(path)
     except BadInput as error:
         return {
             "schema": SCHEMA,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -135,19 +136,32 @@ def study(
         str | None, typer.Option(metavar="ADDRESS", help="Run on this Dask scheduler.")
     ] = None,
     dask: Annotated[bool, typer.Option("--dask", help="Run on a local Dask cluster.")] = False,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Believe no case file that is there: compute all anew.")
+    ] = False,
 ) -> int:
     """Sweep specs over grids or samples of their keys; a stopped study resumes."""
     from syncline_design.report.progress_line import ProgressLine
     from syncline_design.report.studies import STUDY_FORMATS, render_study
     from syncline_design.report.study_words import study_text
     from syncline_design.study import StudySettings, run_study
+    from syncline_design.study.store import FOLDER
 
     wanted = [*(output or ()), *([f"{output_format}:-"] if output_format else ())]
     targets = output_targets(wanted, STUDY_FORMATS, [study_file])
-    settings = StudySettings(seed, workers, store, scheduler, dask)
+    _keep_cases([Path(t.path) for t in targets], store or study_file.parent / FOLDER)
+    settings = StudySettings(seed, workers, store, scheduler, dask, fresh=fresh)
     result = run_study(study_file, settings, None if quiet else ProgressLine())
     emit(study_text(result), targets, lambda name: render_study(name, result), quiet=quiet)
     return result.exit_code
+
+
+def _keep_cases(outputs: list[Path], store: Path) -> None:
+    """Refuse a result that would lie among the files of cases."""
+    for path in outputs:
+        inside = Path(os.path.realpath(path)).parent
+        if inside.parent == Path(os.path.realpath(store)) and len(inside.name) == 2:
+            refuse(f"syncline-design: {path}: lies among the files of cases; write it elsewhere")
 
 
 @guarded

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import json
-from collections.abc import Mapping
+import platform
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import date
+from importlib import metadata
 from typing import Any
 
 from syncline_design import __version__
+from syncline_design.input_files import ReplacedInputError, noting
 from syncline_design.loading import BadInput, LoadedSpec
 from syncline_design.study.factors import plain
+from syncline_design.study.inputs import inputs_of
 from syncline_design.study.loading import Base, Study, engine_sha256
 from syncline_design.yaml_reader import KeyPath, Position, Problem
 
@@ -26,11 +31,24 @@ class CaseSettings:
     seed: int
     today: date
     engine: str  # hash of the package's sources
+    libraries: tuple[str, ...] = ()  # what computes besides: names with versions
 
     @classmethod
     def now(cls, seed: int, today: date | None) -> CaseSettings:
         """Settings of a run that starts now."""
-        return cls(seed, today or date.today(), engine_sha256())
+        return cls(seed, today or date.today(), engine_sha256(), libraries())
+
+
+LIBRARIES = ("numpy", "scipy", "cvxpy", "highspy", "pydantic", "PyYAML", "pymap3d")
+
+
+def libraries() -> tuple[str, ...]:
+    """The interpreter and the libraries whose arithmetic or reading enters a verdict."""
+    found = [f"python {platform.python_version()} {platform.machine()}"]
+    for name in LIBRARIES:
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found.append(f"{name} {metadata.version(name)}")
+    return tuple(found)
 
 
 def canonical(data: Any) -> str:
@@ -44,7 +62,8 @@ def case_keys(study: Study, settings: CaseSettings) -> list[str]:
     """The content address of every case, in order: equal content, equal key.
 
     SHA-256 over the base spec's text, its catalogs, what is set in it, how it is checked, the
-    seed, this version and, where waivers expire, the day.
+    seed, this version with the libraries below it and, where waivers expire, the day.  Other files
+    that a case reads come in when it is known which (`inputs.full_key`).
     """
     heads = [_head(study, base, settings) for base in study.bases]
     return [_key(heads, study, index) for index in range(len(study))]
@@ -59,7 +78,7 @@ def _head(study: Study, base: Base, settings: CaseSettings) -> str:
             "engine": settings.engine,
             "spec": base.document.sha256,
             "catalogs": base.catalogs.sha256(),
-            "files": _outside_files(base),
+            "libraries": settings.libraries,
             "seed": settings.seed,
             "method": check.method,
             "time_limit_s": None if check.time_limit is None else float(check.time_limit),
@@ -67,20 +86,6 @@ def _head(study: Study, base: Base, settings: CaseSettings) -> str:
             "today": settings.today.isoformat() if base.has_waivers else None,
         }
     )
-
-
-def _outside_files(base: Base) -> list[str]:
-    """Hashes of files that a check reads besides spec and catalogs: a recorded trajectory."""
-    data = base.document.data.get("monte_carlo") or {}
-    trajectory = data.get("trajectory") if isinstance(data, Mapping) else None
-    name = trajectory.get("file") if isinstance(trajectory, Mapping) else None
-    if not isinstance(name, str):
-        return []
-    try:
-        content = (base.path.parent / name).read_bytes()
-    except OSError:
-        return ["unreadable"]
-    return [hashlib.sha256(content).hexdigest()]
 
 
 def _key(heads: list[str], study: Study, index: int) -> str:
@@ -98,15 +103,29 @@ def simulates(study: Study, base: Base) -> bool:
 
 
 def check_case(study: Study, index: int, settings: CaseSettings) -> Json:
-    """The record of one case; what goes wrong inside it is part of the record."""
+    """The record of one case; what goes wrong inside it is part of the record.
+
+    `inputs`: the files that it read besides spec and catalogs, with what was in them.
+    """
+    place, chosen = study.case(index)
+    base = study.bases[place]
+    with noting() as found:
+        record = _judged(study, base, chosen, settings)
+    inputs = inputs_of(found, base.path.parent)
+    return record | {"inputs": inputs} if inputs else record
+
+
+def _judged(
+    study: Study, base: Base, chosen: Sequence[tuple[str, Any]], settings: CaseSettings
+) -> Json:
     from syncline_design.choose.outcome import NoVerdict
     from syncline_design.simulate import SimulationError
 
-    place, chosen = study.case(index)
-    base = study.bases[place]
     try:
         loaded = base.load(chosen)
         return _checked(study, base, loaded, settings)
+    except ReplacedInputError:
+        raise
     except BadInput as bad:
         return {"verdict": "refused", "problems": [_problem_json(p) for p in bad.problems]}
     except (NoVerdict, SimulationError) as error:
@@ -131,7 +150,11 @@ def _checked(study: Study, base: Base, loaded: LoadedSpec, settings: CaseSetting
             today=settings.today,
         ),
     )
-    return _record(verdict, left_out)
+    record = _record(verdict, left_out)
+    proof = (verdict.get("choice") or {}).get("proof") or {}
+    if proof.get("optimal") is False:  # as far as this machine came within the time limit
+        record["provisional"] = True
+    return record
 
 
 def without_simulated(loaded: LoadedSpec) -> LoadedSpec:
@@ -188,4 +211,6 @@ def _record(verdict: Json, left_out: tuple[str, ...]) -> Json:
 
 def is_final(record: Json) -> bool:
     """Whether the same case would come out the same again: not after a time limit or a crash."""
+    if record.get("provisional"):
+        return False
     return not (record["verdict"] == "indeterminate" and record.get("reason"))

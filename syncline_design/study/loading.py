@@ -5,12 +5,13 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from syncline_design.catalog_files import Collection, problem_at
+from syncline_design.input_files import note_read
 from syncline_design.loading import BadInput, LoadedSpec, catalogs_of, load_document
 from syncline_design.references import unknown_ids
 from syncline_design.spec import Spec
@@ -117,10 +118,28 @@ def load_study(path: str | Path) -> Study:
         tuple(sample), count, study_file.check, study_file.heat_map, study_file.meets_when,
     )  # fmt: skip
     for base in bases:
+        _note_files(base, grid)
         _check_values(base, study, document, problems)
     if problems:
         raise BadInput(tuple(problems))
     return study
+
+
+def _note_files(base: Base, grid: Sequence[Factor]) -> None:
+    """Note the files that values of the grid may name: each case reads its own later."""
+    for factor in grid:
+        for value in factor.values if factor.listed else ():
+            for text in _texts(value):
+                note_read(base.path.parent / text)
+
+
+def _texts(value: Any) -> Iterator[str]:
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, Mapping):
+        yield from (text for item in value.values() for text in _texts(item))
+    elif isinstance(value, tuple | list):
+        yield from (text for item in value for text in _texts(item))
 
 
 def _grid(chosen: StudyFile, document: Document, problems: list[Problem]) -> Iterator[Factor]:

@@ -5,14 +5,15 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
 from typing import Any
 
 from syncline_design.choose.outcome import NoVerdict
-from syncline_design.study.case import CaseSettings, case_keys, is_final
+from syncline_design.study.case import CaseSettings, canonical, case_keys, is_final
 from syncline_design.study.cluster import ClusterError, run_on_cluster
+from syncline_design.study.inputs import Looked, full_key
 from syncline_design.study.loading import Study, load_study
 from syncline_design.study.pool import Pool, PoolError, Result, encoded_case
 from syncline_design.study.progress import Progress, Report
@@ -37,7 +38,8 @@ class StudySettings:
 
     workers: local processes (of a local cluster with `dask`).  store: folder of the case files;
     None: `.syncline-cases` beside the study file.  scheduler: address of a Dask scheduler.
-    today: the day on which waivers are judged; None: the machine's date.
+    today: the day on which waivers are judged; None: the machine's date.  fresh: believe no case
+    file that is there.
     """
 
     seed: int = 0
@@ -46,6 +48,7 @@ class StudySettings:
     scheduler: str | None = None
     dask: bool = False
     today: date | None = None
+    fresh: bool = False
 
 
 def run_study(
@@ -85,35 +88,63 @@ class _Run:
     started: float
     progress: Report | None
     retried: int = 0
+    looked: Looked = field(default_factory=Looked)
 
     def finish(self) -> StudyResult:
-        keys = case_keys(self.study, self.shared)
-        missing = self._missing(keys)
-        reused = len(keys) - len(missing)
-        self._say(reused, len(keys), reused)
+        cases = case_keys(self.study, self.shared)
+        twins = self._twins(cases)
+        keys = {index: key for index in twins if (key := self._kept(cases[index], index))}
+        missing = [index for index in twins if index not in keys]
+        again = len(cases) - len(twins)  # cases of equal content are computed once
+        reused = len(keys) + again
+        self._say(reused, len(cases), reused)
         unsettled: dict[str, Json] = {}
         for done, (index, encoded) in enumerate(self._records(missing), 1):
-            record = json.loads(encoded) if '"reason":' in encoded else None
-            if record is not None and not is_final(record):
+            record = json.loads(encoded)
+            keys[index] = self._keep(cases[index], encoded, record)
+            if not is_final(record):
                 unsettled[keys[index]] = record
-            else:
-                self.store.write(keys[index], encoded)
-            self._say(reused + done, len(keys), reused)
+            self._say(reused + done, len(cases), reused)
         elapsed = time.monotonic() - self.started
+        firsts = {twin: index for index, group in twins.items() for twin in group}
+        placed = tuple(keys[firsts[index]] for index in range(len(cases)))
         return StudyResult(
-            self.study, self.settings.seed, tuple(keys), self.store, unsettled, reused,
-            len(missing), self.retried, elapsed,
+            self.study, self.settings.seed, placed, self.store, unsettled, reused, len(missing),
+            self.retried, elapsed,
         )  # fmt: skip
 
-    def _missing(self, keys: Sequence[str]) -> list[int]:
-        """Cases without a whole file; of several with the same content only the first."""
-        seen: set[str] = set()
-        missing = []
-        for index, key in enumerate(keys):
-            if key not in seen and self.store.read(key) is None:
-                missing.append(index)
-            seen.add(key)
-        return missing
+    def _twins(self, cases: Sequence[str]) -> dict[int, list[int]]:
+        """The first case of every content in every folder, with all that equal it."""
+        groups: dict[tuple[str, str], list[int]] = {}
+        for index, case_key in enumerate(cases):
+            groups.setdefault((str(self._folder(index)), case_key), []).append(index)
+        return {group[0]: group for group in groups.values()}
+
+    def _folder(self, index: int) -> Path:
+        return self.study.bases[self.study.case(index)[0]].path.parent
+
+    def _kept(self, case_key: str, index: int) -> str | None:
+        """The key of a record that holds for the files as they are now."""
+        if self.settings.fresh:
+            return None
+        folder = self._folder(index)
+        for sought in self.store.reads(case_key) or [[]]:
+            inputs = self.looked.now(sought, folder)
+            key = full_key(case_key, inputs, canonical(inputs))
+            record = self.store.read(key)
+            if record is not None and (record.get("inputs") or []) == inputs:
+                return key
+        return None
+
+    def _keep(self, case_key: str, encoded: str, record: Json) -> str:
+        """Put a record where the next run finds it, unless the same case may come out otherwise."""
+        inputs = record.get("inputs") or []
+        key = full_key(case_key, inputs, canonical(inputs))
+        if is_final(record):
+            self.store.write(key, encoded)
+            if inputs:
+                self.store.note_reads(case_key, inputs)
+        return key
 
     def _records(self, missing: Sequence[int]) -> Iterator[Result]:
         settings = self.settings
