@@ -84,11 +84,11 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
     return tuple(found)
 
 
-def commonness(candidate: Candidate) -> tuple[int, int]:
+def commonness(label: tuple[str, str, int]) -> tuple[int, int]:
     """Place among the commonest; sensors in the order position, attitude, ranging, target."""
-    name = candidate.effect.name
+    name, sensor, _ = label
     place = COMMONEST.index(name) if name in COMMONEST else len(COMMONEST)
-    return place, ("position", "attitude", "ranging", "target").index(candidate.sensor)
+    return place, ("position", "attitude", "ranging", "target").index(sensor)
 
 
 def zero_values(effect: Effect, at: dict[str, float] | None = None) -> dict[str, float]:

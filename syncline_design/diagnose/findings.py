@@ -10,9 +10,9 @@ import numpy as np
 
 from syncline_design.diagnose.fitting import Data, Model, Opened
 from syncline_design.diagnose.gross import Gross
-from syncline_design.diagnose.identify import Comparison, compare
+from syncline_design.diagnose.identify import Alias, Comparison
 from syncline_design.diagnose.noise import NoiseLevel, precision
-from syncline_design.diagnose.search import SearchResult, Step
+from syncline_design.diagnose.settling import Settled
 from syncline_design.diagnose.simulation import Scene
 from syncline_design.diagnose.tails import tails_in
 from syncline_design.effects.base import Effect
@@ -41,7 +41,7 @@ def figure_text(shown: Figure) -> str:
 
 @dataclass(frozen=True, slots=True)
 class AliasFigure:
-    """An effect that this log cannot tell from the named one."""
+    """Another effect beside the named one; nats_worse counts the freedom of both."""
 
     effect: str
     sensor: str
@@ -59,6 +59,7 @@ class Finding:
     stage: str
     parameters: Mapping[str, Figure]
     aliases: tuple[AliasFigure, ...]
+    lookalikes: tuple[AliasFigure, ...]
     excluded: tuple[AliasFigure, ...]
     gain_nat: float
     log10_p: float | None
@@ -82,26 +83,22 @@ class Finding:
         return f"saves {self.gain_nat:.1f} nat; noise alone does that with a chance of {chance}"
 
 
-def findings(
-    data: Data, result: SearchResult, gross: Sequence[Gross], signatures: Sequence[object]
-) -> tuple[Finding, ...]:
-    """All findings, gross faults first, then by what they explain."""
-    steps = {s.label: s for s in result.steps}
-    found = [_deterministic(data, result.model, k, steps, signatures) for k in _single(result)]
-    found += [_stochastic(data, result.model, o, steps) for o in result.model.opened]
+def findings(final: Settled, gross: Sequence[Gross]) -> tuple[Finding, ...]:
+    """All findings, gross faults first, then by what leaving them out would cost."""
+    found = [_deterministic(final, k) for k in _single(final.model)]
+    found += [_stochastic(final, o) for o in final.model.opened]
     found.sort(key=lambda f: -f.gain_nat)
-    return (*(_gross(data.view, g) for g in gross), *found)
+    return (*(_gross(final.data.view, g) for g in gross), *found)
 
 
-def _single(result: SearchResult) -> list[int]:
+def _single(model: Model) -> list[int]:
     """Indices of acting effects that are findings of their own (a packet's mean is not)."""
-    opened = {o.candidate.label for o in result.model.opened}
-    return [k for k, a in enumerate(result.model.acting) if a.label not in opened]
+    opened = {o.candidate.label for o in model.opened}
+    return [k for k, a in enumerate(model.acting) if a.label not in opened]
 
 
-def _deterministic(
-    data: Data, model: Model, index: int, steps: Mapping[Label, Step], signatures: Sequence[object]
-) -> Finding:
+def _deterministic(final: Settled, index: int) -> Finding:
+    model = final.model
     one = model.acting[index]
     at = sum(len(a.effect.slopes()) for a in model.acting[:index])
     figures: dict[str, Figure] = {}
@@ -111,37 +108,28 @@ def _deterministic(
             spread = float(np.sqrt(max(model.covariance[at, at], 0.0)))
             at += 1
         figures[p.name] = Figure(float(one.values[p.name]), spread, p.unit)
-    compared = compare(data, model, index, signatures)  # type: ignore[arg-type]
-    return _finding(data.view, one.effect, one.label, figures, compared, steps)
+    return _finding(final, one.effect, one.label, figures)
 
 
 def _finding(
-    view: Scene,
-    effect: Effect,
-    label: Label,
-    figures: Mapping[str, Figure],
-    compared: Comparison | None,
-    steps: Mapping[Label, Step],
+    final: Settled, effect: Effect, label: Label, figures: Mapping[str, Figure]
 ) -> Finding:
-    step = steps.get(label)
-    aliases = () if compared is None else tuple(_alias(view, a) for a in compared.aliases)
-    excluded = () if compared is None else tuple(_alias(view, a) for a in compared.excluded)
+    view, evidence = final.data.view, final.evidence[label]
+    compared = final.classes.get(label, Comparison())
     return Finding(
         effect,
         label[1],
         view.system.stages[label[2]].name,
         figures,
-        aliases,
-        excluded[:MOST_EXCLUDED],
-        step.gain if step else 0.0,
-        step.log_p / math.log(10.0) if step and math.isfinite(step.log_p) else None,
+        tuple(_alias(view, a) for a in compared.aliases),
+        tuple(_alias(view, a) for a in compared.lookalikes),
+        tuple(_alias(view, a) for a in compared.excluded[:MOST_EXCLUDED]),
+        evidence.gain,
+        evidence.log_p / math.log(10.0) if math.isfinite(evidence.log_p) else None,
     )
 
 
-def _alias(view: Scene, alias: object) -> AliasFigure:
-    from syncline_design.diagnose.identify import Alias
-
-    assert isinstance(alias, Alias)
+def _alias(view: Scene, alias: Alias) -> AliasFigure:
     name, sensor, stage = alias.candidate.label
     return AliasFigure(name, sensor, view.system.stages[stage].name, alias.cosine, alias.loss)
 
@@ -151,11 +139,12 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     figures = {p.name: Figure(fault.acting.values[p.name], None, p.unit) for p in effect.parameters}
     stage = view.system.stages[label[2]].name
     gain = math.log(fault.falls_by)
-    return Finding(effect, label[1], stage, figures, (), (), gain, None, gross=True)
+    return Finding(effect, label[1], stage, figures, (), (), (), gain, None, gross=True)
 
 
-def _stochastic(data: Data, model: Model, opened: Opened, steps: Mapping[Label, Step]) -> Finding:
+def _stochastic(final: Settled, opened: Opened) -> Finding:
     """Values of a stochastic effect from the fitted noise; uncertainty from the likelihood."""
+    data, model = final.data, final.model
     effect, label = opened.candidate.effect, opened.candidate.label
     stage = data.view.system.stages[label[2]]
     units = {p.name: p.unit for p in effect.parameters}
@@ -183,7 +172,7 @@ def _stochastic(data: Data, model: Model, opened: Opened, steps: Mapping[Label, 
     else:
         figures = _wander(data, model, sensor, opened.what)
     shown = {name: Figure(v, s, units[name]) for name, (v, s) in figures.items()}
-    return _finding(data.view, effect, label, shown, None, steps)
+    return _finding(final, effect, label, shown)
 
 
 def _wander(

@@ -162,11 +162,10 @@ def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:
     return fewer, replace(model, error=model.error[index], precision=known)
 
 
-def polished(data: Data, model: Model) -> Model:
-    """The model with its noise fitted on POLISH_ROWS rows, for the final figures."""
+def finely(data: Data) -> Data:
+    """The data with the noise fitted on POLISH_ROWS rows, for the final figures."""
     index = windows(len(data.view), POLISH_ROWS, STRETCH)
-    fine = replace(data, noise_rows=index, noise_structure=data.structure.rows(index))
-    return fit(fine, model.acting, model.opened, start=model.level)
+    return replace(data, noise_rows=index, noise_structure=data.structure.rows(index))
 
 
 def slow_guess(level: NoiseLevel, time_s: float | None) -> NoiseLevel:

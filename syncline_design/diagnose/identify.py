@@ -1,4 +1,8 @@
-"""What a log cannot tell apart: other effects whose signature lies along the named one's."""
+"""What a log cannot tell apart: other effects whose signature lies along the named one's.
+
+All members of a class are fitted in the place of the named one, on the same rows, from the same
+noise, and the best of them is named.
+"""
 
 from __future__ import annotations
 
@@ -8,42 +12,127 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from syncline_design.diagnose.candidates import Candidate, Signature, slopes, zero_values
+from syncline_design.diagnose.candidates import Candidate, Signature, commonness, slopes
 from syncline_design.diagnose.fitting import Data, Model, fit, inner, inverse_scaled
-from syncline_design.diagnose.noise import precision
-from syncline_design.effects.base import Array
+from syncline_design.diagnose.trials import freedom_of, plausible, with_effect
+from syncline_design.effects.base import Array, Effect
 
 Label = tuple[str, str, int]
 SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
 CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
-MOST_REFITTED = 5
+MOST_REFITTED = 8
 RIVAL_COSINE = 0.7  # ... if it also points roughly the same way
 RIVAL_NATS = 3.0  # a rival that fits worse by less than this is not excluded by the data
+AS_GOOD_NATS = 2.0  # within which the commoner of two effects is named
 
 
 @dataclass(frozen=True, slots=True)
 class Alias:
-    """An effect that this log cannot tell from the named one.
+    """Another effect beside the named one.
 
     cosine: of the whitened angle between the named signature and the span of the other's.
-    loss: how much worse the other fits [nat].
+    fit: how much worse the other fits [nat]; loss: the same with what each pays for its freedom.
     """
 
     candidate: Candidate
     cosine: float
+    fit: float
     loss: float
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """All other effects against a named one: those that cannot be told apart, and the rest."""
+    """All other effects against a named one, nearest first.
 
-    aliases: tuple[Alias, ...]
-    excluded: tuple[Alias, ...]  # nearest first
+    aliases: cannot be told apart.  lookalikes: the same signature to first order, but re-simulation
+    fits worse or only with impossible values.  excluded: another signature that does not fit.
+    """
+
+    aliases: tuple[Alias, ...] = ()
+    lookalikes: tuple[Alias, ...] = ()
+    excluded: tuple[Alias, ...] = ()
 
 
-def compare(data: Data, model: Model, index: int, others: Sequence[Signature]) -> Comparison:
-    """Compare the index-th acting effect of a model with all signatures not in the model."""
+def without(model: Model, label: Label) -> Model:
+    """The model less one effect, not fitted again; its noise within what is left open."""
+    acting = tuple(a for a in model.acting if a.label != label)
+    opened = tuple(o for o in model.opened if o.candidate.label != label)
+    return replace(model, acting=acting, opened=opened)
+
+
+def competed(
+    data: Data, model: Model, label: Label, others: Sequence[Signature], again: int = 2
+) -> tuple[Model, Comparison]:
+    """The model with the best member of a named effect's class, and the rest against that one."""
+    named = fit(data, model.acting, model.opened, start=model.level)
+    screened, found = _screened(data, named, label, others)
+    near = [a for a in screened if a.cosine > SAME or _rivals(a)][:MOST_REFITTED]
+    rest = without(named, label)
+    fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)
+            for a in near}  # fmt: skip
+    best = _best(data, named, label, fits)
+    if best != label and again:
+        return competed(data, fits[best], best, others, again - 1)
+    return named, _sorted_out(data, named, label, screened, fits)
+
+
+def _price(data: Data, effect: Effect) -> float:
+    """What an effect pays for its freedom [nat]: half of log N a figure (Schwarz 1978)."""
+    return 0.5 * math.log(max(len(data.view) * len(data.axes), 2)) * freedom_of(effect)
+
+
+def _best(data: Data, named: Model, label: Label, fits: Mapping[Label, Model]) -> Label:
+    """The likeliest member of a class; among those that are as good, the commonest in practice."""
+    scores = {label: named.nll + _price(data, effect_of(named, label))}
+    for other, model in fits.items():
+        if plausible(model):
+            scores[other] = model.nll + _price(data, effect_of(model, other))
+    least = min(scores.values())
+    close = [one for one, score in scores.items() if score <= least + AS_GOOD_NATS]
+    return min(close, key=lambda one: (commonness(one), scores[one], one))
+
+
+def effect_of(model: Model, label: Label) -> Effect:
+    """The effect of a label that the model holds."""
+    acting = {a.label: a.effect for a in model.acting}
+    return acting.get(label) or {o.candidate.label: o.candidate.effect for o in model.opened}[label]
+
+
+def _sorted_out(
+    data: Data, named: Model, label: Label, screened: Sequence[Alias], fits: Mapping[Label, Model]
+) -> Comparison:
+    """Aliases, lookalikes and what is excluded, with the losses of the refits where there are."""
+    own = _price(data, effect_of(named, label))
+    lists: tuple[list[Alias], list[Alias], list[Alias]] = ([], [], [])
+    for one in screened:
+        model = fits.get(one.candidate.label)
+        possible = True
+        if model is not None:
+            worse = model.nll - named.nll
+            loss = worse + _price(data, one.candidate.effect) - own
+            one, possible = replace(one, fit=worse, loss=loss), plausible(model)
+        lists[_place(one, possible)].append(one)
+    aliases, lookalikes, excluded = lists
+    return Comparison(tuple(aliases), tuple(lookalikes), tuple(excluded))
+
+
+def _place(one: Alias, possible: bool) -> int:
+    """Which list an effect belongs to: 0 aliases, 1 lookalikes, 2 excluded."""
+    same = one.cosine > SAME
+    if possible and (_rivals(one) or (same and one.fit < CLASS_NATS)):
+        return 0
+    return 1 if same or one.fit < RIVAL_NATS else 2
+
+
+def _rivals(alias: Alias) -> bool:
+    return alias.fit < RIVAL_NATS and alias.cosine > RIVAL_COSINE
+
+
+def _screened(
+    data: Data, model: Model, label: Label, others: Sequence[Signature]
+) -> tuple[list[Alias], dict[Label, Signature]]:
+    """Every other effect to first order, nearest first, and its best signature."""
+    index = [a.label for a in model.acting].index(label)
     named = model.acting[index]
     rest = tuple(a for k, a in enumerate(model.acting) if k != index)
     own = np.nan_to_num(slopes(data.view, (named,)))
@@ -56,55 +145,28 @@ def compare(data: Data, model: Model, index: int, others: Sequence[Signature]) -
     normal = inner(columns, weighted)
     score = inner(weighted, (model.error + added[:, :, 0])[:, :, None])[:, 0]
     normal, score = _without(normal, score, base.shape[2])
-    length = float(normal[0, 0])
     best: dict[Label, Alias] = {}
     found: dict[Label, Signature] = {}
     at = 1
     for s in free:
         group = slice(at, at + s.columns.shape[2])
         at = group.stop
-        inverse = inverse_scaled(normal[group, group])
-        cross = normal[0, group]
-        inside = max(float(cross @ inverse @ cross), 0.0)
-        cosine = math.sqrt(inside / max(length, 1e-300))
-        gain = 0.5 * float(score[group] @ inverse @ score[group])
-        alias = Alias(s.candidate, min(cosine, 1.0), _gain_of_named(score, normal) - gain)
-        if s.candidate.label not in best or best[s.candidate.label].loss > alias.loss:
+        alias = _first_order(s.candidate, normal, score, group)
+        if s.candidate.label not in best or best[s.candidate.label].fit > alias.fit:
             best[s.candidate.label] = alias
             found[s.candidate.label] = s
     ranked = sorted(best.values(), key=lambda a: (-a.cosine, a.candidate.label))
-    near = [a for a in ranked if a.cosine > SAME or _rivals(a)]
-    refitted = [_refitted(data, model, index, a, found) for a in near[:MOST_REFITTED]]
-    same = tuple(a for a in refitted if _rivals(a) or (a.cosine > SAME and a.loss < CLASS_NATS))
-    kept = {a.candidate.label for a in same}
-    return Comparison(same, tuple(a for a in ranked if a.candidate.label not in kept))
+    return ranked, found
 
 
-def _rivals(alias: Alias) -> bool:
-    return alias.loss < RIVAL_NATS and alias.cosine > RIVAL_COSINE
-
-
-def _refitted(
-    data: Data, model: Model, index: int, alias: Alias, found: Mapping[Label, Signature]
-) -> Alias:
-    """The loss by re-simulation: a large latency and a large filter lag differ after all."""
-    rest = tuple(a for k, a in enumerate(model.acting) if k != index)
-    signature = found[alias.candidate.label]
-    start = alias.candidate.acting(zero_values(alias.candidate.effect, signature.at))
-    rival = fit(data, (*rest, start), model.opened, start=model.level)
-    loss = rival.nll - model.nll
-    if alias.candidate.effect.kind == "stochastic":
-        loss = _with_scatter(data, rival, alias.candidate) - model.nll
-    return Alias(alias.candidate, alias.cosine, loss)
-
-
-def _with_scatter(data: Data, rival: Model, candidate: Candidate) -> float:
-    """NLL once the scatter that belongs to the fitted mean is there too."""
-    index = [d.key for d in data.structure.directed].index(candidate.key)
-    value = abs(rival.acting[-1].values[candidate.effect.parameters[0].name])
-    sizes = tuple(value if k == index else s for k, s in enumerate(rival.level.size))
-    known = precision(data.structure, replace(rival.level, size=sizes))
-    return known.negative_log_likelihood(rival.error)
+def _first_order(candidate: Candidate, normal: Array, score: Array, group: slice) -> Alias:
+    """Cosine and loss of one effect by its linear signature."""
+    inverse = inverse_scaled(normal[group, group])
+    cross = normal[0, group]
+    inside = max(float(cross @ inverse @ cross), 0.0)
+    cosine = math.sqrt(inside / max(float(normal[0, 0]), 1e-300))
+    loss = _gain_of_named(score, normal) - 0.5 * float(score[group] @ inverse @ score[group])
+    return Alias(candidate, min(cosine, 1.0), loss, loss)
 
 
 def _gain_of_named(score: Array, normal: Array) -> float:

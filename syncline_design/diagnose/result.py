@@ -123,6 +123,7 @@ def finding_json(finding: Finding) -> Json:
             name: {**asdict(f), "text": figure_text(f)} for name, f in finding.parameters.items()
         },
         "aliases": [asdict(a) for a in finding.aliases],
+        "lookalikes": [asdict(a) for a in finding.lookalikes],
         "excluded": [asdict(a) for a in finding.excluded],
         "sentence": finding.sentence,
         "evidence": finding.evidence,

@@ -84,7 +84,7 @@ def diagnose_measured(
     left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
     verdict: Verdict = "unexplained" if left else ("explained" if named else "agrees")
     progress("measuring the gap", 0.8)
-    shown = findings(data, result, faults, search.signatures)
+    shown = findings(result.final, faults)
     cells = where_map(view, result.base.error, result.model.precision)
     cells_after = where_map(view, result.model.error, result.model.precision)
     folds = block_folds(data)
@@ -149,10 +149,10 @@ def expected_size(inputs: Measured) -> float:
 def _stairs(data: Data, result: SearchResult, left: bool) -> tuple[Stairs, ...]:
     folds = block_folds(data)
     stairs = []
-    for step in result.steps:
-        found = gap(data, step.model, folds, left)
+    for label, model in result.final.stairs:
+        found = gap(data, model, folds, left)
         if found is not None:
-            name, sensor, _ = step.label
+            name, sensor, _ = label
             stairs.append(Stairs(f"{name} ({sensor})", found))
     return tuple(stairs)
 

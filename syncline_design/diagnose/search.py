@@ -7,37 +7,29 @@ the largest of all candidates' scores reaches by chance on this very trajectory.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from syncline_design.diagnose.calibration import refit_factor
 from syncline_design.diagnose.candidates import (
-    EDGE,
-    STEP_TIMES,
     Candidate,
     Signature,
     candidates,
     commonness,
     signatures,
-    zero_values,
 )
 from syncline_design.diagnose.fitting import (
     Data,
     Model,
     Opened,
-    adjusted,
+    finely,
     fit,
-    polished,
 )
 from syncline_design.diagnose.noise import NoiseLevel, as_specified
 from syncline_design.diagnose.scatter import (
-    directed_index,
     scatter_candidates,
-    usual_noise_size,
-    with_size,
 )
 from syncline_design.diagnose.scores import (
     Gram,
@@ -48,8 +40,9 @@ from syncline_design.diagnose.scores import (
     possible,
 )
 from syncline_design.diagnose.settings import DiagnosisSettings
-from syncline_design.diagnose.simulation import Acting
+from syncline_design.diagnose.settling import Settled, settle
 from syncline_design.diagnose.tails import tails_in
+from syncline_design.diagnose.trials import freedom_of, log_chance, plausible, with_effect
 
 TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
@@ -83,28 +76,19 @@ class Trial:
 
         A step is charged for the places at which it was looked for.
         """
-        located = any(p.located for p in self.candidate.effect.parameters)
-        charge = math.log(STEP_TIMES) if located else 0.0
-        return min(log_p_of(2.0 * self.gain, self.freedom) + charge, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One accepted addition."""
-
-    label: tuple[str, str, int]
-    gain: float
-    log_p: float
-    threshold: float  # log p that clean logs reach at the stated rate
-    model: Model
+        return log_chance(self.candidate.effect, self.gain, self.freedom)
 
 
 @dataclass(frozen=True, slots=True)
 class SearchResult:
+    """The model without effects, and what was found."""
+
     base: Model
-    model: Model
-    steps: tuple[Step, ...]
-    rivals: dict[tuple[str, str, int], tuple[Candidate, ...]] = field(default_factory=dict)
+    final: Settled
+
+    @property
+    def model(self) -> Model:
+        return self.final.model
 
 
 @dataclass(slots=True)
@@ -121,7 +105,7 @@ class Search:
     def run(self) -> SearchResult:
         """Add effects while they beat chance; then take out what is no longer needed."""
         base = fit(self.data)
-        model, steps = base, []
+        model = base
         while len(model.labels) < self.settings.max_effects:
             scores = gram(self.data, model, self.free_signatures(model), model.level)
             threshold = self.threshold(scores)
@@ -133,10 +117,18 @@ class Search:
                 if trial.log_p > threshold:
                     break
             model = self.exchanged(trial.model)
-            steps.append(Step(trial.candidate.label, trial.gain, trial.log_p, threshold, model))
-            self.progress(len(steps) / self.settings.max_effects)
-        model = polished(self.data, self.pruned(model))
-        return SearchResult(base, model, tuple(steps))
+            self.progress(len(model.labels) / self.settings.max_effects)
+        return SearchResult(base, self.settled(model))
+
+    def settled(self, model: Model) -> Settled:
+        """The final model: its classes decided, its evidence counted, needless effects gone."""
+        fine = finely(self.data)
+        start = fit(fine, model.acting, model.opened, start=model.level)
+
+        def threshold(less: Model) -> float:
+            return self.threshold(gram(fine, less, self.free_signatures(less), less.level))
+
+        return settle(fine, start, self.signatures, threshold)
 
     def threshold(self, scores: Gram) -> float:
         """log p that the best candidate of a clean log falls below at the stated rate."""
@@ -186,15 +178,8 @@ class Search:
 
     def trial(self, model: Model, found: Signature, level: NoiseLevel) -> Trial:
         """The model with this candidate, fitted by re-simulation."""
-        start = found.candidate.acting(zero_values(found.candidate.effect, found.at))
-        opened = model.opened
-        if found.candidate.effect.kind == "stochastic":
-            directed = directed_index(self.data, found.candidate)
-            opened = (*opened, Opened(found.candidate, "size", directed))
-            level = with_size(level, directed, 0.3 * usual_noise_size(self.data, directed))
-        fitted = fit(self.data, (*model.acting, start), opened, start=level)
-        fitted = located(self.data, fitted) if found.at else fitted
-        freedom = found.columns.shape[2] + len(found.at) + (len(opened) - len(model.opened))
+        fitted = with_effect(self.data, model, found, level)
+        freedom = freedom_of(found.candidate.effect)
         return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
 
     def scatter_trials(self, model: Model, least: float) -> list[Trial]:
@@ -240,21 +225,6 @@ class Search:
                     break
         return model
 
-    def pruned(self, model: Model) -> Model:
-        """Leave out effects that the others have made needless."""
-        for label in model.labels:
-            if len(model.labels) < 2:
-                break
-            acting = tuple(a for a in model.acting if a.label != label)
-            opened = tuple(o for o in model.opened if o.candidate.label != label)
-            less = fit(self.data, acting, opened, start=model.level)
-            freedom = max(len(model.covariance) - len(less.covariance), 1)
-            loss = max(2.0 * (less.nll - model.nll), 0.0)
-            scores = gram(self.data, less, self.free_signatures(less), less.level)
-            if log_p_of(loss, freedom) > self.threshold(scores):
-                model = less
-        return model
-
 
 def clearly_better(new: Model, old: Model) -> bool:
     """Whether another effect in the place of one fits better by more than its freedom and luck."""
@@ -285,52 +255,7 @@ def preferred(trials: Sequence[Trial]) -> Trial | None:
     if lasting and min(t.log_p for t in lasting) <= least + WANDER_NATS:
         trials, least = lasting, min(t.log_p for t in lasting)
     close = [t for t in trials if t.log_p <= least + AS_GOOD_NATS]
-    return min(close, key=lambda t: (commonness(t.candidate), t.log_p, t.candidate.label))
-
-
-def plausible(model: Model) -> bool:
-    """Whether every fitted parameter is of a size that its effect can have."""
-    for one in model.acting:
-        for p in one.effect.slopes():
-            value = one.values[p.name]
-            if abs(value) > p.high or (not p.signed and value < 0.0):
-                return False
-    return all(_mean_and_scatter_agree(model, one) for one in model.opened)
-
-
-def _mean_and_scatter_agree(model: Model, opened: Opened) -> bool:
-    """An effect with a mean and a scatter of one parameter needs both to say the same."""
-    for one in model.acting:
-        if one.label == opened.candidate.label:
-            value = one.values[one.effect.parameters[0].name]
-            return abs(model.level.size[opened.directed] - value) < AGREE * value
-    return True
-
-
-def located(data: Data, model: Model) -> Model:
-    """Refine where the newest effect starts, by halving the grid around the best place."""
-    last = model.acting[-1]
-    name = next(p.name for p in last.effect.parameters if p.located)
-    since = data.view.log.time_s - data.view.log.time_s[0]
-    first, last_time = np.quantile(since, [EDGE, 1.0 - EDGE])
-    reach = (last_time - first) / STEP_TIMES
-    best = model
-    for _ in range(4):
-        centre = best.acting[-1].values[name]
-        low, high = max(centre - reach, first), min(centre + reach, last_time)
-        for t in np.linspace(low, high, 7):
-            moved = replace(best.acting[-1], values={**best.acting[-1].values, name: float(t)})
-            trial = refitted(data, (*best.acting[:-1], moved), best)
-            best = trial if trial.nll < best.nll else best
-        reach /= 3.5
-    return best
-
-
-def refitted(data: Data, acting: tuple[Acting, ...], like: Model) -> Model:
-    """The same noise, other effects, one adjustment."""
-    now, error, covariance = adjusted(data, acting, like.precision, data.error(acting), steps=1)
-    nll = like.precision.negative_log_likelihood(error)
-    return replace(like, acting=now, error=error, covariance=covariance, nll=nll)
+    return min(close, key=lambda t: (commonness(t.candidate.label), t.log_p, t.candidate.label))
 
 
 def start_search(

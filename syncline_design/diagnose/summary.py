@@ -42,7 +42,10 @@ def _finding_lines(number: int, finding: Finding, diagnosis: Diagnosis) -> list[
         names = "; ".join(_name(a) for a in finding.aliases)
         lines.append(f"   this log cannot tell it from: {names}")
         lines.append(f"   to separate them: {finding.effect.separated_by}")
-    elif finding.excluded:
+    if finding.lookalikes:
+        worse = ", ".join(f"{_name(a)} by {a.nats_worse:.3g} nat" for a in finding.lookalikes[:3])
+        lines.append(f"   looks alike, fits worse: {worse}")
+    if finding.excluded and not finding.aliases:
         names = ", ".join(_name(a) for a in finding.excluded[:3])
         varied = ", ".join(
             f"{name.replace('_', ' ')} varied {m['low']:.3g} to {m['high']:.3g} {m['unit']}"

@@ -101,6 +101,7 @@ def finding_words(entry: Json) -> dict[str, Any]:
         "sentence": _full_stop(str(entry.get("sentence") or "")),
         "parameters": parameters,
         "aliases": sentence_list([_effect_text(e) for e in entry.get("aliases") or ()]),
+        "lookalikes": sentence_list([_excluded_text(e) for e in items(entry, "lookalikes")]),
         "excluded": sentence_list([_excluded_text(e) for e in items(entry, "excluded")]),
         "separated_by": plain_text(entry.get("separated_by")),
         "evidence": plain_text(entry.get("evidence")),

@@ -1,0 +1,123 @@
+"""Effects that look alike: fair refits inside a class, the best named, and what the evidence is.
+
+Truth and Cramer-Rao bounds are the hidden world's own.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from scipy.stats import chi2
+
+from syncline_design.diagnose import DiagnosisSettings, diagnose
+from tests.world import Hidden, WorldLog, hidden, make_log, scenario
+
+Document = dict[str, Any]
+EXACT = 0.9999
+
+
+def ask(log: WorldLog, folder: Path) -> Document:
+    spec = folder / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    document: Document = diagnose(
+        spec, [log.to_csv(folder / "log.csv")], DiagnosisSettings()
+    ).to_json()
+    return document
+
+
+def pairs(entries: list[Document]) -> set[tuple[str, str]]:
+    return {(entry["effect"], entry["sensor"]) for entry in entries}
+
+
+@pytest.mark.parametrize(("platform", "sensor"), [("car_stops", "position"),
+                                                  ("multirotor_lines", "ranging")])  # fmt: skip
+def test_an_exact_alias_is_one_and_fits_as_well(platform: str, sensor: str, tmp_path: Path) -> None:
+    """Without a time shift a lever arm of the antenna is that of the scanner, sign turned.
+
+    1500 rows: the noise is fitted on part of them only.
+    """
+    arm = hidden("lever_arm", sensor, x_m=0.15, y_m=-0.1, z_m=0.12)
+    document = ask(make_log(scenario(platform, 17, 150.0, 10.0), (arm,)), tmp_path)
+    (finding,) = document["findings"]
+    other = ({"position", "ranging"} - {finding["sensor"]}).pop()
+    assert finding["effect"] == "lever_arm"
+    (alias,) = [a for a in finding["aliases"] if a["effect"] == "lever_arm"]
+    assert alias["sensor"] == other
+    assert abs(alias["nats_worse"]) < 0.5
+    assert not [a for a in finding["excluded"] if a["cosine"] > EXACT]
+
+
+DELAYS = (
+    ("fixed_wing_circuits", 3, hidden("latency", "position", latency_s=0.05)),
+    ("car_stops", 21, hidden("latency", "position", latency_s=0.02)),
+    ("vessel_figure_eights", 6, hidden("latency", "attitude", latency_s=0.12)),
+    ("multirotor_lines", 9, hidden("latency", "ranging", latency_s=0.015)),
+)
+
+
+@pytest.mark.parametrize(("platform", "seed", "delay"), DELAYS)
+def test_a_plain_delay_is_called_one(
+    platform: str, seed: int, delay: Hidden, tmp_path: Path
+) -> None:
+    """And nothing that fits better by more than its freedom is listed beside it."""
+    document = ask(make_log(scenario(platform, seed, 80.0, 5.0), (delay,)), tmp_path)
+    (finding,) = document["findings"]
+    assert (finding["effect"], finding["sensor"]) == (delay.effect, delay.sensor)
+    for other in finding["aliases"]:
+        assert other["nats_worse"] > -2.0
+    for other in finding["excluded"]:
+        assert other["cosine"] < 0.99
+        assert other["nats_worse"] > 0.0
+
+
+def test_a_lag_that_is_no_delay_is_called_a_lag(tmp_path: Path) -> None:
+    """A slow filter on a multirotor that turns round: 0.25 s against manoeuvres of a second."""
+    lag = hidden("filter_lag", "position", time_constant_s=0.25)
+    document = ask(make_log(scenario("multirotor_lines", 31, 120.0, 5.0), (lag,)), tmp_path)
+    assert ("filter_lag", "position") in pairs(document["findings"])
+
+
+FAULTS = (
+    (
+        hidden("elevation_bias", "ranging", bias_rad=0.002),
+        hidden("latency", "position", latency_s=0.045),
+    ),
+    (
+        hidden("range_bias", "ranging", bias_m=0.06),
+        hidden("latency", "position", latency_s=0.02),
+    ),
+)
+BOUNDS = 14.0
+
+
+@pytest.mark.parametrize("faults", FAULTS)
+def test_evidence_is_what_leaving_an_effect_out_costs(
+    faults: tuple[Hidden, ...], tmp_path: Path
+) -> None:
+    """0.5 (value / bound)^2 nat to first order, the bound being Cramer and Rao's with both free.
+
+    Faults of 14 bounds each: 98 nat.  Noise that may take up part of what is left out makes it
+    cheaper, by less than 60 %; luck of four standard errors is allowed on either side.
+    """
+    run = scenario("multirotor_lines", 8, 120.0, 5.0)
+    first = make_log(run, faults).cramer_rao()
+    faults = tuple(
+        fault.with_values({name: BOUNDS * first[k, name] for name, _ in fault.parameters})
+        for k, fault in enumerate(faults)
+    )
+    log = make_log(run, faults)
+    bounds, document = log.cramer_rao(), ask(log, tmp_path)
+    found = {(f["effect"], f["sensor"]): f for f in document["findings"]}
+    assert set(found) == {(fault.effect, fault.sensor) for fault in faults}
+    for (index, name), bound in bounds.items():
+        finding = found[faults[index].effect, faults[index].sensor]
+        ratio = faults[index].number(name) / bound
+        assert 0.2 * (ratio - 4.0) ** 2 < finding["gain_nat"] < 0.5 * (ratio + 4.0) ** 2
+        if finding["gain_nat"] < 300.0:
+            log10_p = float(chi2.logsf(2.0 * finding["gain_nat"], 1)) / math.log(10.0)
+            assert finding["log10_p"] == pytest.approx(log10_p, rel=1e-6)
+    ranked = [finding["gain_nat"] for finding in document["findings"]]
+    assert ranked == sorted(ranked, reverse=True)
