@@ -59,11 +59,11 @@ class Finding:
     stage: str
     parameters: Mapping[str, Figure]
     aliases: tuple[AliasFigure, ...]
-    lookalikes: tuple[AliasFigure, ...]
     excluded: tuple[AliasFigure, ...]
     gain_nat: float
     log10_p: float | None
     gross: bool = False
+    lookalikes: tuple[AliasFigure, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -122,10 +122,10 @@ def _finding(
         view.system.stages[label[2]].name,
         figures,
         tuple(_alias(view, a) for a in compared.aliases),
-        tuple(_alias(view, a) for a in compared.lookalikes),
         tuple(_alias(view, a) for a in compared.excluded[:MOST_EXCLUDED]),
         evidence.gain,
         evidence.log_p / math.log(10.0) if math.isfinite(evidence.log_p) else None,
+        lookalikes=tuple(_alias(view, a) for a in compared.lookalikes),
     )
 
 
@@ -139,7 +139,7 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     figures = {p.name: Figure(fault.acting.values[p.name], None, p.unit) for p in effect.parameters}
     stage = view.system.stages[label[2]].name
     gain = math.log(fault.falls_by)
-    return Finding(effect, label[1], stage, figures, (), (), (), gain, None, gross=True)
+    return Finding(effect, label[1], stage, figures, (), (), gain, None, gross=True)
 
 
 def _stochastic(final: Settled, opened: Opened) -> Finding:
