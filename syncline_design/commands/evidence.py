@@ -88,7 +88,7 @@ def diagnose(
     data, text = found.to_json(), f"{visible(loaded.spec.name)} ({spec})\n\n{summary_text(found)}"
     if means is not None:
         data["design"] = means.to_json()
-        text += "\nWhat it means for the design:\n" + "".join(f"  {x}\n" for x in means.lines)
+        text += f"\nWhat it means for the design:\n{means.text()}"
     if write_spec is not None and means is not None:
         from syncline_design.spec_writer import write_spec as write_checked
 

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 from syncline_design.report.diagnosis_page import (
     DIAGNOSES,
+    design_lines,
     finding_words,
     gap_table,
-    plain_text,
+    meaning_table,
     remaining_text,
     sentence_text,
 )
@@ -33,10 +34,12 @@ def render_diagnosis_markdown(data: Json) -> str:
     gap = gap_table(data)
     if gap is not None:
         lines += [f"**{markdown_safe(gap.caption)}**", "", markdown_table(gap)]
-    means = [plain_text(line) for line in part(data, "design").get("text") or ()]
+    means = design_lines(data)
     if means:
         lines += ["**What it means for the design**", ""]
         lines += [f"- {markdown_safe(line.strip())}" for line in means]
+        figures = meaning_table(data)
+        lines += ["", markdown_table(figures)] if figures is not None else []
     return "\n".join(lines).rstrip() + "\n"
 
 

@@ -38,7 +38,7 @@ def render_diagnosis(data: Json) -> str:
         "gap": [t for t in (gap_table(data), _steps(data)) if t is not None],
         "residuals": "residuals" in drawn,
         "where": where_lines(data),
-        "design": [plain_text(line) for line in part(data, "design").get("text") or ()],
+        "design": design_lines(data),
         "log": _log_facts(data),
         "provenance": _provenance(data),
     }
@@ -54,6 +54,7 @@ def render_diagnosis(data: Json) -> str:
         figures={key: None if key not in drawn else page.trusted_svg(drawn[key].svg)
                  for key in ("residuals", "gap", "where", "coverage")},
         coverage=_coverage(data),
+        meaning=meaning_table(data),
         unseen=[plain_text(entry) for entry in data.get("unseen") or ()],
         rejected=_rejected(data),
         remaining=remaining_text(data),
@@ -151,6 +152,34 @@ def _facts(data: Json) -> list[tuple[str, str]]:
         facts.append(("Rows used", f"{numbers.count(log.get('used'))} of "
                                    f"{numbers.count(log.get('rows'))}"))  # fmt: skip
     return facts
+
+
+def design_lines(data: Json) -> list[str]:
+    """What the findings mean for the design, in words; the horizon last."""
+    design = part(data, "design")
+    lines = [plain_text(line) for line in design.get("text") or ()]
+    horizon = part(design, "horizon").get("text")
+    return [*lines, str(horizon)] if horizon else lines
+
+
+def meaning_table(data: Json) -> Table | None:
+    """The error without and with the findings, by model and simulated."""
+    rows: list[tuple[Cell | str, ...]] = [
+        (
+            str(entry.get("label")),
+            *(Cell(numbers.length(entry.get(f"{side}_m")), numbers.finite(entry.get(f"{side}_m")))
+              for side in ("before", "after")),
+            _interval(entry.get("after_interval_m")),
+        )
+        for entry in items(part(data, "design"), "figures")
+    ]  # fmt: skip
+    heads = ("Error of the design", "Without #", "With the findings #", "95 % interval, with")
+    return table("The error without and with the findings", heads, rows) if rows else None
+
+
+def _interval(ends: object) -> str:
+    found = [numbers.length(end) for end in ends] if isinstance(ends, list | tuple) else []
+    return " to ".join(found)
 
 
 def _score_cells(entry: Json) -> list[Cell]:
