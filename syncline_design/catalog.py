@@ -39,6 +39,7 @@ from syncline_design.values import (
 
 Primitive = Literal["pps", "network", "tov", "trigger", "arrival"]
 Modality = Literal["position", "attitude", "ranging"]
+Need = Literal["gnss"]  # what an entry cannot work without
 Sigma = float | tuple[float, ...]
 
 SIGMAS_OF: dict[str, tuple[str, ...]] = {
@@ -120,6 +121,7 @@ class SensorEntry(Entry):
     sigma_range: SigmaLength | None = None
     sigma_bearing: Annotated[Sigma, axes(Dimension.ANGLE, ("azimuth", "elevation"))] | None = None
     primitives: tuple[Primitive, ...]
+    needs: tuple[Need, ...] = ()
     cost: Money | None = None
     mass: Mass | None = None
     power: Power | None = None
@@ -233,6 +235,7 @@ class TimestampingEntry(Entry):
     primitives: Annotated[tuple[Primitive, ...], AtLeastOne]
     timeline: Literal["host", "utc"] = "host"
     error: ErrorEntry
+    needs: tuple[Need, ...] = ()
     cost: Money | None = None
     mass: Mass | None = None
     power: Power | None = None
@@ -243,6 +246,7 @@ class InfrastructureEntry(Entry):
     """Shared hardware, bought once per vehicle and per full set of channels."""
 
     channels: Count
+    needs: tuple[Need, ...] = ()
     cost: Money | None = None
     mass: Mass | None = None
     power: Power | None = None
@@ -254,6 +258,7 @@ class ClockEntry(Entry):
     offset: ErrorEntry
     drift: Ratio | None = None  # free-running clock: ppm, times holdover
     holdover: PositiveTime | None = None
+    needs: tuple[Need, ...] = ()
     cost: Money | None = None
     mass: Mass | None = None
     power: Power | None = None

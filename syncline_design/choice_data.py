@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from typing import Any
 
@@ -13,9 +13,11 @@ from syncline_design.effect_tables import design_budget
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked
 from syncline_design.references import parts_in_use
+from syncline_design.verdict import finite
 
 Json = dict[str, Any]
 NEXT_BEST = 5
+MOST_EXCLUDED = 1000  # rows of `excluded` in a verdict
 
 
 def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked) -> Json:
@@ -34,7 +36,7 @@ def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked) -> Json:
         "front_left_out": left_out(loaded, problem, "cost"),
         "staircase": [step.to_json() for step in staircase(points)],
         "next_best": designs_json(loaded, problem, islice(others, NEXT_BEST)),
-        "excluded": excluded_json(problem),
+        **excluded_json(problem),
     }
 
 
@@ -113,17 +115,49 @@ def left_out_text(labels: Sequence[str], resource: ResourceName) -> str:
     )
 
 
-def excluded_json(problem: Problem) -> list[Json]:
-    """Candidates ruled out before the choice, with the reason."""
-    return [
-        {
-            "stage": table.stage_name,
-            "role": table.role,
-            "sensor": gone.sensor,
-            "primitive": gone.primitive,
-            "method": gone.method,
-            "reason": gone.reason,
-        }
-        for table in problem.roles
-        for gone in table.excluded
-    ]
+def excluded_json(problem: Problem) -> Json:
+    """`excluded`: what was ruled out before the choice, and `excluded_count`, how much that is.
+
+    One row a sensor where the reason is the sensor's (primitive and method null), else one an
+    option; clocks have the role `clock`.  At most MOST_EXCLUDED rows.
+    """
+    rows = [*_excluded_options(problem), *_excluded_clocks(problem)]
+    return {"excluded": rows[:MOST_EXCLUDED], "excluded_count": len(rows)}
+
+
+def _excluded_options(problem: Problem) -> Iterator[Json]:
+    for table in problem.roles:
+        for gone in table.excluded:
+            yield {
+                "stage": table.stage_name,
+                "role": table.role,
+                "sensor": gone.sensor,
+                "primitive": gone.primitive or None,
+                "method": gone.method or None,
+                "reason": gone.reason,
+                "code": gone.code,
+                "figure": _plain(gone.figure),
+                "limit": _plain(gone.limit),
+            }
+
+
+def _excluded_clocks(problem: Problem) -> Iterator[Json]:
+    names = {table.stage: table.stage_name for table in problem.roles}
+    for vehicle in problem.vehicles:
+        for gone in vehicle.excluded:
+            yield {
+                "stage": names.get(vehicle.stages[0], vehicle.name),
+                "role": "clock",
+                "sensor": gone.clock.id,
+                "primitive": None,
+                "method": None,
+                "reason": gone.reason,
+                "code": gone.code,
+                "figure": _plain(gone.figure),
+                "limit": _plain(gone.limit),
+            }
+
+
+def _plain(figure: float | str | None) -> float | str | None:
+    """JSON has no infinity."""
+    return figure if isinstance(figure, str) else finite(figure)

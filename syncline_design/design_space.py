@@ -7,6 +7,7 @@ these tables from a loaded spec.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal, Protocol
@@ -73,7 +74,10 @@ class Option:
 
 @dataclass(frozen=True, slots=True)
 class Excluded:
-    """A candidate removed before the choice, with the reason in words and by how much it misses."""
+    """A candidate removed before the choice, with the reason in words and by how much it misses.
+
+    primitive, method: empty where the reason is the sensor's.
+    """
 
     sensor: str
     primitive: str
@@ -81,6 +85,10 @@ class Excluded:
     reason: str
     ratio: float | None = None  # tau / tau_crit where that is the reason
     option: Option | None = None  # what it would be, were the sync limit relaxed
+    code: str = "primitive"
+    figure: float | str | None = None  # what the entry says
+    limit: float | str | None = None  # what is asked of it
+    impossible: tuple[Option, ...] = ()  # what cannot work here, whatever limit is relaxed
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,10 +122,22 @@ NO_CLOCK = ClockOption(None, 0.0, Resources(Fraction(0), Fraction(0), Fraction(0
 
 
 @dataclass(frozen=True, slots=True)
+class ExcludedClock:
+    """A clock that cannot work on its vehicle."""
+
+    clock: ClockOption
+    reason: str
+    code: str
+    figure: float | str | None = None
+    limit: float | str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleTable:
     name: str
     stages: tuple[int, ...]
-    clocks: tuple[ClockOption, ...]  # never empty
+    clocks: tuple[ClockOption, ...]  # empty only where all that are offered are excluded
+    excluded: tuple[ExcludedClock, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -275,7 +295,32 @@ def breaks_own_tau_crit(option: Option, ratio: float) -> Excluded:
         f"its timestamp error reaches {ratio:.3g} times its own tau_crit: the sensor would be "
         "limited by its timestamps, not by its noise"
     )
-    return Excluded(*option.names, reason=reason, ratio=ratio, option=option)
+    limit = option.tau_s / ratio if 0.0 < ratio < math.inf else option.tau_crit_s
+    return Excluded(
+        *option.names, reason, ratio, option, code="tau", figure=option.tau_s, limit=limit
+    )
+
+
+def with_impossible(problem: Problem) -> Problem:
+    """The problem with what cannot work put back: what a spec that pins it has to be judged by."""
+    roles = []
+    for table in problem.roles:
+        back = [option for one in table.excluded for option in one.impossible]
+        options = tuple(sorted((*table.options, *back), key=lambda option: option.names))
+        rest = tuple(one for one in table.excluded if not one.impossible)
+        roles.append(replace(table, options=options, excluded=rest))
+    vehicles = tuple(
+        replace(v, clocks=(*v.clocks, *(one.clock for one in v.excluded)), excluded=())
+        for v in problem.vehicles
+    )
+    return replace(problem, roles=tuple(roles), vehicles=vehicles)
+
+
+def is_empty(problem: Problem) -> bool:
+    """Whether a role has no option, or a vehicle no clock, so that there is no design at all."""
+    return not all(role.options for role in problem.roles) or not all(
+        vehicle.clocks for vehicle in problem.vehicles
+    )
 
 
 def _under_sync_limit(table: RoleTable, limit: float) -> RoleTable:

@@ -128,7 +128,7 @@ def optimisation_json(found: Optimisation) -> Json:
         "proof": proof_json(found.picked),
         "combinations": str(problem.combinations),
         "designs": designs_json(loaded, problem, found.designs),
-        "excluded": excluded_json(problem),
+        **excluded_json(problem),
         "provenance": {
             "version": __version__,
             "spec_sha256": loaded.spec_sha256,

@@ -9,7 +9,7 @@ own tau_crit = that error / rate, rate v_max for position, v_max + d omega_max o
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -27,6 +27,7 @@ from syncline_design.design_space import (
     ClockOption,
     Design,
     Excluded,
+    ExcludedClock,
     Infrastructure,
     Limits,
     Objective,
@@ -41,12 +42,15 @@ from syncline_design.design_space import (
     breaks_own_tau_crit,
     exactly,
     sync_ratio,
+    with_impossible,
     with_limits,
 )
 from syncline_design.exact_figures import fraction_of, norm, tau_bound
+from syncline_design.gnss import Barred, barred_clock, barred_method, barred_sensor
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.system import ROLES, RoleName
 from syncline_design.resolution import (
+    Methods,
     candidate_sensors,
     clocks_of,
     platform_of,
@@ -164,10 +168,11 @@ def with_everything(problem: Problem) -> Problem:
 def sole_design(problem: Problem) -> tuple[Problem, Design] | None:
     """The one design of a spec that leaves nothing open, sync requirement or not.
 
-    Comes with the problem in which its indices hold: an option that breaks its own tau_crit is
-    part of it, so that the design can be verified and found to fail.
+    Comes with the problem in which its indices hold: an option that breaks its own tau_crit, or
+    that cannot work where it stands, is part of it, so that the design can be verified and found to
+    fail.
     """
-    everything = with_everything(problem)
+    everything = with_everything(with_impossible(problem))
     if everything.combinations != 1:
         return None
     return everything, Design((0,) * len(everything.roles), (0,) * len(everything.vehicles))
@@ -283,17 +288,54 @@ def _candidates(
         if isinstance(methods, InlineTimestamping):
             tau = tau_bound(methods.error, spec.coverage_factor)
             primitive = choice.primitive or INLINE
-            yield figures.option(primitive, INLINE, tau, methods.timeline, None)
-            continue
-        for method_id, method in methods:
-            primitives = usable_primitives(sensor, method, choice.primitive)
-            tau = tau_bound(method.error, spec.coverage_factor)
-            for primitive in primitives:
-                yield figures.option(primitive, method_id, tau, method.timeline, method)
-            if not primitives:
-                offers = choice.primitive or ", ".join(sensor.serves)
-                reason = f"{method_id} serves {', '.join(method.primitives)}; {name} has {offers}"
-                yield Excluded(name, "", method_id, reason)
+            option = figures.option(primitive, INLINE, tau, methods.timeline, None)
+            found: Iterator[Option | Excluded] = iter((option,))
+        else:
+            found = _stamped(figures, stage, choice, methods)
+        if (barred := barred_sensor(spec, stage, name, sensor)) is not None:
+            yield _impossible(name, "", "", barred, found)
+        else:
+            yield from found
+
+
+def _stamped(
+    figures: _Figures, stage: StageChoice, choice: RoleChoice, methods: Methods
+) -> Iterator[Option | Excluded]:
+    """Every way of stamping one sensor, or why it is none."""
+    spec, catalog = figures.loaded.spec, figures.loaded.catalog
+    name, sensor = figures.name, figures.sensor
+    for method_id, method in methods:
+        primitives = usable_primitives(sensor, method, choice.primitive)
+        tau = tau_bound(method.error, spec.coverage_factor)
+        barred = barred_method(spec, stage, method_id, method, catalog)
+        for primitive in primitives:
+            option = figures.option(primitive, method_id, tau, method.timeline, method)
+            one = (option,)
+            yield option if barred is None else _impossible(name, primitive, method_id, barred, one)
+        if not primitives:
+            served = ", ".join(method.primitives)
+            offers = choice.primitive or ", ".join(sensor.serves)
+            reason = f"{method_id} serves {served}; {name} has {offers}"
+            yield Excluded(name, "", method_id, reason, figure=served, limit=offers)
+
+
+def _impossible(
+    sensor: str, primitive: str, method: str, barred: Barred, found: Iterable[Option | Excluded]
+) -> Excluded:
+    """The record of what cannot work on its stage, with the options that it takes along."""
+    options: list[Option] = []
+    for one in found:
+        options += [one] if isinstance(one, Option) else one.impossible
+    return Excluded(
+        sensor,
+        primitive,
+        method,
+        barred.reason,
+        code=barred.code,
+        figure=barred.figure,
+        limit=barred.limit,
+        impossible=tuple(options),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -383,8 +425,19 @@ def _vehicle(loaded: LoadedSpec, name: str) -> VehicleTable:
         (c for i in stages if (c := clocks_of(spec.stages[i], loaded.catalog))),
         (),
     )
-    clocks = tuple(_clock(loaded, identity, entry) for identity, entry in entries)
-    return VehicleTable(name, tuple(stages), clocks or (NO_CLOCK,))
+    if not entries:
+        return VehicleTable(name, tuple(stages), (NO_CLOCK,))
+    clocks: list[ClockOption] = []
+    excluded: list[ExcludedClock] = []
+    for identity, entry in entries:
+        clock = _clock(loaded, identity, entry)
+        barred = barred_clock(spec, name, identity, entry, loaded.catalog)
+        if barred is None:
+            clocks.append(clock)
+        else:
+            why = (barred.reason, barred.code, barred.figure, barred.limit)
+            excluded.append(ExcludedClock(clock, *why))
+    return VehicleTable(name, tuple(stages), tuple(clocks), tuple(excluded))
 
 
 def _clock(loaded: LoadedSpec, identity: str, entry: ClockEntry) -> ClockOption:

@@ -20,13 +20,15 @@ from fractions import Fraction
 from typing import Any, Literal
 
 from syncline_design.loading import LoadedSpec
+from syncline_design.recheck_facts import impossible
 from syncline_design.resolution import candidate_sensors, platform_of, timestamping_of
 from syncline_design.selection import Role, RoleSelection, Selection
 from syncline_design.spec import InlineTimestamping, StageChoice
 
 DIGITS = 60
 IMPLIED_SYNC = "SYNC"
-Kind = Literal["accuracy", "sync", "cost", "mass", "power"]
+IMPLIED_FACTS = "FACTS"  # fails where a chosen entry cannot work where it stands
+Kind = Literal["accuracy", "sync", "cost", "mass", "power", "feasible"]
 BUDGETS: tuple[Literal["cost", "mass", "power"], ...] = ("cost", "mass", "power")
 NO_EXTRA: Mapping[tuple[str, Role], float] = {}
 
@@ -48,6 +50,7 @@ class Rechecked:
     limit: Fraction
     passed: bool
     implied: bool = False
+    note: str = ""
 
     @property
     def value_float(self) -> float | None:
@@ -128,7 +131,7 @@ def _recheck(
     found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
     found |= {"accuracy": Fraction(total), "sync": Fraction(max(ratios))}
     return Recheck(
-        tuple(_requirements(loaded, found)),
+        (*_facts(loaded, selection), *_requirements(loaded, found)),
         amounts["cost"],
         amounts["mass"],
         amounts["power"],
@@ -380,6 +383,14 @@ def _requirements(loaded: LoadedSpec, found: Mapping[str, Fraction | None]) -> I
         value = found[one.kind]
         kind: Kind = one.kind  # type: ignore[assignment]  # monte_carlo is left out above
         yield Rechecked(one.id, kind, value, limit, _meets(one.kind, value, limit))
+
+
+def _facts(loaded: LoadedSpec, selection: Selection) -> Iterator[Rechecked]:
+    """The implied requirement that the payload can exist, where it cannot: how much is wrong."""
+    wrong = impossible(loaded, selection)
+    if wrong:
+        count, none = Fraction(len(wrong)), Fraction(0)
+        yield Rechecked(IMPLIED_FACTS, "feasible", count, none, False, True, "; ".join(wrong))
 
 
 def _exact(value: float) -> Fraction:

@@ -32,6 +32,7 @@ from syncline_design.values import (
     Speed,
     Text,
     Vector,
+    YesNo,
     did_you_mean,
     kind_of,
     read_ids,
@@ -276,6 +277,9 @@ class StageChoice(Record):
         MethodChoice | None, _one_or_candidates("timestamping", MethodChoice)
     ] = None
     clock: Annotated[ClockChoice | None, _one_or_candidates("clock", ClockChoice)] = None
+    gnss: YesNo | None = None  # None: yes for a first stage that is not at a depth
+    depth: NonNegativeLength | None = None
+    timing_from: Text | None = None  # stage that GNSS time comes from, by a cable
     note: str = ""
 
     def role(self, name: Role) -> RoleChoice | None:
@@ -425,11 +429,33 @@ def _stage_errors(spec: Spec) -> list[Located]:
         if stage.ranging is not None and stage.attitude is None:
             error = refusal("missing beside ranging", "an attitude sensor")
             errors.append(((*at, "attitude"), error))
+        errors += _cable_errors(spec, stage, at)
         for name in ("attitude", "ranging"):
             role = stage.attitude if name == "attitude" else stage.ranging
             if role is not None and role.is_empty:
                 errors.append(((*at, name), refusal("no sensor", "sensor or candidates")))
     return errors
+
+
+def _cable_errors(spec: Spec, stage: StageChoice, at: Loc) -> list[Located]:
+    """A cable comes from another stage, and not round in a circle."""
+    source = {one.name: one.timing_from for one in spec.stages}
+    name = stage.timing_from
+    if name is None:
+        return []
+    others = [one for one in source if one != stage.name]
+    if name not in others:
+        wanted = f"one of {', '.join(others)}" if others else "no timing_from in a single stage"
+        error = refusal("no other stage of that name", wanted, name, did_you_mean(name, others))
+        return [((*at, "timing_from"), error)]
+    passed: set[str | None] = set()
+    while name in source and name != stage.name and name not in passed:
+        passed.add(name)
+        name = source[name]
+    if name != stage.name:
+        return []
+    error = refusal("a cable that comes back to its own stage", "a stage that has time of its own")
+    return [((*at, "timing_from"), error)]
 
 
 def _first_position(stage: StageChoice, at: Loc) -> list[Located]:

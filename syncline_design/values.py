@@ -192,6 +192,18 @@ def _figure(
     return Reader(read, quantity_schema(dimension, tolerance))
 
 
+def _read_yes_no(value: Any) -> bool:
+    """yes, no, true or false; YAML 1.2 reads the first two as text."""
+    if isinstance(value, bool):
+        return value
+    if value in ("yes", "no"):
+        return bool(value == "yes")
+    raise refusal("neither yes nor no", "yes or no", kind_of(value))
+
+
+YesNo = Annotated[
+    bool, Reader(_read_yes_no, {"anyOf": [{"enum": ["yes", "no"]}, {"type": "boolean"}]})
+]
 Length = Annotated[float, _figure(Dimension.LENGTH)]
 PositiveLength = Annotated[float, _figure(Dimension.LENGTH, 0.0, above=True)]
 NonNegativeLength = Annotated[float, _figure(Dimension.LENGTH, 0.0)]

@@ -30,7 +30,14 @@ EXIT_CODES: Mapping[str, int] = {
     "refused": 2,
     "indeterminate": 3,
 }
-UNITS = {"accuracy": "m", "monte_carlo": "m", "sync": "1", "mass": "kg", "power": "W"}
+UNITS = {
+    "accuracy": "m",
+    "monte_carlo": "m",
+    "sync": "1",
+    "feasible": "1",
+    "mass": "kg",
+    "power": "W",
+}
 
 
 @dataclass(frozen=True, slots=True)

@@ -111,9 +111,11 @@ def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
     problem = build(loaded)
     sole = sole_design(problem)
     if sole is not None:
-        problem, design = sole
-        verified = verify(loaded, problem, design, settings)
-        return _verdict_json(loaded, problem, verified, settings, {})
+        from syncline_design.choice_data import excluded_json
+
+        everything, design = sole
+        verified = verify(loaded, everything, design, settings)
+        return _verdict_json(loaded, everything, verified, settings, excluded_json(problem))
     return _check_open(loaded, problem, settings, build)
 
 
@@ -185,7 +187,7 @@ def _infeasible_json(
         _placed(loaded, index, one, _unmet(loaded, one, one.id in conflict), settings).to_json()
         for index, one in enumerate(loaded.spec.requirements)
     ]
-    data["choice"] = {"excluded": excluded_json(problem)}
+    data["choice"] = excluded_json(problem)
     return data
 
 
@@ -258,7 +260,8 @@ def _results(
         if one.implied:
             yield RequirementResult(
                 one.id, one.kind, "pass" if one.passed else "fail", one.value_float,
-                float(one.limit), UNITS["sync"], implied=True,
+                float(one.limit), UNITS[one.kind], implied=True,
+                note=one.note,
             )  # fmt: skip
     for index, requirement in enumerate(loaded.spec.requirements):
         if requirement.kind == "monte_carlo":

@@ -22,7 +22,7 @@ from syncline_design.choose.outcome import (
     Unfinished,
 )
 from syncline_design.choose.ranked import iter_best
-from syncline_design.design_space import Design, Problem, ResourceName
+from syncline_design.design_space import Design, Problem, ResourceName, is_empty
 
 SMALL = 300  # combinations up to which the automatic road also enumerates
 MOST_STEPS = 4000  # steps of the search that confirms the merge before it is left out
@@ -40,7 +40,7 @@ def choose(
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
     empty = tuple(r for r, role in enumerate(problem.roles) if not role.options)
-    if empty:
+    if is_empty(problem):
         return Infeasible(Proof("tables", True, True), empty)
     deadline = Deadline(time_limit_s)
     deadline.check()

@@ -19,7 +19,7 @@ from syncline_design.choose.outcome import NoVerdict
 from syncline_design.choose.parts import Part, is_feasible, lifted, parts_of
 from syncline_design.choose.platform_fixes import platform_fixes
 from syncline_design.choose.variations import Build
-from syncline_design.design_space import Problem, RoleTable
+from syncline_design.design_space import Problem, RoleTable, VehicleTable
 from syncline_design.loading import LoadedSpec
 from syncline_design.problem import build_problem
 
@@ -133,6 +133,7 @@ def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) 
     where there are any).
     """
     gaps = tuple(_gap(table, problem.limits.sync) for table in problem.roles if not table.options)
+    gaps += tuple(_clock_gap(vehicle) for vehicle in problem.vehicles if not vehicle.clocks)
     conflict, minimal = _conflict(problem)
     further = _further(problem, conflict)
     moves = _proven(lambda: requirement_fixes(loaded, problem, build))
@@ -213,6 +214,13 @@ def _gap(table: RoleTable, sync_limit: float) -> RoleGap:
     reasons = "; ".join(dict.fromkeys(one.reason for one in table.excluded))
     text = f"No option for {where}: {reasons or 'no candidates'}."
     return RoleGap(table.stage_name, table.role, None, None, text)
+
+
+def _clock_gap(vehicle: VehicleTable) -> RoleGap:
+    """Why no clock that is offered to a vehicle can work there."""
+    reasons = "; ".join(one.reason for one in vehicle.excluded)
+    text = f"No clock for {vehicle.name}: {reasons}."
+    return RoleGap(vehicle.name, "clock", None, None, text)
 
 
 def _conflict(problem: Problem) -> tuple[tuple[Part, ...], bool]:

@@ -30,7 +30,7 @@ from syncline_design.choose.narrowed import stated
 from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choose.pareto import Bools, Columns, Floats, Indices, undominated
 from syncline_design.choose.rounded_once import total_errors_m
-from syncline_design.design_space import ClockOption, Design, Problem, ResourceName
+from syncline_design.design_space import ClockOption, Design, Problem, ResourceName, is_empty
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def merged_front(
 ) -> tuple[FrontPoint, ...]:
     """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12)."""
     demand_structure(problem)
-    if any(not role.options for role in problem.roles):
+    if is_empty(problem):
         return ()
     tables = _one_timeline(tabulate(problem, resource))
     end = deadline or Deadline()

@@ -21,7 +21,7 @@ import numpy as np
 from syncline_design.choose.arrays import MARGIN, Scaled, Tables, tabulate
 from syncline_design.choose.evaluate import broken, evaluate
 from syncline_design.choose.outcome import Deadline, NoVerdict
-from syncline_design.design_space import Design, Pair, Problem, ResourceName
+from syncline_design.design_space import Design, Pair, Problem, ResourceName, is_empty
 
 LEAST_HIGHSPY = (1, 15)
 MOST_CUTS = 40
@@ -39,7 +39,7 @@ _SUNG: list[bool] = []  # whether the canary has been solved rightly in this pro
 
 def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
     """A design with the least objective and, among those, the least error; None if none is."""
-    if any(not role.options for role in problem.roles):
+    if is_empty(problem):
         return None
     solver = _Solver(deadline)
     solver.demand_canary()

@@ -22,7 +22,14 @@ from syncline_design.choose.arrays import MARGIN, RoleArrays, Scaled, tabulate
 from syncline_design.choose.evaluate import Amount, broken, error_key, evaluate, rank
 from syncline_design.choose.outcome import Deadline, TooLarge
 from syncline_design.choose.pareto import Bools, Column, Columns, Floats, Indices, undominated
-from syncline_design.design_space import RESOURCES, Design, Problem, ResourceName, VehicleTable
+from syncline_design.design_space import (
+    RESOURCES,
+    Design,
+    Problem,
+    ResourceName,
+    VehicleTable,
+    is_empty,
+)
 
 Key = tuple[Amount, float, Amount, Amount, Amount, tuple[int, ...]]
 
@@ -34,7 +41,7 @@ def iter_best(
 
     Raises NoVerdict after the deadline, TooLarge after `most_steps` partial designs.
     """
-    if all(role.options for role in problem.roles):
+    if not is_empty(problem):
         yield from _Search(problem).run(deadline or Deadline(), most_steps)
 
 

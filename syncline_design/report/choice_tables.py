@@ -144,8 +144,8 @@ def excluded(verdict: Json) -> Table | None:
         (
             f"{entry.get('stage')} \u00b7 {entry.get('role')}",
             Cell(str(entry.get("sensor")), code=True),
-            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive"))),
-            Cell(str(entry.get("method")), code=True),
+            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive") or "\u2013")),
+            Cell(str(entry.get("method") or "\u2013"), code=True),
             str(entry.get("reason")),
         )
         for entry in items(part(verdict, "choice"), "excluded")

@@ -157,7 +157,7 @@ def table(rows: Sequence[Sequence[str]], indent: int = 2, right: Iterable[int] =
 def _figure(kind: str, value: float | None, unit: str) -> str:
     if value is None:
         return "-"
-    if kind == "sync":
+    if kind in ("sync", "feasible"):
         return f"{value:.4g}"
     if kind == "cost":
         return format_quantity(value, Dimension.MONEY, currency=unit)
@@ -170,7 +170,7 @@ def _requirements(data: Data, paint: Any) -> list[str]:
         kind, unit = r["kind"], r["unit"]
         sign = "<" if kind == "sync" else "<="
         value = _figure(kind, r["value"], unit)
-        what = "tau / tau_crit" if kind == "sync" else kind
+        what = {"sync": "tau / tau_crit", "feasible": "cannot exist"}.get(kind, kind)
         if kind == "monte_carlo":
             what = f"{percent(r['quantile'])} quantile"
         margin = "" if r["margin"] is None else f"margin {_signed(kind, r['margin'], unit)}"

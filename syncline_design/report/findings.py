@@ -130,6 +130,8 @@ def requirement_sentence(row: Json) -> str:
     """`ACC-1: worst-case error (Syncline) 93.9 mm exceeds its limit 50 mm (87.8 % over)`."""
     status = str(row.get("status"))
     limit = value_text(row, "limit")
+    if row.get("kind") == "feasible" and status == "fail":
+        return f"{row.get('id')}: this payload cannot exist; {row.get('note')}"
     if numbers.finite(row.get("value")) is None:
         text = f"{row.get('id')}: {kind_text(row)} limited to {limit}; no value"
     else:

@@ -42,6 +42,7 @@ KINDS: Final[dict[str, str]] = {
     "mass": "mass",
     "power": "power",
     "monte_carlo": "simulated error, quantile",
+    "feasible": "entries that cannot work where they stand",
 }
 TERMS: Final[dict[str, str]] = {
     "sigma_p": "position noise \u03c3_p",
