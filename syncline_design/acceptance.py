@@ -12,16 +12,18 @@ from typing import NoReturn
 
 from syncline_design.choose.outcome import Unfinished
 from syncline_design.chosen_system import system_of
-from syncline_design.design_space import Design, Judge, Judgement
+from syncline_design.design_space import Design, Judge, Judgement, Option
 from syncline_design.design_space import Problem as DesignProblem
 from syncline_design.effect_tables import problem_of
 from syncline_design.input_files import FileContent
 from syncline_design.known_effects import effect_entries
 from syncline_design.loading import BadInput, LoadedSpec, Problem
-from syncline_design.model.system import Sensor, Stage, System
+from syncline_design.model.system import ROLES, UTC, RoleName, Sensor, Stage, System
 from syncline_design.simulate import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.spec import Requirement
+from syncline_design.timing import NO_ERROR
 
+HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
 MOST_SIMULATED = 1000  # different systems simulated for one command before it gives up
 
 
@@ -63,6 +65,7 @@ class Simulations:
         default_factory=dict
     )
     systems: set[System] = field(default_factory=set)
+    gave_up: bool = False
 
     def decide(
         self, loaded: LoadedSpec, system: System, quantile: float, limit_m: float
@@ -74,6 +77,7 @@ class Simulations:
         if key not in self.known:
             self.systems.add(nameless)
             if len(self.systems) > self.most:
+                self.gave_up = True
                 raise Unfinished(f"the search stopped after {self.most} simulated designs")
             self.known[key] = decide(nameless, settings, quantile, limit_m)
         return self.known[key]
@@ -102,39 +106,86 @@ class _SpecJudge:
     requirements: tuple[Requirement, ...]
     limits: tuple[tuple[str, float], ...]
 
+    @property
+    def gave_up(self) -> bool:
+        """Whether too many designs were simulated for one command."""
+        return self.simulations.gave_up
+
+    def hopeless(self, problem: DesignProblem, role: int, option: Option) -> bool:
+        """Whether the noise of a sensor alone, with all else perfect, fails a limit by 1 %.
+
+        Independent errors never make a symmetric, unimodal one less dispersed (T. W. Anderson,
+        Proc. AMS 6, 1955): whatever is added, P(|error| <= limit) is no larger.  The margin is for
+        what the simulator's angles do beyond first order.
+        """
+        if self._noise_is_changed():
+            return False
+        places = [0] * len(problem.roles)
+        places[role] = problem.roles[role].options.index(option)
+        design = Design(tuple(places), (0,) * len(problem.vehicles))
+        table = problem.roles[role]
+        bare = _noise_alone(system_of(self.loaded, problem, design), table.stage, table.role)
+        return any(
+            self._status(bare, name, HOPELESS * limit) == "fail" for name, limit in self.limits
+        )
+
+    def _noise_is_changed(self) -> bool:
+        """Whether a known effect changes the noise of a sensor."""
+        from syncline_design.effects import registry
+
+        kinds = [registry()[one.effect].kind for one in effect_entries(self.loaded)]
+        return "stochastic" in kinds
+
     def judge(self, problem: DesignProblem, design: Design) -> Judgement:
         """Every limit in turn; the first that fails settles it."""
         left_open: list[str] = []
+        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
         for name, limit in self.limits:
-            try:
-                status = self._decision(problem, design, name, limit).status
-            except SimulationError as error:
-                self._demand_no_trajectory(error)
-                status = "indeterminate"
+            status = self._status(system, name, limit)
             if status == "fail":
                 return Judgement(failed=(name,))
             left_open += [name] if status == "indeterminate" else []
         return Judgement(undecided=tuple(left_open))
 
-    def _demand_no_trajectory(self, error: SimulationError) -> None:
-        if self.loaded.spec.monte_carlo.trajectory is not None:
-            refuse_trajectory(self.loaded, str(error))
+    def _status(self, system: System, name: str, limit_m: float) -> str:
+        try:
+            return self._decision(system, name, limit_m).status
+        except SimulationError as error:
+            if self.loaded.spec.monte_carlo.trajectory is not None:
+                refuse_trajectory(self.loaded, str(error))
+            return "indeterminate"
 
-    def _decision(
-        self, problem: DesignProblem, design: Design, name: str, limit_m: float
-    ) -> Decision:
+    def _decision(self, system: System, name: str, limit_m: float) -> Decision:
         quantile = next(float(r.quantile or 0.0) for r in self.requirements if r.id == name)
-        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
         return self.simulations.decide(self.loaded, system, quantile, limit_m)
 
     def reached_m(self, problem: DesignProblem, design: Design, requirement: str) -> float:
         """Upper end of the interval of the quantile that the requirement limits [m]."""
         limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
-        return self._decision(problem, design, requirement, limit).estimate.high_m
+        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
+        return self._decision(system, requirement, limit).estimate.high_m
 
     def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
         """The same at other limits."""
         return replace(self, limits=limits)
+
+
+def _noise_alone(system: System, stage: int, role: RoleName) -> System:
+    """A system whose only error is the noise of one sensor; speeds then matter to nothing."""
+    stages = []
+    for index, one in enumerate(system.stages):
+        perfect = {
+            name: replace(sensor, timing=NO_ERROR, timeline=UTC)
+            if (index, name) == (stage, role)
+            else replace(sensor, sigma=(0.0, 0.0, 0.0), timing=NO_ERROR, timeline=UTC)
+            for name in ROLES
+            if (sensor := getattr(one, name)) is not None
+        }
+        platform = replace(one.platform, v_max_mps=1.0, omega_max_radps=1.0)
+        if role == "position":
+            platform = replace(platform, distance_m=1.0)
+        stages.append(replace(one, platform=platform, **perfect))
+    return replace(system, stages=tuple(stages), clock_offsets=(), effects=())
 
 
 def _nameless(system: System) -> System:

@@ -34,7 +34,7 @@ def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked) -> Json:
         "proof": proof_json(picked),
         "front": front_json(loaded, problem, points),
         "front_left_out": left_out(loaded, problem, "cost"),
-        "staircase": [step.to_json() for step in staircase(points)],
+        "staircase": [step.to_json() for step in staircase([p for p in points if not p.undecided])],
         "next_best": designs_json(loaded, problem, islice(others, NEXT_BEST)),
         **excluded_json(problem),
     }
@@ -65,6 +65,7 @@ def front_json(
             "error_m": point.error_m,
             "design": full_design(loaded, problem, point.design),
         }
+        | _undecided(problem, point.design)
         for point in points
     ]
 
@@ -84,10 +85,16 @@ def _with_error(loaded: LoadedSpec, problem: Problem, design: Design) -> Json:
     figures = design_budget(loaded, problem, design)
     shown = design_json(loaded, problem, design, figures)
     error = figures.total(loaded.spec.sync_model)
-    return {key: shown[key] for key in ("cost", "mass", "power")} | {
-        "error_m": error,
-        "design": shown,
-    }
+    sums = {key: shown[key] for key in ("cost", "mass", "power")}
+    return sums | {"error_m": error, "design": shown} | _undecided(problem, design)
+
+
+def _undecided(problem: Problem, design: Design) -> Json:
+    """Simulated requirements that a design's samples leave open, where there are any."""
+    from syncline_design.choose.acceptable import judgement
+
+    found = judgement(problem, design).undecided
+    return {"undecided": list(found)} if found else {}
 
 
 def left_out(loaded: LoadedSpec, problem: Problem, resource: ResourceName) -> list[str]:

@@ -211,6 +211,15 @@ class Judge(Protocol):
     @property
     def limits(self) -> tuple[tuple[str, float], ...]: ...
 
+    @property
+    def gave_up(self) -> bool:
+        """Whether a search ended because too many designs were simulated."""
+        ...
+
+    def hopeless(self, problem: Problem, role: int, option: Option) -> bool:
+        """Whether a sensor's noise alone already fails a limit, whatever it is combined with."""
+        ...
+
     def judge(self, problem: Problem, design: Design) -> Judgement:
         """Simulate one design of a problem against every limit."""
         ...

@@ -29,6 +29,7 @@ from syncline_design.choose.tolerance import (
     measure_next,
     tolerance_verdict,
 )
+from syncline_design.choose.variations import Build
 from syncline_design.design_space import Design, Problem, ResourceName
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked, pick
@@ -103,19 +104,25 @@ def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     hinges = explanation = None
     if picked.verified is None:
         explanation = explain(loaded, problem, build)
-    else:
+    elif picked.exhausted:
         chosen = picked.verified.design
         others = (d for d in best(problem, settings.count + 1) if d != chosen)
         designs = (chosen, *islice(others, settings.count - 1))
-        hinges = Hinges(
-            slack_ledger(loaded, problem, chosen, build),
-            tolerance_verdict(loaded, problem, chosen, build),
-            measure_next(loaded, problem, chosen, build),
+        hinges = (
+            _hinges(loaded, problem, chosen, build) if picked.verified.word == "meets" else None
         )
+    steps = staircase([point for point in points if not point.undecided])
     return Optimisation(
-        loaded, problem, settings, picked, designs, points, staircase(points), hinges,
-        explanation,
-    )  # fmt: skip
+        loaded, problem, settings, picked, designs, points, steps, hinges, explanation
+    )
+
+
+def _hinges(loaded: LoadedSpec, problem: Problem, chosen: Design, build: Build) -> Hinges:
+    return Hinges(
+        slack_ledger(loaded, problem, chosen, build),
+        tolerance_verdict(loaded, problem, chosen, build),
+        measure_next(loaded, problem, chosen, build),
+    )
 
 
 def optimisation_json(found: Optimisation) -> Json:

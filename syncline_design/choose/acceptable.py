@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from syncline_design.choose.evaluate import broken, evaluate
+from syncline_design.choose.narrowed import Narrowed, kept
 from syncline_design.choose.outcome import Deadline
 from syncline_design.choose.ranked import iter_best
 from syncline_design.design_space import Design, Judgement, Problem
@@ -35,10 +36,47 @@ def iter_acceptable(
     problem: Problem, deadline: Deadline | None = None
 ) -> Iterator[tuple[Design, Judgement]]:
     """Designs that meet all requirements, best first; those that simulation leaves open as such."""
-    for design in iter_best(problem, deadline):
-        found = judgement(problem, design)
+    for design, found in iter_judged(problem, deadline):
         if not found.failed:
             yield design, found
+
+
+def iter_judged(
+    problem: Problem, deadline: Deadline | None = None
+) -> Iterator[tuple[Design, Judgement]]:
+    """Designs that keep every sum, best first, with what simulation says of them.
+
+    From the first that fails on, sensors whose noise alone fails are left out.
+    """
+    known: set[Design] = set()
+    some_failed = False
+    for design in iter_best(problem, deadline):
+        found = judgement(problem, design)
+        known.add(design)
+        yield design, found
+        if found.failed:
+            some_failed = True
+            break
+    if not some_failed:
+        return
+    smaller = promising(problem)
+    if smaller.is_empty:
+        return
+    for inner in iter_best(smaller.problem, deadline):
+        design = smaller.whole(inner)
+        if design not in known:
+            yield design, judgement(problem, design)
+
+
+def promising(problem: Problem) -> Narrowed:
+    """The problem without the options that simulation rules out by their sensor alone."""
+    judge = problem.judge
+    assert judge is not None
+    return kept(
+        problem,
+        lambda r, option: not judge.hopeless(problem, r, option),
+        lambda _, clock: True,
+    )
 
 
 def without_simulation(problem: Problem) -> Problem:

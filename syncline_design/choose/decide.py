@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import replace
+from contextlib import suppress
 
-from syncline_design.choose.acceptable import iter_acceptable, judgement
+from syncline_design.choose.acceptable import iter_acceptable, iter_judged, judgement
 from syncline_design.choose.enumerate import best_by_enumeration
 from syncline_design.choose.evaluate import broken, error_key, evaluate, rank
 from syncline_design.choose.front import merged_front
@@ -22,9 +22,10 @@ from syncline_design.choose.outcome import (
     Unfinished,
 )
 from syncline_design.choose.ranked import iter_best
-from syncline_design.design_space import Design, Problem, ResourceName, is_empty
+from syncline_design.design_space import Design, Judgement, Problem, ResourceName, is_empty
 
 SMALL = 300  # combinations up to which the automatic road also enumerates
+MOST_COUNTED = 1000  # better designs that fail simulation are counted up to here
 MOST_STEPS = 4000  # steps of the search that confirms the merge before it is left out
 
 
@@ -56,26 +57,26 @@ def _simulated(problem: Problem, first: Choice, deadline: Deadline) -> Choice | 
     Where it accepts none, the first one that it leaves open.
     """
     left_open: Choice | None = None
-    proof = first.proof
+    proof, tried = first.proof, 0
     try:
-        found = judgement(problem, first.design)
-        if found.passed:
+        if judgement(problem, first.design).passed:
             return first
-        passed_over = 0
-        for design in itertools.chain((first.design,), _others(problem, first.design, deadline)):
-            found = judgement(problem, design)
+        for design, found in iter_judged(problem, deadline):
             if found.passed:
-                return Choice(design, proof, passed_over)
+                return Choice(design, proof, _before(problem, design, deadline))
             if left_open is None and not found.failed:
-                left_open = Choice(design, proof, passed_over, found.undecided)
-            passed_over += 1
+                place = _before(problem, design, deadline)
+                left_open = Choice(design, proof, place, found.undecided)
+            tried += 1
     except Unfinished:
-        return Choice(first.design, proof, passed_over, exhausted=False)
-    return left_open or Infeasible(replace(proof, rechecked=True), passed_over=passed_over)
+        return Choice(first.design, proof, tried, exhausted=False)
+    return left_open or Infeasible(proof, passed_over=tried)
 
 
-def _others(problem: Problem, first: Design, deadline: Deadline) -> Iterator[Design]:
-    return (design for design in iter_best(problem, deadline) if design != first)
+def _before(problem: Problem, design: Design, deadline: Deadline) -> int:
+    """How many designs come before one in the order, at most as many as anyone would count."""
+    order = itertools.islice(iter_best(problem, deadline), MOST_COUNTED)
+    return next((place for place, one in enumerate(order) if one == design), MOST_COUNTED)
 
 
 def _by_sums(problem: Problem, method: Method, deadline: Deadline) -> Choice | Infeasible:
@@ -160,6 +161,14 @@ def _outcome(
     return Choice(design, proof)
 
 
+def _until_unfinished(
+    designs: Iterator[tuple[Design, Judgement]],
+) -> Iterator[tuple[Design, Judgement]]:
+    """Designs until too many were simulated, which the judge remembers."""
+    with suppress(Unfinished):
+        yield from designs
+
+
 def best(problem: Problem, count: int) -> Iterator[Design]:
     """The best `count` truly different designs, best first.
 
@@ -167,7 +176,7 @@ def best(problem: Problem, count: int) -> Iterator[Design]:
     primitive or clock alone is the same design, shown in its best form.
     """
     seen: set[tuple[tuple[str, str], ...]] = set()
-    for design, _ in iter_acceptable(problem):
+    for design, _ in _until_unfinished(iter_acceptable(problem)):
         options = zip(problem.roles, design.options, strict=True)
         shown = tuple((t.options[i].sensor, t.options[i].method) for t, i in options)
         if shown in seen:

@@ -78,14 +78,24 @@ class _Asked:
     def nearest(self, end: float) -> Quantity | None:
         """The value nearest to the present one, on the way to an end, at which a design exists."""
         found = self._window(self.before, end)
-        if found is None:
+        if found is None or self._simulation_rules_out(end):
             return None
         fails, works = found
-        if not self._holds(works):  # simulation decides: look on, coarsely
+        if not self._holds(works):  # simulation decides: nearer helps, farther does not
+            if end > self.before:
+                return None
             fails, works = self._by_shares(works, end)
             if not self._holds(works):
                 return None
         return self._rounded(self._edge(fails, works), end)
+
+    def _simulation_rules_out(self, end: float) -> bool:
+        """Whether the far end keeps every sum and still fails in simulation: then no value helps,
+        since a slower or nearer vehicle errs no more."""
+        last = self._problem(end)
+        if last.judge is None or end > self.before:
+            return False
+        return is_feasible(without_simulation(last)) and not is_feasible(last)
 
     def _problem(self, value: float) -> Problem:
         if value not in self.problems:

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
-from syncline_design.choose.acceptable import judgement
+from syncline_design.choose.acceptable import judgement, promising
 from syncline_design.choose.evaluate import error_key, evaluate
-from syncline_design.choose.outcome import FrontPoint
+from syncline_design.choose.outcome import FrontPoint, Unfinished
 from syncline_design.choose.ranked import iter_best
 from syncline_design.design_space import Problem, ResourceName
 
@@ -25,6 +26,15 @@ def accepted_front(
     A design that simulation leaves open is listed, marked, and takes no other one's place.
     """
     out: list[FrontPoint] = []
+    with suppress(Unfinished):  # what was found stands; the judge remembers that it gave up
+        for point in _accepted(problem, resource, points):
+            out.append(point)  # noqa: PERF402 - one by one, so that an end keeps what came before
+    return tuple(out)
+
+
+def _accepted(
+    problem: Problem, resource: ResourceName, points: Sequence[FrontPoint]
+) -> Iterator[FrontPoint]:
     least = math.inf
     failing = False
     for point in points:
@@ -32,11 +42,12 @@ def accepted_front(
             failing = True
             continue
         if failing:
-            out += _gap(problem, resource, least, point)
+            yield from _gap(problem, resource, least, point)
             failing = False
-        out.append(point)
+        yield point
         least = error_key(point.error_m)
-    return (*out, *(_gap(problem, resource, least, None) if failing else ()))
+    if failing:
+        yield from _gap(problem, resource, least, None)
 
 
 def _gap(
@@ -57,7 +68,9 @@ def _next(
 ) -> Iterator[FrontPoint]:
     """The cheapest accepted design of a smaller error, after those that are left open."""
     limits = replace(problem.limits, accuracy_m=None if math.isinf(least_m) else least_m)
-    for design in iter_best(replace(problem, limits=limits, objective=resource)):
+    smaller = promising(replace(problem, limits=limits, objective=resource))
+    for inner in iter_best(smaller.problem):
+        design = smaller.whole(inner)
         sums = evaluate(problem, design)
         amount = sums.amount(resource)
         if amount is None or (until is not None and amount >= until.amount):

@@ -1,0 +1,231 @@
+"""Requirements on simulated quantiles in the choice: what is listed meets them, or says it is open.
+
+A vehicle with a position sensor alone and perfect stamps errs by a normal vector: the quantile of
+its length is sigma times that of chi with three degrees of freedom (scipy), so which sensor passes
+is known without simulation.  Limits keep 3 % away from the quantiles (a million samples tell 0.3 %
+apart), except where a test wants the opposite.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from scipy.stats import chi
+
+from syncline_design.loading import LoadedSpec, load_text
+from syncline_design.optimisation import OptimizeSettings, optimisation_json, optimize
+from syncline_design.verify import CheckSettings, check_loaded, exit_code
+
+FACTOR = {q: float(chi.ppf(q, 3)) for q in (0.5, 0.95, 0.997)}
+SENSORS = {  # sigma [m], cost
+    "a": (0.30, 100),
+    "b": (0.20, 200),
+    "c": (0.15, 150),
+    "d": (0.10, 900),
+    "e": (0.05, 4000),
+    "f": (0.04, 3000),
+}
+
+
+def spec(folder: Path, requirements: list[dict[str, Any]], **changes: Any) -> LoadedSpec:
+    sensors = {
+        name: {
+            "modality": "position",
+            "sigma_position": f"{sigma} m",
+            "primitives": [],
+            "cost": f"{cost} EUR",
+        }
+        for name, (sigma, cost) in (SENSORS | changes.pop("sensors", {})).items()
+    }
+    stamping = {
+        "primitives": ["arrival"],
+        "timeline": "utc",
+        "cost": "0 EUR",
+        "error": {"distribution": "constant", "value": "0 s"},
+    }
+    own = {"sensors": sensors, "timestamping": {"bench": stamping}}
+    (folder / "own.yaml").write_text(yaml.safe_dump(own))
+    data = {
+        "syncline": 1,
+        "name": "position alone",
+        "catalogs": ["own.yaml"],
+        "requirements": requirements,
+        "stages": [
+            {
+                "name": "boat",
+                "platform": {
+                    "v_max": "1 m/s",
+                    "omega_max": "1 deg/s",
+                    "distance": "1 m",
+                    "baseline": "1 m",
+                },
+                "position": {"candidates": sorted(sensors)},
+            }
+        ],
+        "timestamping": {"candidates": ["bench"]},
+        "monte_carlo": {"samples": 20000},
+        **changes,
+    }
+    return load_text(yaml.safe_dump(data, sort_keys=False), folder / "spec.yaml")
+
+
+def simulated(limit: float, quantile: float = 0.95, name: str = "MC") -> dict[str, Any]:
+    return {"id": name, "kind": "monte_carlo", "quantile": quantile, "limit": f"{limit!r} m"}
+
+
+def sums(kind: str, limit: str, name: str) -> dict[str, Any]:
+    return {"id": name, "kind": kind, "limit": limit}
+
+
+def position(design: dict[str, Any]) -> str:
+    return str(design["stages"][0]["roles"]["position"]["sensor"])
+
+
+def passing(limit: float, quantile: float = 0.95) -> list[str]:
+    return [n for n, (sigma, _) in SENSORS.items() if FACTOR[quantile] * sigma <= limit]
+
+
+def plain_front(names: list[str]) -> list[tuple[float, float]]:
+    points: list[tuple[float, float]] = []
+    for cost, sigma in sorted((float(SENSORS[n][1]), SENSORS[n][0]) for n in names):
+        if not points or math.sqrt(3) * sigma < points[-1][1]:
+            points.append((cost, math.sqrt(3) * sigma))
+    return points
+
+
+@pytest.mark.parametrize(
+    ("limit", "quantile"), [(0.60, 0.95), (0.45, 0.95), (0.135, 0.95), (0.40, 0.997), (0.17, 0.5)]
+)
+def test_everything_that_is_listed_meets_the_simulated_limit(
+    limit: float, quantile: float, tmp_path: Path
+) -> None:
+    loaded = spec(tmp_path, [simulated(limit, quantile)])
+    names = passing(limit, quantile)
+    cheapest = min(names, key=lambda n: SENSORS[n][1])
+    verdict = check_loaded(loaded, CheckSettings())
+    assert (verdict["verdict"], position(verdict["design"])) == ("meets", cheapest)
+    front = [(p["cost"], p["error_m"]) for p in verdict["choice"]["front"]]
+    assert front == [(c, pytest.approx(e, rel=1e-12)) for c, e in plain_front(names)]
+    steps = [(s["cost"], s["tightest_m"]) for s in verdict["choice"]["staircase"]]
+    assert steps == front
+    listed = {position(d["design"]) for d in verdict["choice"]["next_best"]}
+    assert listed == set(names) - {cheapest}
+    found = optimisation_json(optimize(loaded, OptimizeSettings(count=9, pareto=True)))
+    assert {position(d["design"]) for d in found["designs"]} == set(names)
+    assert [(p["cost"], p["error_m"]) for p in found["front"]] == front
+
+
+def test_a_better_design_that_fails_is_said_to_be_passed_over(tmp_path: Path) -> None:
+    verdict = check_loaded(spec(tmp_path, [simulated(0.30)]), CheckSettings())
+    assert verdict["choice"]["proof"]["passed_over"] == 3
+    assert [w["code"] for w in verdict["warnings"]].count("passed-over") == 1
+
+
+def test_no_design_passes_is_infeasible_in_check_and_optimize(tmp_path: Path) -> None:
+    loaded = spec(tmp_path, [simulated(0.10), sums("accuracy", "5 m", "ACC")])
+    verdict = check_loaded(loaded, CheckSettings())
+    found = optimize(loaded, OptimizeSettings())
+    assert (verdict["verdict"], exit_code(verdict), found.exit_code) == ("infeasible", 1, 1)
+    data = optimisation_json(found)
+    assert data["verdict"] == "infeasible"
+    assert data["designs"] == []
+    for why in (verdict["infeasibility"], data["infeasibility"]):
+        assert why["conflict"] == {
+            "requirements": [{"id": "MC", "kind": "monte_carlo", "line": 6}],
+            "minimal": True,
+        }
+    status = {r["id"]: r["status"] for r in verdict["requirements"]}
+    assert status["MC"] == "fail"
+
+
+def fix_of(verdict: dict[str, Any], name: str) -> dict[str, Any]:
+    (fix,) = [f for f in verdict["infeasibility"]["fixes"] if f["requirement"] == name]
+    return dict(fix)
+
+
+def test_a_simulated_limit_is_moved_as_little_as_needed(tmp_path: Path) -> None:
+    fix = fix_of(check_loaded(spec(tmp_path, [simulated(0.10)]), CheckSettings()), "MC")
+    least = FACTOR[0.95] * SENSORS["f"][0]
+    assert least * 0.99 < fix["to"] < least * 1.03
+    written = fix["text"].rsplit(" to ", 1)[1]
+    again = spec(tmp_path, [simulated(0.1) | {"limit": written}])
+    assert check_loaded(again, CheckSettings())["verdict"] == "meets"
+
+
+def test_a_conflict_of_cost_and_simulation_names_both(tmp_path: Path) -> None:
+    """0.30 m needs d, e or f; 800 EUR buys a, b or c."""
+    loaded = spec(tmp_path, [simulated(0.30), sums("cost", "800 EUR", "COST")])
+    verdict = check_loaded(loaded, CheckSettings())
+    why = verdict["infeasibility"]
+    assert {m["id"] for m in why["conflict"]["requirements"]} == {"MC", "COST"}
+    assert fix_of(verdict, "COST")["to"] == 900
+    least = FACTOR[0.95] * SENSORS["c"][0]
+    assert least * 0.99 < fix_of(verdict, "MC")["to"] < least * 1.03
+    assert any("without any one of them a design exists" in line for line in why["text"])
+    for fixed in ([simulated(0.30), sums("cost", "900 EUR", "COST")],):
+        assert check_loaded(spec(tmp_path, fixed), CheckSettings())["verdict"] == "meets"
+
+
+def test_two_simulated_requirements_each_count(tmp_path: Path) -> None:
+    """The median lets c pass, the 99.7 % quantile asks for d."""
+    median, tail = FACTOR[0.5] * 0.16, FACTOR[0.997] * 0.11
+    loaded = spec(tmp_path, [simulated(median, 0.5, "MED"), simulated(tail, 0.997, "TAIL")])
+    verdict = check_loaded(loaded, CheckSettings())
+    assert position(verdict["design"]) == "d"
+    tight = spec(
+        tmp_path, [simulated(median, 0.5, "MED"), simulated(0.03 * FACTOR[0.997], 0.997, "TAIL")]
+    )
+    why = check_loaded(tight, CheckSettings())["infeasibility"]
+    assert [m["id"] for m in why["conflict"]["requirements"]] == ["TAIL"]
+
+
+def test_a_design_that_its_samples_leave_open_carries_the_requirement(tmp_path: Path) -> None:
+    """The limit is the cheap sensor's own quantile to 1e-9: no number of samples decides."""
+    limit = FACTOR[0.95] * 0.15 * (1 + 1e-9)
+    loaded = spec(tmp_path, [simulated(limit)], sensors={"c": (0.15, 50)})
+    verdict = check_loaded(loaded, CheckSettings())
+    assert verdict["verdict"] == "meets"
+    assert position(verdict["design"]) == "d"
+    marked = {position(d["design"]): d.get("undecided") for d in verdict["choice"]["next_best"]}
+    assert marked == {"c": ["MC"], "e": None, "f": None}
+    points = {position(p["design"]): p.get("undecided") for p in verdict["choice"]["front"]}
+    assert points == {"c": ["MC"], "d": None, "f": None}
+
+
+def test_nothing_but_an_open_design_is_no_verdict(tmp_path: Path) -> None:
+    limit = FACTOR[0.95] * SENSORS["f"][0] * (1 + 1e-9)
+    found = optimize(spec(tmp_path, [simulated(limit)]), OptimizeSettings())
+    data = optimisation_json(found)
+    assert (data["verdict"], found.exit_code) == ("indeterminate", 3)
+    assert data["designs"][0]["undecided"] == ["MC"]
+
+
+def test_a_known_effect_decides_in_simulation_too(tmp_path: Path) -> None:
+    """Noise twice the datasheet's: the quantile doubles, and another sensor is chosen."""
+    effects = [{"effect": "noise_understated", "sensor": "position", "parameters": {"factor": 2.0}}]
+    limit = 2.0 * FACTOR[0.95] * 0.15 * 1.05
+    loaded = spec(tmp_path, [simulated(limit)], effects=effects)
+    verdict = check_loaded(loaded, CheckSettings())
+    assert position(verdict["design"]) == "c"
+    assert {position(p["design"]) for p in verdict["choice"]["front"]} == {"c", "d", "f"}
+
+
+def test_measured_figures_flip_the_choice_by_simulation(tmp_path: Path) -> None:
+    """c just keeps the limit: 20 % more noise and it fails, as nothing but simulation says."""
+    loaded = spec(tmp_path, [simulated(FACTOR[0.95] * 0.15 * 1.05)])
+    data = optimisation_json(optimize(loaded, OptimizeSettings()))
+    flips = {one["figure"]: one for one in data["measure_next"]}
+    assert "c sigma_position" in flips
+    assert flips["c sigma_position"]["at"] == pytest.approx(0.18)
+
+
+def test_a_waived_simulated_requirement_excludes_nothing(tmp_path: Path) -> None:
+    waiver = {"reason": "the buoy is out", "expires": "2999-01-01"}
+    loaded = spec(tmp_path, [simulated(0.001) | {"waiver": waiver}])
+    verdict = check_loaded(loaded, CheckSettings())
+    assert verdict["verdict"] == "meets"
+    assert position(verdict["design"]) == "a"
