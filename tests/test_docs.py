@@ -97,3 +97,95 @@ def test_shipped_studies_can_be_read(study: Path) -> None:
     loaded = load_study(study)
     assert 20 <= len(loaded) <= 200
     assert loaded.path == study
+
+
+def _ratio_table(first: str) -> list[list[str]]:
+    """The rows of the table in docs/simulation.md whose header starts like this."""
+    text = (DOCS / "simulation.md").read_text(encoding="utf-8")
+    body = text.partition(f"\n| {first} |")[2].partition("\n\n")[0]
+    return [[c.strip() for c in line.strip("| ").split("|")] for line in body.splitlines()[2:]]
+
+
+def _worst_ratios(platform: str) -> list[float]:
+    from syncline_design.chosen_system import system_of
+    from syncline_design.loading import load_text
+    from syncline_design.simulate import comparison
+    from syncline_design.verify import picked_design
+
+    how = "primitive: pps, timestamping: hardware"
+    text = (
+        "syncline: 1\nname: x\nrequirements:\n  - {id: A, kind: accuracy, limit: 1 km}\n"
+        "  - {id: S, kind: sync, limit: 1000000}\n"
+        f"stages:\n  - name: s\n    platform: {platform}\n"
+        f"    position: {{sensor: ublox_f9p_rtk, {how}}}\n"
+        f"    attitude: {{sensor: kongsberg_mru5, {how}}}\n"
+        f"    ranging: {{sensor: riegl_vux1uav, {how}}}\n"
+    )
+    loaded = load_text(text, ROOT / "specs" / "x.yaml")
+    system = system_of(loaded, *picked_design(loaded), ())
+    return [row.worst_case.ratio for row in comparison(system, (1e-6, 1e-3, 1e-2, 1e-1))]
+
+
+def test_the_lever_arm_figures_are_what_the_simulator_gives() -> None:
+    """Both tables of docs/simulation.md, anew; the search itself is good to a few thousandths."""
+    platforms = _ratio_table("platform")
+    assert len(platforms) == 7
+    for name, _, *printed in platforms:
+        assert _worst_ratios(name) == pytest.approx([float(p) for p in printed], abs=0.006), name
+    lengths = _ratio_table("b / d")
+    assert len(lengths) == 4
+    for share, *printed in lengths:
+        platform = f"{{use: uav_fixed_wing, distance: 100 m, baseline: {100 * float(share):g} m}}"
+        assert _worst_ratios(platform) == pytest.approx([float(p) for p in printed], abs=0.006)
+
+
+def test_how_often_errors_exceed_the_syncline_is_as_the_pages_say() -> None:
+    """39 % from the chi-square distribution, 9 % from a simulation of the README's design."""
+    import numpy as np
+    from scipy.stats import chi2
+
+    from syncline_design.chosen_system import system_of
+    from syncline_design.loading import load
+    from syncline_design.model.budget import budget
+    from syncline_design.simulate import SimulationSettings, sample_errors
+    from syncline_design.verify import picked_design
+
+    assert f"{100 * chi2.sf(3.0, 3):.0f} %" == "39 %"
+    loaded = load(ROOT / "specs" / "uav_corridor.yaml")
+    system = system_of(loaded, *picked_design(loaded), ())
+    errors = np.linalg.norm(sample_errors(system, SimulationSettings(samples=100_000)), axis=1)
+    share = float(np.mean(errors > budget(system).total_m))
+    assert share == pytest.approx(0.09, abs=0.005)  # standard error 0.0009
+    for page in ("simulation.md", "theory.md"):
+        text = (DOCS / page).read_text(encoding="utf-8")
+        assert "39 %" in text
+        assert "9 %" in text
+        assert "now and then" not in text
+
+
+def test_the_drawing_of_signs_follows_the_simulator(tmp_path: Path) -> None:
+    """The script's bearing is that of the chain, and the committed drawing is the script's."""
+    import importlib.util
+
+    import numpy as np
+
+    from syncline_design.effects.kinematics import bearing
+
+    source = importlib.util.spec_from_file_location("make_signs", DOCS / "make_signs.py")
+    assert source is not None
+    assert source.loader is not None
+    drawing = importlib.util.module_from_spec(source)
+    source.loader.exec_module(drawing)
+    for azimuth, elevation in ((0.0, 0.0), (0.6, 0.5), (-2.0, -1.1), (np.pi / 2, 0.0)):
+        ours = bearing(np.array([azimuth]), np.array([elevation]))[0]
+        assert drawing.bearing(azimuth, elevation) == pytest.approx(tuple(ours), abs=1e-12)
+    forward, right, down = drawing.bearing(0.3, 0.2)
+    assert (forward > 0, right > 0, down < 0) == (True, True, True)
+    drawing.IMAGE = tmp_path / "signs.svg"
+    drawing.main()
+    words = [
+        re.findall(r">([^<]+)</text>", path.read_text("utf-8"))
+        for path in (DOCS / "images" / "bearing_signs.svg", drawing.IMAGE)
+    ]
+    assert words[0] == words[1]
+    assert {"azimuth &gt; 0:", "to the right", "elevation &gt; 0:", "above"} <= set(words[0])

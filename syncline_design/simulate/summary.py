@@ -56,8 +56,8 @@ def monte_carlo_lines(found: MonteCarlo, trajectory: str | None = None) -> list[
         )
     lines.append(f"  intervals hold with {100 * found.confidence:g} % confidence")
     lines.append(
-        "  Gaussian noise exceeds a sum of one-sigma terms now and then: errors above the "
-        "Syncline do not contradict it"
+        "  the Syncline adds one-sigma magnitudes and is no quantile (39 % of errors exceed it "
+        "where position noise is all there is): errors above it do not contradict it"
     )
     return lines
 
