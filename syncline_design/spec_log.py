@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+import math
+from typing import Annotated, Any
+
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
 
-from syncline_design.units import UNITS, suffix_unit
-from syncline_design.values import Loc, Record, Text, did_you_mean, refusal, refusals
+from syncline_design.units import UNITS, Dimension, Quantity, suffix_unit
+from syncline_design.values import (
+    Loc,
+    Reader,
+    Record,
+    Text,
+    did_you_mean,
+    kind_of,
+    quantity_schema,
+    read_quantity,
+    refusal,
+    refusals,
+)
 
 
 def split_column(text: str) -> tuple[str, str]:
@@ -19,11 +33,56 @@ def split_column(text: str) -> tuple[str, str]:
     return bare, unit[:-1].strip()
 
 
+def _read_place(value: Any) -> tuple[Quantity, ...]:
+    """Latitude, longitude and height, each with its unit."""
+    wanted = "latitude, longitude, height, such as [47.3 deg, 8.55 deg, 460 m]"
+    if not isinstance(value, tuple | list) or len(value) != 3:
+        found = f"{len(value)} figures" if isinstance(value, tuple | list) else kind_of(value)
+        raise refusal("not a place", wanted, found)
+    kinds = (Dimension.ANGLE, Dimension.ANGLE, Dimension.LENGTH)
+    read, errors = [], list[tuple[Loc, PydanticCustomError]]()
+    for k, (item, kind) in enumerate(zip(value, kinds, strict=True)):
+        try:
+            read.append(read_quantity(item, kind))
+        except PydanticCustomError as error:
+            errors.append(((k,), error))
+    if not errors and abs(read[0]) > 0.5 * math.pi * (1.0 + 1e-12):
+        errors.append(((0,), refusal("no latitude", "at most 90 deg", read[0].text)))
+    if not errors and abs(read[1]) > 2.0 * math.pi * (1.0 + 1e-12):
+        errors.append(((1,), refusal("no longitude", "at most 360 deg", read[1].text)))
+    if errors:
+        raise refusals(errors)
+    return tuple(read)
+
+
+Place = Annotated[
+    tuple[float, float, float],
+    Reader(
+        _read_place,
+        {
+            "type": "array",
+            "items": [
+                quantity_schema(Dimension.ANGLE),
+                quantity_schema(Dimension.ANGLE),
+                quantity_schema(Dimension.LENGTH),
+            ],
+            "minItems": 3,
+            "maxItems": 3,
+            "description": "WGS 84: latitude, longitude, height above the ellipsoid",
+        },
+    ),
+]
+
+
 class LogChoice(Record):
-    """How a measured log names its columns: canonical name to `their.name [unit]`."""
+    """How a measured log names its columns: canonical name to `their.name [unit]`.
+
+    origin: latitude, longitude, height above the ellipsoid of the log's local frame.
+    """
 
     columns: dict[Text, Text] = Field(default_factory=dict)
     files: tuple[Text, ...] = ()
+    origin: Place | None = None
 
     @model_validator(mode="after")
     def _units_fit(self) -> LogChoice:

@@ -103,15 +103,122 @@ def test_geodetic_places_become_local(tmp_path: Path) -> None:
     assert any("WGS 84" in note for note in log.notes)
 
 
-def test_gaps_duplicates_and_disorder_are_counted(tmp_path: Path) -> None:
+def test_gaps_and_strays_are_counted(tmp_path: Path) -> None:
     made = columns()
     made["range_m"][5] = np.nan
-    made["time_s"][10] = made["time_s"][9]
     made["time_s"][20], made["time_s"][21] = made["time_s"][21], made["time_s"][20]
     log = read(write(tmp_path / "a.csv", made))
-    assert log.rejected == {"stamp out of order": 1, "duplicate stamp": 1, "missing value": 1}
-    assert len(log) == ROWS - 2
+    assert log.rejected == {"stamp out of order": 1, "missing value": 1}
+    assert log.rows_read == len(log) + 2
     assert np.all(np.diff(log.time_s) > 0)
+
+
+@pytest.mark.parametrize("wrong", [1e6, -50.0, np.nan])
+def test_one_stray_stamp_costs_one_row(tmp_path: Path, wrong: float) -> None:
+    made = columns()
+    made["time_s"][17] = wrong
+    log = read(write(tmp_path / "a.csv", made))
+    assert log.time_s == pytest.approx(np.delete(columns()["time_s"], 17))
+    assert sum(log.rejected.values()) == 1
+
+
+def test_one_target_after_the_other_is_put_in_order(tmp_path: Path) -> None:
+    """A file sorted by target runs through time once for each; no row is a stamp fault."""
+    made = columns()
+    order = np.argsort(np.arange(ROWS) % 2, kind="stable")
+    log = read(write(tmp_path / "a.csv", {k: v[order] for k, v in made.items()}))
+    assert log.time_s == pytest.approx(made["time_s"])
+    assert log.truth_m[:, 0] == pytest.approx(made["target_north_m"], rel=1e-8)
+    assert not log.rejected
+    assert any("order" in note for note in log.notes)
+
+
+def scanned(stamps: int, targets: int) -> dict[str, np.ndarray]:
+    """Rows of a scanner that sees all targets at every stamp."""
+    made = columns()
+    rng = np.random.default_rng(8)
+    made = {name: rng.uniform(-10, 10, stamps * targets) for name in made}
+    made["time_s"] = np.repeat(np.arange(stamps) * 0.1, targets)
+    places = np.round(rng.uniform(0, 100, (targets, 3)), 3)
+    for k, axis in enumerate(("north", "east", "down")):
+        made[f"target_{axis}_m"] = np.tile(places[:, k], stamps)
+        made[f"position_{axis}_m"] = np.sin(0.1 * made["time_s"] + k)
+    return made
+
+
+@pytest.mark.parametrize("told_by", ["place", "number", "name"])
+def test_targets_of_one_stamp_are_all_used(tmp_path: Path, told_by: str) -> None:
+    made = scanned(30, 4)
+    ids = np.tile(np.arange(4), 30)
+    path = write(tmp_path / "a.csv", made | ({} if told_by == "place" else {"target_id": ids}))
+    if told_by == "name":
+        lines = path.read_text(encoding="utf-8").splitlines()
+        named = [
+            line.rpartition(",")[0] + f",tube {k}" for line, k in zip(lines[1:], ids, strict=True)
+        ]
+        path.write_text("\n".join([lines[0], *named]) + "\n", encoding="utf-8")
+    log = read(path)
+    assert len(log) == log.rows_read == 120
+    assert not log.rejected
+    assert log.stages[0].range_m == pytest.approx(made["range_m"], rel=1e-8)
+    if told_by != "place":
+        assert log.target_id is not None
+        assert len(set(zip(log.target_id, ids, strict=True))) == 4
+
+
+def test_a_row_given_twice_is_counted_once(tmp_path: Path) -> None:
+    made = scanned(30, 4)
+    again = np.sort(np.concatenate([np.arange(120), [5, 5, 77]]))
+    log = read(write(tmp_path / "a.csv", {k: v[again] for k, v in made.items()}))
+    assert log.rejected == {"row given twice": 3}
+    assert (log.rows_read, len(log)) == (123, 120)
+    made = scanned(30, 4)
+    other = {k: np.append(v, v[9]) for k, v in made.items()}
+    other["range_m"][-1] += 1.0
+    order = np.argsort(other["time_s"], kind="stable")
+    log = read(write(tmp_path / "b.csv", {k: v[order] for k, v in other.items()}))
+    assert log.rejected == {"second row of a target at one stamp": 1}
+    assert log.stages[0].range_m is not None
+    assert log.stages[0].range_m[9] == pytest.approx(made["range_m"][9], rel=1e-8)
+
+
+def test_a_row_of_a_position_log_is_its_stamp_s(tmp_path: Path) -> None:
+    t = np.repeat(np.arange(20) * 0.1, 2)[:-1]
+    made = {k: v[: t.size] for k, v in columns().items() if k.startswith(("pos", "ro", "pi", "ya"))}
+    made |= {"time_s": t, **{f"reference_{a}_m": 0 * t for a in ("north", "east", "down")}}
+    with pytest.raises(BadInput, match="stands still"):
+        read_log([write(tmp_path / "a.csv", {**made, "time_s": 0 * t})], ["car"], {}, False)
+    made["time_s"] = np.unique(np.append(np.arange(t.size) * 0.1, 0.0))
+    made["time_s"][4] = made["time_s"][3]
+    log = read_log([write(tmp_path / "b.csv", made)], ["car"], {}, False)
+    assert log.rejected == {"duplicate stamp": 1}
+
+
+@pytest.mark.parametrize("targets", [1, 4])
+def test_motion_is_derived_over_distinct_stamps(tmp_path: Path, targets: int) -> None:
+    """A turning circle seen at several targets a stamp: the same velocity and rate as at one."""
+    t = np.repeat(np.arange(200) * 0.1, targets)
+    yaw = 0.2 * t
+    made = {
+        "time_s": t,
+        "position_north_m": 10 * np.sin(yaw),
+        "position_east_m": -10 * np.cos(yaw),
+        "position_down_m": 0 * t,
+        "roll_deg": 0 * t,
+        "pitch_deg": 0 * t,
+        "yaw_deg": np.degrees(yaw),
+        "range_m": 5 + 0 * t,
+        "azimuth_deg": 0 * t,
+        "elevation_deg": 0 * t,
+        "target_north_m": np.tile(np.arange(targets), 200) + 0.0,
+        "target_east_m": 0 * t,
+        "target_down_m": 0 * t,
+    }
+    log = read(write(tmp_path / "a.csv", made))
+    assert len(log) == 200 * targets
+    assert log.interval_s == pytest.approx(0.1)
+    assert log.stages[0].velocity_mps[:, 0] == pytest.approx(2 * np.cos(yaw), abs=0.02)
+    assert log.stages[0].rate_radps[:, 2] == pytest.approx(0.2, abs=1e-6)
 
 
 def test_a_torn_end_leaves_the_readable_rows(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 
 from syncline_design.spec import split_column
@@ -25,12 +26,14 @@ COMMON = (
     *(f"{p}_{g}" for p in ("target", "reference") for g in GEODETIC),
 )
 TARGET_ID = "target_id"
+ISO_TIMES = ("time", "time_utc", "time_iso")  # columns of ISO 8601 times; no unit in the name
+HEADING, YAW = "heading_rad", "yaw_rad"
 
 
 def known_names(stages: Iterable[str]) -> frozenset[str]:
     """Every SI column name that a log of these stages may hold."""
-    names = [*COMMON, TARGET_ID, *PER_STAGE]
-    names += [f"{stage}_{name}" for stage in stages for name in PER_STAGE]
+    names = [*COMMON, TARGET_ID, *PER_STAGE, HEADING]
+    names += [f"{stage}_{name}" for stage in stages for name in (*PER_STAGE, HEADING)]
     return frozenset(names)
 
 
@@ -40,9 +43,10 @@ def si_columns(
     """SI name -> (column of the file, factor to SI) for everything the diagnosis can use.
 
     A name of the mapping wins over the column's own; `their.name [unit]` brings its own unit,
-    without brackets the canonical name's suffix is the unit.
+    without brackets the canonical name's suffix is the unit.  The factor is NaN for a time column
+    whose name has no unit.  A heading is a yaw.
     """
-    names = list(present)
+    names = dict.fromkeys(present)
     found: dict[str, tuple[str, float]] = {}
     for name in names:
         si = TARGET_ID if name == TARGET_ID else si_name(name)
@@ -53,7 +57,23 @@ def si_columns(
         if column in names:
             factor = float(UNITS[unit][1]) if unit else suffix_unit(canonical)[0]
             found[si_name(canonical)] = (column, factor)
+    for name in ISO_TIMES:
+        own = found.pop(name, (name, math.nan) if name in names else None)
+        if own is not None and TIME not in found:
+            found[TIME] = (own[0], math.nan)
+    for si in [s for s in found if s.endswith(HEADING)]:
+        heading = found.pop(si)
+        found.setdefault(si.removesuffix(HEADING) + YAW, heading)
     return found
+
+
+def headings(found: Mapping[str, tuple[str, float]]) -> tuple[str, ...]:
+    """What to say of headings that stand in for yaw."""
+    return tuple(
+        f"{name} was read as yaw"
+        for si, (name, _) in sorted(found.items())
+        if si.endswith(YAW) and si_name(name).endswith(HEADING)
+    )
 
 
 def shown(si: str) -> str:

@@ -49,7 +49,24 @@ def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
                 slow.append(Slow((stage.name, role), loading, True))
     kept = tuple(s for s in slow if _matters(s, white))
     common = np.concatenate(stamped, axis=2) if stamped else None
-    return Structure(view.log.time_s, tuple(white), kept, fixed, directed, common)
+    once = one_reading(view)
+    return Structure(view.log.time_s, tuple(white), kept, fixed, directed, common, once)
+
+
+def one_reading(view: Scene) -> bool:
+    """Whether rows of one stamp hold one reading of the vehicle, and so its very noise.
+
+    Several targets of a scan are paired with one pose.  Where the poses of a stamp differ, the
+    stamps are coarse, and every row is a reading of its own.
+    """
+    log = view.log
+    same = log.time_s[1:] == log.time_s[:-1]
+    equal = np.ones(same.shape, dtype=bool)
+    for stage in log.stages:
+        for values in (stage.antenna_m, stage.euler_rad):
+            if values is not None:
+                equal &= np.all(values[1:] == values[:-1], axis=1)
+    return bool(np.mean(equal[same]) > 0.5) if np.any(same) else True
 
 
 def _matters(part: Slow, white: list[White]) -> bool:

@@ -69,6 +69,7 @@ class Log:
     truth_m (n, 3) NED: surveyed target (georeference) or the better system's reference point
     (position); NaN components are not known and count for nothing.  rejected: rows dropped, by
     reason.  notes: what was derived or cut, for people.  rows_read: before any was dropped.
+    thinned: rows of a very long log that are not in the windows kept of it.
     """
 
     kind: Kind
@@ -79,6 +80,7 @@ class Log:
     rows_read: int
     rejected: Mapping[str, int]
     notes: tuple[str, ...] = ()
+    thinned: int = 0
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,9 @@ from syncline_design.diagnose.columns import (
 )
 from syncline_design.diagnose.derivatives import derived_velocity
 from syncline_design.diagnose.log import Track
-from syncline_design.diagnose.tables import Table, refuse
+from syncline_design.diagnose.refusals import refuse
+from syncline_design.diagnose.tables import Table
+from syncline_design.diagnose.twins import one_a_stamp, without_twins
 from syncline_design.effects.base import Array
 from syncline_design.simulate.chain import euler_to_rotation, rotation_to_euler
 
@@ -33,22 +35,23 @@ REACH = 2.5  # intervals of the other file across which its values are still int
 class Merged:
     """Columns at common stamps, and the motion at the rate it was logged at."""
 
-    columns: Mapping[str, Array]
+    table: Table  # the file that sets the rows, with the columns of all
     tracks: Mapping[str, Track]  # "PREFIXvelocity" or "PREFIXrate"
-    notes: tuple[str, ...]
     follows_position: bool = False
 
 
 def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
     """Interpolate every other file to the stamps of the file that sets the rows."""
-    tables = [in_order(t) for t in tables]
+    at = _base(tables, prefixes)
+    tables = [without_twins(t) if k == at else one_a_stamp(t) for k, t in enumerate(tables)]
     follows = _needs_velocity(tables, prefixes[0])
     if follows is not None:
         tables = [_with_velocity(t, prefixes[0]) if t is follows else t for t in tables]
-    base = _base(tables, prefixes)
+    base = tables[at]
     columns: dict[str, Array] = dict(base.columns)
     tracks: dict[str, Track] = {}
-    notes: list[str] = [note for t in tables for note in t.notes]
+    notes = [note for t in tables for note in t.notes]
+    notes += [note for t in tables if t is not base for note in _left_out(t)]
     stamps = base.columns[TIME]
     for table in tables:
         if table is base:
@@ -68,7 +71,8 @@ def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
                 found=f"{table.columns[TIME][0]:.3f} to {table.columns[TIME][-1]:.3f} s",
                 hint="are both files on the same time scale?",
             )
-    return Merged(columns, tracks, tuple(notes), follows is not None)
+    table = replace(base, columns=columns, notes=tuple(notes))
+    return Merged(table, tracks, follows is not None)
 
 
 def _needs_velocity(tables: Sequence[Table], prefix: str) -> Table | None:
@@ -89,27 +93,22 @@ def _with_velocity(table: Table, prefix: str) -> Table:
     slope = derived_velocity(columns[TIME], place[kept])
     columns |= {prefix + n: slope[:, k] for k, n in enumerate(VELOCITY)}
     note = f"velocity was derived from the positions of {table.path.name}, smoothed over 1 s"
-    return Table(table.path, columns, table.header, (*table.notes, note))
+    return replace(table, columns=columns, notes=(*table.notes, note))
 
 
-def in_order(table: Table) -> Table:
-    """The rows with a stamp, in rising time, one per stamp."""
-    stamps = table.columns[TIME]
-    index = np.flatnonzero(np.isfinite(stamps))
-    _, first = np.unique(stamps[index], return_index=True)
-    index = index[first]
-    columns = {name: values[index] for name, values in table.columns.items()}
-    return Table(table.path, columns, table.header, table.notes)
+def _left_out(table: Table) -> list[str]:
+    """What a file that does not set the rows lost."""
+    return [f"{table.path.name}: {n} rows left out ({why})" for why, n in table.rejected.items()]
 
 
-def _base(tables: Sequence[Table], prefixes: Sequence[str]) -> Table:
+def _base(tables: Sequence[Table], prefixes: Sequence[str]) -> int:
     """The last stage's ranging sensor; in a position log the sparser of antenna and reference."""
-    for table in tables:
+    for k, table in enumerate(tables):
         if f"{prefixes[-1]}{RANGING[0]}" in table.columns:
-            return table
+            return k
     names = (POSITION[0], REFERENCE[0], GEODETIC[0], f"reference_{GEODETIC[0]}")
-    fixes = [t for t in tables if any(n in t.columns for n in names)]
-    return min(fixes or tables, key=len)
+    fixes = [k for k, t in enumerate(tables) if any(n in t.columns for n in names)]
+    return min(fixes or range(len(tables)), key=lambda k: len(tables[k]))
 
 
 def interpolated(

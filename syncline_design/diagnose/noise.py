@@ -88,11 +88,12 @@ class Structure:
     fixed: Array
     directed: tuple[Directed, ...] = ()
     stamped: Array | None = None
+    one_reading: bool = True  # of the vehicle for all rows of a stamp
 
     @property
     def shared(self) -> bool:
         """Whether rows share stamps, and with them the vehicle's noise."""
-        return repeated(self.time_s)
+        return self.one_reading and repeated(self.time_s)
 
     def rows(self, index: Rows) -> Structure:
         """The same structure on some of the rows."""
@@ -103,6 +104,7 @@ class Structure:
             self.fixed[index],
             tuple(Directed(d.key, d.direction[index]) for d in self.directed),
             None if self.stamped is None else self.stamped[index],
+            self.one_reading,
         )
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from syncline_design.diagnose import places, planar
 from syncline_design.diagnose.columns import (
     ATTITUDE,
     GEODETIC,
@@ -23,25 +24,29 @@ from syncline_design.diagnose.columns import (
 )
 from syncline_design.diagnose.derivatives import derived_rate, derived_velocity
 from syncline_design.diagnose.log import Kind, Log, StageLog, Track
-from syncline_design.diagnose.merging import in_order, merged
-from syncline_design.diagnose.tables import Table, read_table, refuse
+from syncline_design.diagnose.merging import merged
+from syncline_design.diagnose.refusals import refuse
+from syncline_design.diagnose.tables import Table, read_tables
+from syncline_design.diagnose.twins import without_twins
 from syncline_design.effects.base import Array
 
 LEAST_ROWS = 10
 MOST_SPEED_MPS = 2000.0
-LONGEST_S = 1e8  # a log longer than three years has its stamps in the wrong unit
 
 
 @dataclass(slots=True)
 class _Draft:
     """A log under construction: columns at common stamps, and what has been noted."""
 
-    path: Path
-    header: tuple[str, ...]
+    table: Table
     columns: dict[str, Array]
     tracks: Mapping[str, Track]
     notes: list[str] = field(default_factory=list)
     follows_position: bool = False
+
+    @property
+    def path(self) -> Path:
+        return self.table.path
 
     def vectors(self, names: Sequence[str]) -> Array:
         return np.stack([self.columns[n] for n in names], axis=1)
@@ -56,130 +61,50 @@ def read_log(
     mapping: Mapping[str, str] | None = None,
     needs_ranging: bool = True,
     slip_s: float = 0.0,
+    origin: places.Origin | None = None,
 ) -> Log:
     """Read one log, from one file or several, for a system of these stages.
 
     needs_ranging: whether the spec has ranging sensors; it decides what is said to be missing.
-    slip_s: by how much the stamps of a file of positions are ahead; they are set back.
+    slip_s: by how much the stamps of a file of positions are ahead; they are set back.  origin: of
+    the local frame, where the spec states it.
     """
     prefixes = [f"{name}_" for name in stages] if len(stages) > 1 else [""]
-    tables = [read_table(Path(p), mapping or {}, tuple(stages)) for p in paths]
-    if slip_s and len(tables) > 1:
-        tables = [_set_back(t, prefixes[0], slip_s) for t in tables]
-    rejected = _time_faults(tables)
-    read = len(tables[0]) if len(tables) == 1 else 0
+    names = (prefixes[0] + POSITION[0], prefixes[0] + GEODETIC[0])
+    slip = (names, slip_s if len(paths) > 1 else 0.0)
+    tables = read_tables([Path(p) for p in paths], mapping or {}, tuple(stages), slip)
     draft = _draft(tables, prefixes)
-    read = read or len(draft.columns[TIME])
-    _make_local(draft, prefixes)
+    draft.notes += places.made_local(draft.path, draft.columns, prefixes[0], origin)
     kind = _kind(draft, prefixes, needs_ranging)
+    draft.notes += planar.filled(draft.columns, prefixes, kind)
     _demand_columns(draft, prefixes, kind)
+    rejected = dict(draft.table.rejected)
     draft.columns, missing = _complete_rows(draft, prefixes, kind)
     if missing:
         rejected["missing value"] = missing
-    if len(draft.columns[TIME]) < LEAST_ROWS:
+    left = draft.columns[TIME]
+    if left.shape[0] < LEAST_ROWS or left[0] == left[-1]:
         raise refuse(
             draft.path,
             "too few complete rows",
-            expected=f"at least {LEAST_ROWS}",
-            found=f"{len(draft.columns[TIME])} of {read}",
+            expected=f"at least {LEAST_ROWS}, at several stamps",
+            found=f"{left.shape[0]} of {draft.table.rows}",
         )
-    return _log(draft, stages, prefixes, kind, read, rejected)
-
-
-def _set_back(table: Table, prefix: str, slip_s: float) -> Table:
-    """A file of antenna positions with its stamps set back; others as they are."""
-    if not any(prefix + name in table.columns for name in (POSITION[0], GEODETIC[0])):
-        return table
-    return replace(table, columns={**table.columns, TIME: table.columns[TIME] - slip_s})
-
-
-def _time_faults(tables: Sequence[Table]) -> dict[str, int]:
-    """Rows without a stamp, out of order or doubled; raises where the column makes no sense."""
-    rejected: dict[str, int] = {}
-    for table in tables:
-        stamps = table.columns[TIME]
-        finite = stamps[np.isfinite(stamps)]
-        if finite.shape[0] < 2:
-            raise refuse(table.path, "no time stamps", field=TIME, found="empty column")
-        step = np.diff(finite)
-        back, same = int(np.sum(step < 0)), int(finite.shape[0] - np.unique(finite).shape[0])
-        if back > 0.5 * step.shape[0]:
-            raise refuse(table.path, "time runs backwards", field=TIME, hint="reverse the rows")
-        if same > 0.5 * finite.shape[0]:
-            raise refuse(table.path, "time stands still", field=TIME, found=f"{same} equal stamps")
-        if float(finite.max() - finite.min()) > LONGEST_S:
-            raise refuse(
-                table.path,
-                "the log is years long",
-                field=TIME,
-                found=f"{finite.max() - finite.min():.3g} s",
-                hint="are the stamps in nanoseconds? Then call the column time_ns",
-            )
-        for reason, count in (
-            ("no time stamp", int(stamps.shape[0] - finite.shape[0])),
-            ("stamp out of order", back),
-            ("duplicate stamp", same),
-        ):
-            if count:
-                rejected[reason] = rejected.get(reason, 0) + count
-    return rejected
+    return _log(draft, stages, prefixes, kind, rejected)
 
 
 def _draft(tables: Sequence[Table], prefixes: Sequence[str]) -> _Draft:
     if len(tables) == 1:
-        only = in_order(tables[0])
-        return _Draft(only.path, only.header, dict(only.columns), {}, list(only.notes))
+        only = without_twins(tables[0])
+        return _Draft(only, dict(only.columns), {}, list(only.notes))
     joined = merged(tables, prefixes)
-    header = tuple(name for table in tables for name in table.header)
     return _Draft(
-        tables[0].path,
-        header,
-        dict(joined.columns),
+        joined.table,
+        dict(joined.table.columns),
         joined.tracks,
-        list(joined.notes),
+        list(joined.table.notes),
         joined.follows_position,
     )
-
-
-def _make_local(draft: _Draft, prefixes: Sequence[str]) -> None:
-    """WGS 84 columns to north, east, down about the first row's position."""
-    pairs = {f"{prefixes[0]}": POSITION, "reference_": REFERENCE, "target_": TARGET}
-    geodetic = {p: tuple(p + g for g in GEODETIC) for p in pairs}
-    used = [p for p, names in geodetic.items() if draft.has(names)]
-    if not used:
-        return
-    start = draft.vectors(geodetic[used[0]])
-    complete = np.flatnonzero(np.all(np.isfinite(start), axis=1))
-    if not complete.shape[0]:
-        raise refuse(draft.path, "no position", field=shown(geodetic[used[0]][0]))
-    origin = start[complete[0]]
-    for prefix in used:
-        names = pairs[prefix]
-        local = [prefix + n if prefix == prefixes[0] else n for n in names]
-        if any(n in draft.columns for n in local):
-            raise refuse(
-                draft.path,
-                "both local and WGS 84 coordinates",
-                field=shown(geodetic[prefix][0]),
-                hint=f"leave out either these or {local[0]}",
-            )
-        place = _geodetic_to_ned(draft.vectors(geodetic[prefix]), origin)
-        draft.columns |= {n: place[:, k] for k, n in enumerate(local)}
-    draft.notes.append(
-        "WGS 84 positions were made local (north, east, down) at the first row, "
-        f"{np.degrees(origin[0]):.7f} deg, {np.degrees(origin[1]):.7f} deg, {origin[2]:.3f} m"
-    )
-
-
-def _geodetic_to_ned(place: Array, origin: Array) -> Array:
-    import pymap3d
-
-    degrees = np.degrees(place[:, :2])
-    ned = pymap3d.geodetic2ned(
-        degrees[:, 0], degrees[:, 1], place[:, 2], *np.degrees(origin[:2]), origin[2]
-    )
-    local: Array = np.stack(ned, axis=1)
-    return local
 
 
 def _kind(draft: _Draft, prefixes: Sequence[str], needs_ranging: bool) -> Kind:
@@ -226,7 +151,7 @@ def _missing(draft: _Draft, names: Sequence[str]) -> Exception:
         f"{plural} missing: {listed}",
         line=1,
         column=1,
-        found=", ".join(draft.header[:20]) or "no columns",
+        found=", ".join(draft.table.header[:20])[:500] or "no columns",
         hint="name them there, or map them in the spec: log: {columns: {roll_deg: theirs [rad]}}",
     )
 
@@ -242,7 +167,9 @@ def _complete_rows(
         needed += [prefix + n for n in (*VELOCITY, *RATE) if prefix + n in draft.columns]
     truth = TARGET if kind == "georeference" else REFERENCE
     needed += [n for n in truth if np.any(np.isfinite(draft.columns[n]))]
-    keep = np.all(np.isfinite(np.stack([draft.columns[n] for n in needed])), axis=0)
+    keep = np.ones(draft.columns[TIME].shape, dtype=bool)
+    for name in needed:
+        keep &= np.isfinite(draft.columns[name])
     columns = {name: values[keep] for name, values in draft.columns.items()}
     return columns, int(np.sum(~keep))
 
@@ -252,7 +179,6 @@ def _log(
     stages: Sequence[str],
     prefixes: Sequence[str],
     kind: Kind,
-    read: int,
     rejected: dict[str, int],
 ) -> Log:
     built = []
@@ -265,9 +191,10 @@ def _log(
         stages=tuple(built),
         truth_m=draft.vectors(TARGET if kind == "georeference" else REFERENCE),
         target_id=target_id,
-        rows_read=read,
+        rows_read=draft.table.rows,
         rejected=rejected,
         notes=tuple(draft.notes),
+        thinned=draft.table.thinned,
     )
 
 

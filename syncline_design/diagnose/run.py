@@ -176,12 +176,13 @@ def _unseen(data: Data, search: Search, result: SearchResult) -> tuple[str, ...]
 
 
 def log_json(log: Log) -> Json:
-    """What was read and what was left out."""
+    """What was read and what was left out: rows = used + thinned + all that was rejected."""
     return {
         "kind": log.kind,
         "rows": log.rows_read,
         "used": len(log),
         "rejected": dict(log.rejected),
+        "thinned": log.thinned,
         "notes": list(log.notes),
         "duration_s": log.duration_s,
         "interval_s": log.interval_s,

@@ -95,6 +95,8 @@ def _cell_line(cell: Cell) -> str:
 def _log_lines(diagnosis: Diagnosis) -> list[str]:
     log = diagnosis.log
     lines = [f"Log: {log['used']} of {log['rows']} rows used, {log['kind']}."]
+    if log.get("thinned"):
+        lines.append(f"  too long to hold: {log['thinned']} rows between the windows kept of it")
     if log["fitted"] < log["used"]:
         lines.append(f"  worked on: {log['fitted']} rows, in windows spread over the log")
     lines += [f"  left out: {count} ({reason})" for reason, count in log["rejected"].items()]

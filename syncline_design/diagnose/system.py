@@ -34,11 +34,12 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
     system = pinned_system(loaded)
     names = [stage.name for stage in system.stages]
     mapping = loaded.spec.log.columns if loaded.spec.log else {}
+    origin = loaded.spec.log.origin if loaded.spec.log else None
     ranges = system.stages[-1].ranging is not None
     files = list(paths) or own_files(loaded)
 
     def read(slip_s: float) -> Log:
-        return read_log(files, names, mapping, ranges, slip_s)
+        return read_log(files, names, mapping, ranges, slip_s, origin)
 
     log = read(0.0)
     reread = read if len(files) > 1 else None
