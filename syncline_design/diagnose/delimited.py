@@ -23,7 +23,7 @@ from syncline_design.diagnose.refusals import refuse
 if TYPE_CHECKING:
     import polars as pl
 
-BLOCK_BYTES = 4 << 20
+BLOCK_BYTES = 1 << 20
 MOST_HEAD = 1 << 20  # bytes in which the names have to come
 MOST_LINE = 1 << 22
 MOST_COLUMNS = 5_000
