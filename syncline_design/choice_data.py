@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import islice
 from typing import Any
 
 from syncline_design.choose.outcome import FrontPoint
@@ -13,6 +12,7 @@ from syncline_design.effect_tables import design_budget
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked
 from syncline_design.references import parts_in_use
+from syncline_design.time_limit import Pieces
 from syncline_design.verdict import finite
 
 Json = dict[str, Any]
@@ -20,7 +20,13 @@ NEXT_BEST = 5
 MOST_EXCLUDED = 1000  # rows of `excluded` in a verdict
 
 
-def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked) -> Json:
+def choice_json(
+    loaded: LoadedSpec,
+    problem: Problem,
+    picked: Picked,
+    pieces: Pieces | None = None,
+    points: Sequence[FrontPoint] | None = None,
+) -> Json:
     """The `choice` key of a verdict; the front is of cost against error where costs are known."""
     from syncline_design.choose.decide import best
     from syncline_design.choose.front import front
@@ -28,14 +34,21 @@ def choice_json(loaded: LoadedSpec, problem: Problem, picked: Picked) -> Json:
 
     assert picked.verified is not None
     chosen = picked.verified.design
-    others = (d for d in best(problem, NEXT_BEST + 1) if d != chosen)
-    points = front(problem)
+    pieces = pieces or Pieces()
+    nothing: tuple[FrontPoint, ...] = ()
+
+    def others() -> Iterator[Design]:
+        return (d for d in best(problem, NEXT_BEST + 1) if d != chosen)
+
+    if points is None:
+        points = pieces.made("front", lambda: front(problem), nothing)
+    following = pieces.listed("next best designs", others)
     return {
         "proof": proof_json(picked),
         "front": front_json(loaded, problem, points),
         "front_left_out": left_out(loaded, problem, "cost"),
         "staircase": [step.to_json() for step in staircase([p for p in points if not p.undecided])],
-        "next_best": designs_json(loaded, problem, islice(others, NEXT_BEST)),
+        "next_best": designs_json(loaded, problem, following[:NEXT_BEST]),
         **excluded_json(problem),
     }
 
@@ -47,6 +60,7 @@ def proof_json(picked: Picked) -> Json:
         "method": proof.method,
         "optimal": proof.optimal,
         "rechecked": proof.rechecked,
+        "gap": proof.gap,
         "agrees_with": list(proof.agrees_with),
         "passed_over": picked.passed_over,
     }

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import islice
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 from syncline_design import __version__
@@ -35,8 +35,9 @@ from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked, pick
 from syncline_design.problem import selection_of
 from syncline_design.spec_writer import PinnedRole, pinned_spec_text
+from syncline_design.time_limit import Deadline, Pieces, in_force, within
 from syncline_design.verdict import files_json
-from syncline_design.verify import CheckSettings, verify
+from syncline_design.verify import CheckSettings, open_verdict, verify
 from syncline_design.yaml_reader import printable
 
 SCHEMA = "syncline-design/optimization/v1"
@@ -53,15 +54,19 @@ class OptimizeSettings:
     method: Method = "auto"
     time_limit_s: float | None = None
     seed: int = 0
+    report: bool = False  # the whole verdict too, for a page
 
 
 @dataclass(frozen=True, slots=True)
 class Hinges:
-    """What the chosen design hinges on: slack of every figure, tolerances, what to measure."""
+    """What the chosen design hinges on: slack of every figure, tolerances, what to measure.
 
-    slack: tuple[Slack, ...]
-    tolerance: ToleranceVerdict
-    measure_next: tuple[Measurement, ...]
+    None: not worked out within the time limit.
+    """
+
+    slack: tuple[Slack, ...] | None
+    tolerance: ToleranceVerdict | None
+    measure_next: tuple[Measurement, ...] | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +82,8 @@ class Optimisation:
     prices: tuple[Step, ...]
     hinges: Hinges | None
     explanation: Explanation | None
+    cut_short: tuple[str, ...] = ()  # what the time limit left out or incomplete
+    verdict: Json | None = None
 
     @property
     def exit_code(self) -> int:
@@ -89,40 +96,73 @@ class Optimisation:
 
 def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     """The best designs of a spec; pinned roles stay as they are."""
+    limit = settings.time_limit_s
+    with within(in_force() if limit is None else Deadline(limit)):
+        return _optimize(loaded, settings)
+
+
+def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
+    in_force().doing("choosing")
     build = Simulations(settings.seed).problem_of
     problem = build(loaded)
     simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
-    checking = CheckSettings(seed=settings.seed, monte_carlo=simulated)
+    checking = CheckSettings(
+        settings.seed, settings.method, monte_carlo=simulated or settings.report
+    )
     picked = pick(
         problem,
         settings.method,
-        settings.time_limit_s,
+        None,
         lambda design: verify(loaded, problem, design, checking),
     )
-    points = front(problem, settings.resource) if settings.pareto else ()
+    pieces, nothing = Pieces(), _no_points()
+    points = nothing
+    if settings.pareto:
+        points = pieces.made("front", lambda: front(problem, settings.resource), nothing)
     designs: tuple[Design, ...] = ()
     hinges = explanation = None
     if picked.verified is None:
         explanation = explain(loaded, problem, build)
     elif picked.exhausted:
         chosen = picked.verified.design
-        others = (d for d in best(problem, settings.count + 1) if d != chosen)
-        designs = (chosen, *islice(others, settings.count - 1))
-        hinges = (
-            _hinges(loaded, problem, chosen, build) if picked.verified.word == "meets" else None
-        )
+        designs = _designs(problem, chosen, settings.count, pieces)
+        if picked.verified.word == "meets":
+            hinges = _hinges((loaded, problem, chosen, build), pieces)
     steps = staircase([point for point in points if not point.undecided])
-    return Optimisation(
-        loaded, problem, settings, picked, designs, points, steps, hinges, explanation
-    )
+    found = Optimisation(
+        loaded, problem, settings, picked, designs, points, steps, hinges,
+        explanation, tuple(pieces.cut_short),
+    )  # fmt: skip
+    return replace(found, verdict=_verdict(found, checking)) if settings.report else found
 
 
-def _hinges(loaded: LoadedSpec, problem: Problem, chosen: Design, build: Build) -> Hinges:
+def _no_points() -> tuple[FrontPoint, ...]:
+    return ()
+
+
+def _designs(problem: Problem, chosen: Design, count: int, pieces: Pieces) -> tuple[Design, ...]:
+    """The chosen design, then the next best others."""
+    if count == 1:
+        return (chosen,)
+
+    def others() -> Iterator[Design]:
+        return (d for d in best(problem, count + 1) if d != chosen)
+
+    return (chosen, *pieces.listed("next best designs", others)[: count - 1])
+
+
+def _hinges(given: tuple[LoadedSpec, Problem, Design, Build], pieces: Pieces) -> Hinges:
     return Hinges(
-        slack_ledger(loaded, problem, chosen, build),
-        tolerance_verdict(loaded, problem, chosen, build),
-        measure_next(loaded, problem, chosen, build),
+        pieces.made("slack ledger", lambda: slack_ledger(*given), None),
+        pieces.made("tolerances", lambda: tolerance_verdict(*given), None),
+        pieces.made("what to measure next", lambda: measure_next(*given), None),
     )
+
+
+def _verdict(found: Optimisation, checking: CheckSettings) -> Json:
+    """The verdict of the same design, for a page: nothing is chosen a second time."""
+    points = found.front if found.settings.pareto and found.settings.resource == "cost" else None
+    return open_verdict(found.loaded, found.problem, found.picked, checking, points=points)
 
 
 def optimisation_json(found: Optimisation) -> Json:
@@ -136,6 +176,7 @@ def optimisation_json(found: Optimisation) -> Json:
         "combinations": str(problem.combinations),
         "designs": designs_json(loaded, problem, found.designs),
         **excluded_json(problem),
+        "cut_short": list(found.cut_short),
         "provenance": {
             "version": __version__,
             "spec_sha256": loaded.spec_sha256,
@@ -151,9 +192,12 @@ def optimisation_json(found: Optimisation) -> Json:
         data["front_left_out"] = left_out(loaded, problem, found.settings.resource)
         data["staircase"] = [step.to_json() for step in found.prices]
     if found.hinges is not None:
-        data["slack"] = [row.to_json() for row in found.hinges.slack]
-        data["tolerances"] = found.hinges.tolerance.to_json()
-        data["measure_next"] = [one.to_json() for one in found.hinges.measure_next]
+        hinges = found.hinges
+        data["slack"] = None if hinges.slack is None else [row.to_json() for row in hinges.slack]
+        data["tolerances"] = None if hinges.tolerance is None else hinges.tolerance.to_json()
+        data["measure_next"] = (
+            None if hinges.measure_next is None else [m.to_json() for m in hinges.measure_next]
+        )
     if found.explanation is not None:
         data["infeasibility"] = found.explanation.to_json() | {"text": found.explanation.lines()}
     return data
@@ -176,17 +220,33 @@ def optimisation_text(found: Optimisation) -> str:
     if found.settings.pareto:
         missing = left_out(found.loaded, problem, found.settings.resource)
         blocks += [[left_out_text(missing, found.settings.resource)]] if missing else []
-    if found.hinges is not None:
-        blocks.append(
-            ["How far each term may grow:", *presentation.slack_table(found.hinges.slack)]
-        )
-        blocks.append([found.hinges.tolerance.text, *_measure_lines(found.hinges)])
+    blocks += _hinge_blocks(found.hinges)
+    if found.cut_short:
+        blocks.append([f"The time limit ended this too early: {', '.join(found.cut_short)}."])
     shown = ["\n".join(printable(line, len(line)) for line in block) for block in blocks]
     return "\n\n".join(shown) + "\n"
 
 
+def _hinge_blocks(hinges: Hinges | None) -> list[list[str]]:
+    if hinges is None:
+        return []
+    blocks: list[list[str]] = []
+    if hinges.slack is not None:
+        blocks.append(["How far each term may grow:", *presentation.slack_table(hinges.slack)])
+    told = [] if hinges.tolerance is None else [hinges.tolerance.text]
+    told += [] if hinges.measure_next is None else _measure_lines(hinges.measure_next)
+    return [*blocks, told] if told else blocks
+
+
 def _proof_line(found: Optimisation) -> str:
     proof = found.picked.choice.proof
+    if not proof.optimal:
+        gap = "" if proof.gap is None else f": the optimum is at most {100 * proof.gap:.3g} % lower"
+        return (
+            f"Found among {problem_size(found.problem)} combinations by "
+            f"{found.loaded.spec.objective} within the time limit, rechecked exactly, not proven "
+            f"optimal{gap}"
+        )
     confirmed = " and ".join(ROADS.get(road, road) for road in proof.agrees_with)
     others = f", confirmed by {confirmed}" if confirmed else ""
     passed = found.picked.passed_over
@@ -203,11 +263,11 @@ def problem_size(problem: Problem) -> str:
     return f"{count}" if count < 1_000_000 else f"{count:.2e}"
 
 
-def _measure_lines(hinges: Hinges) -> list[str]:
-    if not hinges.measure_next:
+def _measure_lines(measure: Sequence[Measurement]) -> list[str]:
+    if not measure:
         return ["No single datasheet figure, 20 % up or down, changes the choice."]
     lines = ["What to measure next (a single figure that changes the choice):"]
-    for one in hinges.measure_next:
+    for one in measure:
         spread = " (20 % assumed)" if one.assumed else ""
         lines.append(
             f"  {one.figure} from {one.value_text} to {one.at_text}{spread}: {one.becomes}"

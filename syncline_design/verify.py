@@ -34,6 +34,7 @@ from syncline_design.simulate import (
     decide,
 )
 from syncline_design.spec import Requirement
+from syncline_design.time_limit import Deadline, OutOfTime, Pieces, in_force, within
 from syncline_design.units import Quantity
 from syncline_design.verdict import (
     EXIT_CODES,
@@ -49,7 +50,7 @@ from syncline_design.verdict import (
 )
 
 if TYPE_CHECKING:
-    from syncline_design.choose.outcome import Method
+    from syncline_design.choose.outcome import FrontPoint, Method
     from syncline_design.choose.variations import Build
     from syncline_design.open_choice import Picked
 
@@ -74,16 +75,26 @@ class CheckSettings:
 
 def check_file(path: str | Path, settings: CheckSettings | None = None) -> Json:
     """The verdict of a spec file (schema syncline-design/verdict/v1)."""
-    return check_loaded(load(path), settings or CheckSettings())
+    wanted = settings or CheckSettings()
+    with within(_deadline(wanted)):
+        return check_loaded(load(path), replace(wanted, time_limit_s=None))
+
+
+def _deadline(settings: CheckSettings) -> Deadline:
+    """A deadline of the settings' own, or the one in force."""
+    return in_force() if settings.time_limit_s is None else Deadline(settings.time_limit_s)
 
 
 def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
     """Verdicts of specs, in the order given; a refused file stands among them as such.
 
-    Refused: {"verdict": "refused", "file", "problems"}, and nothing of that spec is computed.
+    Refused: {"verdict": "refused", "file", "problems"}, and nothing of that spec is computed.  A
+    time limit binds all of them together.
     """
     read = [_or_refused(path, load) for path in paths]  # all of them before anything is computed
-    return [_check_or_refuse(item, settings) for item in read]
+    with within(_deadline(settings)):
+        alone = replace(settings, time_limit_s=None)
+        return [_check_or_refuse(item, alone) for item in read]
 
 
 def _check_or_refuse(read: LoadedSpec | Json, settings: CheckSettings) -> Json:
@@ -106,17 +117,40 @@ def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Json:
 
 
 def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
-    """The verdict of a loaded spec."""
+    """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
     build = _build(settings)
     problem = build(loaded)
-    sole = sole_design(problem)
-    if sole is not None:
-        from syncline_design.choice_data import excluded_json
+    if sole_design(problem) is not None:
+        return _pinned_verdict(loaded, problem, settings)
+    with within(_deadline(settings)):
+        try:
+            return _check_open(loaded, problem, replace(settings, time_limit_s=None), build)
+        except OutOfTime as error:
+            return _unfinished_json(loaded, problem, settings, str(error))
 
-        everything, design = sole
-        verified = verify(loaded, everything, design, settings)
-        return _verdict_json(loaded, everything, verified, settings, excluded_json(problem))
-    return _check_open(loaded, problem, settings, build)
+
+def _pinned_verdict(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
+    """The verdict on the only design that a spec leaves."""
+    sole = sole_design(problem)
+    assert sole is not None
+    from syncline_design.choice_data import excluded_json
+
+    everything, design = sole
+    verified = verify(loaded, everything, design, settings)
+    return _verdict_json(loaded, everything, verified, settings, excluded_json(problem))
+
+
+def _unfinished_json(
+    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, why: str
+) -> Json:
+    """A verdict that the time limit left without a design."""
+    data = frame(loaded, problem, "indeterminate", settings.seed)
+    data["requirements"] = [
+        _placed(loaded, index, one, _unmet(loaded, one, in_conflict=False), settings).to_json()
+        for index, one in enumerate(loaded.spec.requirements)
+    ]
+    data["warnings"] = [{"code": "time-limit", "message": f"{why}; no design was found by then"}]
+    return data
 
 
 def _build(settings: CheckSettings) -> Build:
@@ -149,7 +183,6 @@ def _check_open(
     loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
 ) -> Json:
     """Choose, then verify; without any design say why and what would help."""
-    from syncline_design.choice_data import choice_json, left_out_text
     from syncline_design.open_choice import pick
 
     picked = pick(
@@ -158,18 +191,46 @@ def _check_open(
         settings.time_limit_s,
         lambda design: verify(loaded, problem, design, settings),
     )
+    return open_verdict(loaded, problem, picked, settings, build)
+
+
+def open_verdict(
+    loaded: LoadedSpec,
+    problem: DesignProblem,
+    picked: Picked,
+    settings: CheckSettings,
+    build: Build | None = None,
+    points: Sequence[FrontPoint] | None = None,
+) -> Json:
+    """The verdict on what was picked for a spec; points: its front of cost, where known."""
+    from syncline_design.choice_data import choice_json, left_out_text
+
+    if sole_design(problem) is not None:
+        return _pinned_verdict(loaded, problem, settings)
     if picked.verified is None:
-        return _infeasible_json(loaded, problem, settings, build)
-    choice = choice_json(loaded, problem, picked)
+        return _infeasible_json(loaded, problem, settings, build or _build(settings))
+    pieces = Pieces()
+    choice = choice_json(loaded, problem, picked, pieces, points)
     data = _verdict_json(loaded, problem, picked.verified, settings, choice)
     if picked.verified.word != "meets" and not picked.exhausted:
         data["verdict"] = "indeterminate"
+    data["warnings"][:0] = [*_unproven(picked), *([pieces.caution] if pieces.caution else [])]
     if choice["front_left_out"]:
         text = left_out_text(choice["front_left_out"], "cost")
         data["warnings"].append({"code": "unpriced", "message": text})
     if picked.passed_over:
         data["warnings"].insert(0, _passed_over(picked))
     return data
+
+
+def _unproven(picked: Picked) -> list[Json]:
+    """What the time limit left open about a design that meets."""
+    proof = picked.choice.proof
+    if proof.optimal:
+        return []
+    gap = "" if proof.gap is None else f" (by {100 * proof.gap:.3g} % at most)"
+    message = f"the time limit ended the search: a better design than this may exist{gap}"
+    return [{"code": "not-proven-optimal", "message": message}]
 
 
 def _infeasible_json(
@@ -241,7 +302,10 @@ def _monte_carlo(
     if not settings.monte_carlo:
         return None, "left out on request"
     try:
+        in_force().doing("simulating")
         return cross_check(system, simulation_settings(loaded, settings.seed)), ""
+    except OutOfTime:
+        return None, "the time limit ended it"
     except SimulationError as error:
         if loaded.spec.monte_carlo.trajectory is not None:
             refuse_trajectory(loaded, str(error))
@@ -296,7 +360,10 @@ def _decided(
     if found is None:
         return replace(blank, note="not simulated")
     simulation = simulation_settings(loaded, settings.seed)
-    decision = decide(system, simulation, quantile, limit, first=found)
+    try:
+        decision = decide(system, simulation, quantile, limit, first=found)
+    except OutOfTime:
+        return replace(blank, note="the time limit ended the simulation before it was decided")
     estimate = decision.estimate
     return replace(
         blank,

@@ -215,10 +215,10 @@ def test_role_without_options_is_infeasible_at_once() -> None:
 def test_roads_that_disagree_are_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     roles = [[option(f"{n}{k}", 0.5, 0.0, k) for k in range(2)] for n in "abc"]
     problem = one_stage(roles, Limits(None, 1.0), 1.0, 1.0)
-    monkeypatch.setattr(decide, "best_by_enumeration", lambda _: Design((1, 1, 1), (0,)))
+    monkeypatch.setattr(decide, "best_by_enumeration", lambda *_: Design((1, 1, 1), (0,)))
     with pytest.raises(NoVerdict, match="disagree on the best design"):
         choose(problem)
-    monkeypatch.setattr(decide, "best_by_enumeration", lambda _: None)
+    monkeypatch.setattr(decide, "best_by_enumeration", lambda *_: None)
     with pytest.raises(NoVerdict, match="disagree on whether"):
         choose(problem)
 

@@ -7,8 +7,9 @@ from collections.abc import Iterator
 from contextlib import suppress
 
 from syncline_design.choose.acceptable import iter_acceptable, iter_judged, judgement
+from syncline_design.choose.anytime import in_hand, unproven
 from syncline_design.choose.enumerate import best_by_enumeration
-from syncline_design.choose.evaluate import broken, error_key, evaluate, rank
+from syncline_design.choose.evaluate import broken, evaluate, rank
 from syncline_design.choose.front import merged_front
 from syncline_design.choose.outcome import (
     METHODS,
@@ -17,12 +18,15 @@ from syncline_design.choose.outcome import (
     Infeasible,
     Method,
     NoVerdict,
+    OutOfTime,
     Proof,
     TooLarge,
     Unfinished,
 )
+from syncline_design.choose.partition import iter_differing
 from syncline_design.choose.ranked import iter_best
 from syncline_design.design_space import Design, Judgement, Problem, ResourceName, is_empty
+from syncline_design.time_limit import in_force
 
 SMALL = 300  # combinations up to which the automatic road also enumerates
 MOST_COUNTED = 1000  # better designs that fail simulation are counted up to here
@@ -36,14 +40,15 @@ def choose(
 
     auto: the front by merging, confirmed by best-first search and, where there are few
     combinations, by enumeration; the MILP where merging gives up.  Raises NoVerdict when a road
-    ends without a proof or two roads disagree.
+    ends without a proof or two roads disagree.  A time limit that ends the search leaves a design
+    that meets every sum and is not proven optimal, where one was found.
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
     empty = tuple(r for r, role in enumerate(problem.roles) if not role.options)
     if is_empty(problem):
         return Infeasible(Proof("tables", True, True), empty)
-    deadline = Deadline(time_limit_s)
+    deadline = in_force() if time_limit_s is None else Deadline(time_limit_s)
     deadline.check()
     found = _by_sums(problem, method, deadline)
     if problem.judge is None or isinstance(found, Infeasible):
@@ -80,6 +85,19 @@ def _before(problem: Problem, design: Design, deadline: Deadline) -> int:
 
 
 def _by_sums(problem: Problem, method: Method, deadline: Deadline) -> Choice | Infeasible:
+    """The best design by the sums; one in hand where the time ends before the proof."""
+    held = in_hand(problem, deadline)
+    try:
+        return _proven(problem, method, deadline)
+    except OutOfTime:
+        found = None if held is None else unproven(problem, held, method)
+        if found is None:
+            raise
+        return found
+
+
+def _proven(problem: Problem, method: Method, deadline: Deadline) -> Choice | Infeasible:
+    """The answer of one road, or of roads that agree."""
     if method == "auto":
         return _auto(problem, deadline)
     if method == "enumerate":
@@ -95,17 +113,15 @@ def best_by_front(problem: Problem, deadline: Deadline) -> Design | None:
     points = merged_front(problem, resource, accuracy=True, deadline=deadline)
     if not points:
         return None
-    picked = points[0]
-    if problem.objective == "error":
-        least = min(error_key(point.error_m) for point in points)
-        picked = next(point for point in points if error_key(point.error_m) == least)
-    holds = not broken(problem, evaluate(problem, picked.design))
+    ordered = points[::-1] if problem.objective == "error" else points
+    picked = next(
+        (p.design for p in ordered if not broken(problem, evaluate(problem, p.design))), None
+    )
     try:
-        first = next(iter_best(problem, deadline, MOST_STEPS if holds else None), None)
-    except TooLarge:
-        return picked.design
-    if holds:
-        _demand_agreement(problem, picked.design, first, "merging", "best-first search")
+        first = next(iter_best(problem, deadline, MOST_STEPS), None)
+    except (TooLarge, OutOfTime):  # merging is the proof, the search confirms it
+        return picked
+    _demand_agreement(problem, picked, first, "merging", "best-first search")
     return first
 
 
@@ -116,7 +132,10 @@ def _auto(problem: Problem, deadline: Deadline) -> Choice | Infeasible:
         return _by_milp(problem, deadline)
     agrees: tuple[str, ...] = ()
     if problem.combinations <= SMALL:
-        other = best_by_enumeration(problem)
+        try:
+            other = best_by_enumeration(problem, deadline)
+        except OutOfTime:  # merging is the proof, enumeration confirms it
+            return _outcome(problem, design, "front")
         _demand_agreement(problem, design, other, "front", "enumeration")
         agrees = ("enumerate",)
     return _outcome(problem, design, "front", agrees)
@@ -169,19 +188,33 @@ def _until_unfinished(
         yield from designs
 
 
-def best(problem: Problem, count: int) -> Iterator[Design]:
-    """The best `count` truly different designs, best first.
+def best(problem: Problem, count: int, *, every: bool = False) -> Iterator[Design]:
+    """The best `count` designs, best first.
 
-    Two designs differ when a role has another sensor or another timestamping method; another
-    primitive or clock alone is the same design, shown in its best form.
+    They differ in a sensor at least, each with its best timestamping and clocks; every: whatever
+    differs is a design of its own.
     """
-    seen: set[tuple[tuple[str, str], ...]] = set()
-    for design, _ in _until_unfinished(iter_acceptable(problem)):
-        options = zip(problem.roles, design.options, strict=True)
-        shown = tuple((t.options[i].sensor, t.options[i].method) for t, i in options)
-        if shown in seen:
-            continue
-        seen.add(shown)
-        yield design
-        if len(seen) == count:
-            return
+    if every:
+        found = _until_unfinished(iter_acceptable(problem))
+        return itertools.islice((design for design, _ in found), count)
+    return itertools.islice(_differing(problem), count)
+
+
+def _differing(problem: Problem) -> Iterator[Design]:
+    seen: set[tuple[str, ...]] = set()
+    try:
+        if problem.judge is not None:
+            raise TooLarge("simulation decides design by design")
+        for design in iter_differing(problem, lambda option: option.sensor):
+            seen.add(_sensors(problem, design))
+            yield design
+    except TooLarge:  # couplings that merging and splitting do not remove
+        for design, _ in _until_unfinished(iter_acceptable(problem)):
+            if _sensors(problem, design) not in seen:
+                seen.add(_sensors(problem, design))
+                yield design
+
+
+def _sensors(problem: Problem, design: Design) -> tuple[str, ...]:
+    options = zip(problem.roles, design.options, strict=True)
+    return tuple(table.options[i].sensor for table, i in options)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from syncline_design.choose.evaluate import Evaluation, broken, error_key, evaluate, rank
 from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.design_space import Design, Problem, ResourceName
+from syncline_design.time_limit import in_force
 
 MOST_COMBINATIONS = 300_000
 
@@ -16,7 +17,7 @@ def all_designs(
     problem: Problem, deadline: Deadline | None = None
 ) -> Iterator[tuple[Design, Evaluation]]:
     """Every design with what it costs and reaches; NoVerdict after the deadline."""
-    end = deadline or Deadline()
+    end = deadline or in_force()
     if problem.combinations > MOST_COMBINATIONS:
         raise TooLarge(
             f"{problem.combinations:.3g} combinations are too many to enumerate "

@@ -31,6 +31,7 @@ from syncline_design.choose.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choose.pareto import Bools, Columns, Floats, Indices, undominated
 from syncline_design.choose.rounded_once import total_errors_m
 from syncline_design.design_space import ClockOption, Design, Problem, ResourceName, is_empty
+from syncline_design.time_limit import in_force
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +72,7 @@ def merged_front(
     if is_empty(problem):
         return ()
     tables = _one_timeline(tabulate(problem, resource))
-    end = deadline or Deadline()
+    end = deadline or in_force()
     relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=None)
     holds = _hold_sync(tables, relaxed)
     points = _points(tables, relaxed, holds)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import math
-import time
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
 from syncline_design.design_space import Design
+from syncline_design.time_limit import Deadline as Deadline
+from syncline_design.time_limit import NoVerdict as NoVerdict
+from syncline_design.time_limit import OutOfTime as OutOfTime
 
 Method = Literal["auto", "front", "milp", "enumerate"]
 METHODS: tuple[Method, ...] = ("auto", "front", "milp", "enumerate")
@@ -20,33 +21,12 @@ ROADS: dict[str, str] = {
 }
 
 
-class NoVerdict(Exception):  # noqa: N818 - an outcome with its own exit code, not a failure
-    """No proven answer: a time limit, a missing solver, or roads that disagree."""
-
-
 class TooLarge(NoVerdict):
     """One road gives up; another may still do it."""
 
 
 class Unfinished(NoVerdict):
     """So many designs were simulated that the search gave up."""
-
-
-class Deadline:
-    """A point in time after which a road gives up."""
-
-    def __init__(self, limit_s: float | None = None) -> None:
-        self.limit_s = limit_s
-        self._end = math.inf if limit_s is None else time.monotonic() + limit_s
-
-    def check(self) -> None:
-        """Raise NoVerdict once the time is over."""
-        if time.monotonic() > self._end:
-            raise NoVerdict(f"the time limit of {self.limit_s:g} s was reached without a proof")
-
-    def left_s(self) -> float | None:
-        """Seconds left, None without a limit."""
-        return None if self.limit_s is None else max(0.0, self._end - time.monotonic())
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,13 +48,15 @@ class Proof:
     """How a choice was proven.
 
     method: the road.  rechecked: every sum and constraint of the design was recomputed in exact
-    fractions.  agrees_with: further roads that gave the same answer.
+    fractions.  agrees_with: further roads that gave the same answer.  gap: of a design that is not
+    proven optimal, the share of its objective that the optimum may lie below it at most.
     """
 
     method: str
     optimal: bool
     rechecked: bool
     agrees_with: tuple[str, ...] = ()
+    gap: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,6 +22,7 @@ from syncline_design.choose.arrays import MARGIN, RoleArrays, Scaled, tabulate
 from syncline_design.choose.evaluate import Amount, broken, error_key, evaluate, rank
 from syncline_design.choose.outcome import Deadline, TooLarge
 from syncline_design.choose.pareto import Bools, Column, Columns, Floats, Indices, undominated
+from syncline_design.choose.partition import iter_differing
 from syncline_design.design_space import (
     RESOURCES,
     Design,
@@ -30,6 +31,10 @@ from syncline_design.design_space import (
     VehicleTable,
     is_empty,
 )
+from syncline_design.time_limit import in_force
+
+PATIENCE = 4000  # steps without a further design before splitting takes over
+MOST_ROWS = 2_000_000  # options in the blocks of a search: about 200 MB
 
 Key = tuple[Amount, float, Amount, Amount, Amount, tuple[int, ...]]
 
@@ -39,10 +44,28 @@ def iter_best(
 ) -> Iterator[Design]:
     """Every design that meets all requirements, best first, each decided exactly.
 
-    Raises NoVerdict after the deadline, TooLarge after `most_steps` partial designs.
+    Raises NoVerdict after the deadline, TooLarge after `most_steps` partial designs; without
+    `most_steps`, a search that grows without finding anything gives way to splitting.
     """
-    if not is_empty(problem):
-        yield from _Search(problem).run(deadline or Deadline(), most_steps)
+    if is_empty(problem):
+        return
+    end = deadline or in_force()
+    if most_steps is not None:
+        yield from _Search(problem).run(end, most_steps)
+        return
+    seen: set[Design] = set()
+    try:
+        for design in _Search(problem).run(end, PATIENCE, patient=True):
+            seen.add(design)
+            yield design
+    except TooLarge:
+        rest = iter_differing(problem, lambda option: option.names, clocks=True, deadline=end)
+        yield from (design for design in rest if design not in seen)
+
+
+def lower_bound(problem: Problem) -> Amount:
+    """What no design can go below in the objective: shared hardware and later roles for free."""
+    return _Search(problem).bound()
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,23 +113,27 @@ class _Search:
         self.least_tau = [float(role.tau.min()) for role in tables.roles]
         self.suffixes = self._suffix_fronts()
         self.counter = itertools.count()
+        self.rows = 0  # options held in blocks so far
         self.clock_order = [_by_id(vehicle) for vehicle in problem.vehicles]
 
-    def run(self, deadline: Deadline, most_steps: int | None) -> Iterator[Design]:
-        """Designs in order."""
+    def run(
+        self, deadline: Deadline, most_steps: int, *, patient: bool = False
+    ) -> Iterator[Design]:
+        """Designs in order; patient: the steps count anew after each design."""
         heap: list[Entry] = []
         ranges = [range(len(v.clocks)) for v in self.problem.vehicles]
         for clocks in itertools.product(*ranges):
             self._push(heap, self._expand(_Node(clocks, (), 0.0, self._clock_sums(clocks))), 0)
-        for step in itertools.count():
-            if not heap:
-                return
+        steps = 0
+        while heap:
             deadline.check()
-            if most_steps is not None and step > most_steps:
+            steps += 1
+            if steps > most_steps or self.rows > MOST_ROWS:
                 raise TooLarge(f"more than {most_steps} partial designs")
             _, _, block, at, design = heapq.heappop(heap)
             if design is not None:
                 yield design
+                steps = 0 if patient else steps
                 continue
             assert block is not None
             self._push(heap, block, at + 1)
@@ -125,6 +152,16 @@ class _Search:
             )
         )
         return [known.get(name, np.zeros(len(role), dtype=np.int64)) for name in RESOURCES]
+
+    def bound(self) -> Amount:
+        """What no design can go below in the objective (infinite: there is none)."""
+        least: Amount = math.inf
+        ranges = [range(len(v.clocks)) for v in self.problem.vehicles]
+        for clocks in itertools.product(*ranges):
+            block = self._expand(_Node(clocks, (), 0.0, self._clock_sums(clocks)))
+            for place in block.order.tolist():
+                least = min(least, self._key(block, place)[0])
+        return least
 
     def _clock_sums(self, clocks: tuple[int, ...]) -> tuple[int | float, ...]:
         chosen = [
@@ -174,6 +211,7 @@ class _Search:
             keep &= reach
             least[self.main] = sums[self.main] + amount
         order = self._sorted(total, least, np.flatnonzero(keep))
+        self.rows += len(role)
         return _Block(node, order, error, total, sums, tuple(least))
 
     def _least_within(self, r: int, slack: Floats) -> tuple[Bools, Column]:
@@ -245,15 +283,17 @@ class _Search:
     def _push(self, heap: list[Entry], block: _Block, at: int) -> None:
         if at >= len(block.order):
             return
-        place = int(block.order[at])
+        key = self._key(block, int(block.order[at]))
+        heapq.heappush(heap, (key, next(self.counter), block, at, None))
+
+    def _key(self, block: _Block, place: int) -> Key:
         sums = [
             Fraction(0) if s is None else _amount(_plain(c[place]), s.denominator)
             for s, c in zip(self.scales, block.least, strict=True)
         ]
         error = error_key(float(block.total[place]))
         first = error if self.problem.objective == "error" else self._of_objective(sums)
-        key: Key = (first, error, sums[0], sums[1], sums[2], (*block.node.places, place))
-        heapq.heappush(heap, (key, next(self.counter), block, at, None))
+        return (first, error, sums[0], sums[1], sums[2], (*block.node.places, place))
 
     def _of_objective(self, sums: list[Amount]) -> Amount:
         return sums[self.main]

@@ -15,7 +15,7 @@ from typing import Any
 
 from syncline_design.choose.decide import choose
 from syncline_design.choose.evaluate import broken, chosen_options, evaluate, pair_bound
-from syncline_design.choose.outcome import Choice, NoVerdict
+from syncline_design.choose.outcome import Choice, NoVerdict, OutOfTime
 from syncline_design.choose.variations import (
     PLATFORM_FIGURES,
     Build,
@@ -262,6 +262,8 @@ def _payload_factor(
 
     try:
         return _first(same, until)
+    except OutOfTime:
+        raise
     except NoVerdict:  # what cannot be proven is not claimed
         return None
 

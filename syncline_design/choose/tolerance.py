@@ -17,7 +17,7 @@ from typing import Any, Literal
 
 from syncline_design.choose.decide import choose
 from syncline_design.choose.evaluate import chosen_options, evaluate
-from syncline_design.choose.outcome import Choice, NoVerdict
+from syncline_design.choose.outcome import Choice, NoVerdict, OutOfTime
 from syncline_design.choose.slack import payload
 from syncline_design.choose.variations import (
     Build,
@@ -214,6 +214,8 @@ def measure_next(
     for figure in given or figures:
         try:
             found += _flips(loaded, problem, design, build, figure, assumed=not given)
+        except OutOfTime:
+            raise
         except NoVerdict:  # what cannot be proven is not claimed
             continue
     return tuple(sorted(found, key=lambda m: (-_weight(m), m.figure, m.at)))

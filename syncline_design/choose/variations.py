@@ -12,6 +12,7 @@ from syncline_design.design_space import Problem
 from syncline_design.loading import LoadedSpec
 from syncline_design.resolution import candidate_sensors, platform_of
 from syncline_design.spec import MethodChoice, Role, StageChoice
+from syncline_design.time_limit import in_force
 from syncline_design.units import Dimension, Quantity, format_quantity
 
 Build = Callable[[LoadedSpec], Problem]
@@ -36,7 +37,8 @@ def quantity(value: float | Fraction, dimension: Dimension) -> Quantity:
 
 
 def with_stage(loaded: LoadedSpec, index: int, **changes: Any) -> LoadedSpec:
-    """The spec with some keys of one stage changed."""
+    """The spec with some keys of one stage changed; every what-if asks for time first."""
+    in_force().check()
     stages = list(loaded.spec.stages)
     stages[index] = stages[index].model_copy(update=changes)
     spec = loaded.spec.model_copy(update={"stages": tuple(stages)})
@@ -124,7 +126,8 @@ def _figures(name: str, entry: SensorEntry, place: tuple[int, Role] | None) -> I
 
 
 def with_figure(loaded: LoadedSpec, figure: Figure, value: Quantity) -> LoadedSpec:
-    """The spec and catalogs with one datasheet figure changed."""
+    """The spec and catalogs with one datasheet figure changed; OutOfTime after the deadline."""
+    in_force().check()
     if figure.place is not None:
         stage, role = figure.place
         choice = loaded.spec.stages[stage].role(role)

@@ -19,11 +19,13 @@ from syncline_design.commands.shared import (
     SpecArgument,
     StudyOutput,
     TimeLimitOption,
+    deadline_of,
     emit,
     guarded,
     output_targets,
     refuse,
     road,
+    watched,
 )
 
 
@@ -40,6 +42,7 @@ def check(
     ] = False,
 ) -> int:
     """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
+    deadline = deadline_of(time_limit)
     from syncline_design.report.checks import CHECK_FORMATS, render_checks
     from syncline_design.report.console import verdict_text
     from syncline_design.report.several import skipped_text, summary_line
@@ -49,8 +52,9 @@ def check(
 
     found = spec_files(spec, skip_others=skip_others)
     targets = output_targets(output, CHECK_FORMATS, found.files)
-    settings = CheckSettings(seed=seed, method=road(method), time_limit_s=time_limit)
-    verdicts = check_files(found.files, settings)
+    settings = CheckSettings(seed=seed, method=road(method))
+    with watched(deadline, targets, quiet=quiet):
+        verdicts = check_files(found.files, settings)
     refused = [verdict for verdict in verdicts if verdict["verdict"] == "refused"]
     for verdict in refused:
         print(verdict["text"], file=sys.stderr)
@@ -84,6 +88,7 @@ def optimize(
     ] = None,
 ) -> int:
     """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
+    deadline = deadline_of(time_limit)
     from syncline_design.loading import load
     from syncline_design.optimisation import OptimizeSettings, optimisation_text, optimize
     from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
@@ -97,9 +102,11 @@ def optimize(
                 "is not in that folder; write the design beside the spec"
             )
     settings = OptimizeSettings(
-        best, pareto, resource, road(method), time_limit_s=time_limit, seed=seed
-    )
-    found = optimize(loaded, settings)
+        best, pareto, resource, road(method), seed=seed,
+        report=any(target.format == "html" for target in targets),
+    )  # fmt: skip
+    with watched(deadline, targets, quiet=quiet):
+        found = optimize(loaded, settings)
     if write_design is not None and found.exit_code == 0:
         _write_design(found, write_design)
     emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)

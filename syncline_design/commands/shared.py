@@ -5,7 +5,8 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
 
@@ -15,7 +16,9 @@ from syncline_design.report import formats
 
 if TYPE_CHECKING:
     from syncline_design.report.write import Target
+    from syncline_design.time_limit import Deadline
 
+PAGE_S = 1.0  # what drawing a page takes
 BAD_INPUT, NO_VERDICT, INTERRUPTED = 2, 3, 130
 DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal error
 
@@ -153,6 +156,30 @@ def emit(
     if text and not quiet and not any(target.path == STDOUT for target in targets):
         rendered.append((Target("text", STDOUT), text))
     write_outputs(rendered)
+
+
+def deadline_of(time_limit_s: float | None) -> Deadline:
+    """The command's time limit, which begins now: before anything slow is imported."""
+    from syncline_design.time_limit import Deadline
+
+    return Deadline(time_limit_s)
+
+
+@contextmanager
+def watched(deadline: Deadline, targets: Sequence[Target], *, quiet: bool) -> Iterator[None]:
+    """The time limit put in force, with time kept back for pages and signs of progress."""
+    from syncline_design.report.progress_line import StepLine
+    from syncline_design.time_limit import within
+
+    if any(target.format == "html" for target in targets):
+        deadline.keep_back(PAGE_S)
+    line = StepLine(quiet=quiet)
+    deadline.tick = line
+    try:
+        with within(deadline):
+            yield
+    finally:
+        line.clear()
 
 
 def road(name: str) -> Any:

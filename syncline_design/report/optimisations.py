@@ -19,10 +19,8 @@ def render_optimize(name: str, found: Optimisation) -> str:
 
         return json_text(optimisation_json(found))
     from syncline_design.report.verdict_page import render_verdict
-    from syncline_design.verify import CheckSettings, check_loaded
 
-    settings = CheckSettings(found.settings.seed, found.settings.method)
-    verdict = check_loaded(found.loaded, settings)
+    verdict = found.verdict or {}
     told = optimisation_json(found)
     choice = dict(verdict.get("choice") or {})
     choice |= {key: told[key] for key in _HINGES if told.get(key)}

@@ -1,4 +1,4 @@
-"""Progress of a study on standard error: one line that renews itself, or one now and then."""
+"""Progress on standard error: one line that renews itself, for a study also one now and then."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from syncline_design.report.study_words import progress_text
 from syncline_design.study.progress import Progress
 
 ON_TERMINAL_S, IN_LOG_S = 0.2, 10.0
+SILENT_S = 1.0  # nothing is said of what is done within a second
 
 
 class ProgressLine:
@@ -33,3 +34,28 @@ class ProgressLine:
         else:
             self._stream.write(text + "\n")
         self._stream.flush()
+
+
+class StepLine:
+    """What a command is doing, once it takes longer than a second; on a terminal only."""
+
+    def __init__(self, stream: TextIO | None = None, *, quiet: bool = False) -> None:
+        self._stream = stream or sys.stderr
+        self._live = not quiet and self._stream.isatty()
+        self._last = 0.0
+        self._shown = False
+
+    def __call__(self, doing: str, elapsed_s: float) -> None:
+        """Renew the line when it is time to."""
+        if not self._live or elapsed_s < SILENT_S or elapsed_s - self._last < ON_TERMINAL_S:
+            return
+        self._last, self._shown = elapsed_s, True
+        self._stream.write(f"\r\x1b[2K{doing or 'working'} ({elapsed_s:.0f} s)")
+        self._stream.flush()
+
+    def clear(self) -> None:
+        """Take the line away."""
+        if self._shown:
+            self._stream.write("\r\x1b[2K")
+            self._stream.flush()
+            self._shown = False

@@ -21,6 +21,7 @@ from syncline_design.simulate.distribution import KEPT_VALUES, Binned, Values
 from syncline_design.simulate.draws import RandomSource, generator, stage_draw, timing_draws
 from syncline_design.simulate.kernel import norm
 from syncline_design.simulate.settings import SimulationSettings, demand_simulable
+from syncline_design.time_limit import in_force
 
 JOB = 16384  # samples: what a job works on stays in the second-level cache
 PLAIN_STREAM = 1  # first word of the stream key, see draws.generator
@@ -87,10 +88,12 @@ def run_jobs(
     jobs = iter(range(first // JOB, -(-last // JOB)))
     failures: list[BaseException] = []
     lock = threading.Lock()
+    deadline = in_force()
 
     def work() -> None:
         try:
             while not failures:
+                deadline.check()
                 with lock:
                     job = next(jobs, None)
                 if job is None:

@@ -1,0 +1,125 @@
+"""One time limit for a whole command, and what it is doing when that runs long.
+
+The limit is set once, by `within`, and every search, simulation and what-if asks the one in force,
+however deep it is called: none can forget to hand it on.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TypeVar
+
+
+class NoVerdict(Exception):  # noqa: N818 - an outcome with its own exit code, not a failure
+    """No proven answer: a time limit, a missing solver, or roads that disagree."""
+
+
+class OutOfTime(NoVerdict):
+    """The time limit was reached; what is known by then still counts."""
+
+
+Tick = Callable[[str, float], None]  # what is being done, for how long the command runs [s]
+
+
+class Deadline:
+    """A point in time after which everything gives up.
+
+    tick: called at every check with what is being done, for a sign of progress.
+    """
+
+    def __init__(self, limit_s: float | None = None, tick: Tick | None = None) -> None:
+        self.limit_s = limit_s
+        self._start = time.monotonic()
+        self._end = math.inf if limit_s is None else self._start + limit_s
+        self.tick = tick
+        self._doing = ""
+
+    def keep_back(self, seconds: float) -> None:
+        """End earlier, by no more than a quarter of the limit, for what follows the search."""
+        if self.limit_s is not None:
+            self._end -= min(seconds, 0.25 * self.limit_s)
+
+    def doing(self, what: str) -> None:
+        """Say what comes next: `choosing`, `pricing accuracy`."""
+        self._doing = what
+        self.check()
+
+    def check(self) -> None:
+        """Raise OutOfTime once the time is over."""
+        now = time.monotonic()
+        if now > self._end:
+            limit = f"{self.limit_s:g} s"
+            raise OutOfTime(f"the time limit of {limit} was reached without a proof")
+        if self.tick is not None:
+            self.tick(self._doing, now - self._start)
+
+    def left_s(self) -> float | None:
+        """Seconds left, None without a limit."""
+        return None if self.limit_s is None else max(0.0, self._end - time.monotonic())
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time is over."""
+        return time.monotonic() > self._end
+
+
+_IN_FORCE: ContextVar[Deadline | None] = ContextVar("deadline", default=None)
+
+
+def in_force() -> Deadline:
+    """The deadline of the command; one without an end where there is none."""
+    return _IN_FORCE.get() or Deadline()
+
+
+@contextmanager
+def within(deadline: Deadline) -> Iterator[Deadline]:
+    """Put a deadline in force for everything that is called inside."""
+    token = _IN_FORCE.set(deadline)
+    try:
+        yield deadline
+    finally:
+        _IN_FORCE.reset(token)
+
+
+T = TypeVar("T")
+
+
+class Pieces:
+    """What belongs to an answer besides its heart; a time limit leaves the later pieces out.
+
+    cut_short: names of the pieces that are missing or not complete for that reason.
+    """
+
+    def __init__(self) -> None:
+        self.cut_short: list[str] = []
+
+    def made(self, name: str, make: Callable[[], T], without: T) -> T:
+        """A piece, or what stands for it when the time is over."""
+        try:
+            in_force().doing(name)
+            return make()
+        except OutOfTime:
+            self.cut_short.append(name)
+            return without
+
+    def listed(self, name: str, make: Callable[[], Iterable[T]]) -> list[T]:
+        """A piece as a list, as far as the time goes."""
+        found: list[T] = []
+        try:
+            in_force().doing(name)
+            found.extend(make())
+        except OutOfTime:
+            self.cut_short.append(name)
+        return found
+
+    @property
+    def caution(self) -> dict[str, str] | None:
+        """The warning that goes with what is missing."""
+        if not self.cut_short:
+            return None
+        message = f"the time limit ended this before it was complete: {', '.join(self.cut_short)}"
+        return {"code": "time-limit", "message": message}
