@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from syncline_design.chosen_system import system_of
-from syncline_design.design_space import Design, Problem
+from syncline_design.design_space import Design, Problem, is_empty
 from syncline_design.known_effects import effect_entries, known_of
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.budget import Budget, budget
@@ -60,7 +60,7 @@ class _Systems:
         self, loaded: LoadedSpec, problem: Problem, effects: tuple[EffectEntry, ...]
     ) -> None:
         self.loaded, self.problem, self.effects = loaded, problem, effects
-        filled = all(table.options for table in problem.roles)
+        filled = not is_empty(problem)
         self.first = Design((0,) * len(problem.roles), (0,) * len(problem.vehicles))
         self.places = dict(self._places()) if filled else {}
         self.built: dict[Key | None, System] = {}
