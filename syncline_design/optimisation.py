@@ -34,6 +34,9 @@ from syncline_design.design_space import Design, Problem, ResourceName
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked, pick
 from syncline_design.problem import selection_of
+from syncline_design.resolution import timestamping_of
+from syncline_design.selection import RoleSelection
+from syncline_design.spec import InlineTimestamping
 from syncline_design.spec_writer import PinnedRole, pinned_spec_text
 from syncline_design.time_limit import Deadline, Pieces, in_force, within
 from syncline_design.verdict import files_json
@@ -286,10 +289,7 @@ def pinned_text(loaded: LoadedSpec, problem: Problem, design: Design) -> str:
     """The spec with a design pinned, for `--write-design`."""
     selected = selection_of(problem, design)
     index = {stage.name: i for i, stage in enumerate(loaded.spec.stages)}
-    roles = [
-        PinnedRole(index[r.stage], r.role, r.sensor, r.primitive, _method(loaded, r.method))
-        for r in selected.roles
-    ]
+    roles = [_pinned(loaded, index[one.stage], one) for one in selected.roles]
     clocks = {
         i: identity
         for i, stage in enumerate(loaded.spec.stages)
@@ -298,6 +298,12 @@ def pinned_text(loaded: LoadedSpec, problem: Problem, design: Design) -> str:
     return pinned_spec_text(loaded, roles, clocks)
 
 
-def _method(loaded: LoadedSpec, name: str) -> str | None:
-    """A method's id; None where the error is given in place and stays."""
-    return name if name in loaded.catalog.timestamping else None
+def _pinned(loaded: LoadedSpec, index: int, one: RoleSelection) -> PinnedRole:
+    """What to write for one role; an error given in place stays, with its primitive if it has."""
+    stage = loaded.spec.stages[index]
+    choice = stage.role(one.role)
+    assert choice is not None
+    stamping = timestamping_of(loaded.spec, stage, choice, loaded.catalog)
+    if isinstance(stamping, InlineTimestamping):
+        return PinnedRole(index, one.role, one.sensor)
+    return PinnedRole(index, one.role, one.sensor, one.primitive, one.method)

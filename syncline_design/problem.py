@@ -286,16 +286,27 @@ def _candidates(
     for name, sensor in candidate_sensors(spec, stage, role, catalog):
         figures = _Figures(loaded, role, motion, effects.of(name), name, sensor)
         if isinstance(methods, InlineTimestamping):
-            tau = tau_bound(methods.error, spec.coverage_factor)
-            primitive = choice.primitive or INLINE
-            option = figures.option(primitive, INLINE, tau, methods.timeline, None)
-            found: Iterator[Option | Excluded] = iter((option,))
+            found: Iterator[Option | Excluded] = _given_in_place(figures, choice, methods)
         else:
             found = _stamped(figures, stage, choice, methods)
         if (barred := barred_sensor(spec, stage, name, sensor)) is not None:
             yield _impossible(name, "", "", barred, found)
         else:
             yield from found
+
+
+def _given_in_place(
+    figures: _Figures, choice: RoleChoice, stamping: InlineTimestamping
+) -> Iterator[Option | Excluded]:
+    """A sensor whose timestamp error the spec gives; a primitive that is pinned has to be its."""
+    name, offered = figures.name, figures.sensor.serves
+    if choice.primitive is not None and choice.primitive not in offered:
+        offers = ", ".join(offered)
+        reason = f"{choice.primitive} is asked for; {name} has {offers}"
+        yield Excluded(name, "", INLINE, reason, figure=offers, limit=choice.primitive)
+        return
+    tau = tau_bound(stamping.error, figures.loaded.spec.coverage_factor)
+    yield figures.option(choice.primitive or INLINE, INLINE, tau, stamping.timeline, None)
 
 
 def _stamped(

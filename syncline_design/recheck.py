@@ -191,6 +191,11 @@ def _chosen(
     stamping = timestamping_of(spec, stage, choice, catalog)
     method: Any = None
     if isinstance(stamping, InlineTimestamping):
+        if choice.primitive is not None and choice.primitive not in (
+            "arrival",
+            *sensor.primitives,
+        ):
+            raise NotADesign(f"{picked.sensor} cannot be stamped by {choice.primitive}")
         error, timeline = stamping.error, stamping.timeline
     else:
         method = dict(stamping).get(picked.method)

@@ -218,7 +218,15 @@ def _scalar_text(text: str) -> str:
     """A text as a plain scalar where it reads back the same, else in double quotes."""
     first = text[:1].isalnum() or text[:1] in "_." or (text[:1] in "+-" and text[1:2].isdigit())
     plain = first and set(text) <= _PLAIN and text == text.strip() and plain_scalar(text) == text
-    return text if plain and isinstance(plain_scalar(text), str) else _quoted(text)
+    return text if plain and _is_text_everywhere(text) else _quoted(text)
+
+
+def _is_text_everywhere(text: str) -> bool:
+    """Whether a plain scalar is text to this project's reader and to YAML 1.1 ones as well."""
+    try:
+        return isinstance(plain_scalar(text), str) and yaml.safe_load(text) == text
+    except yaml.YAMLError:
+        return False
 
 
 def _quoted(text: str) -> str:
