@@ -7,7 +7,6 @@ them moves the payload and the price.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,8 +18,9 @@ from syncline_design.resolution import platform_of
 from syncline_design.study.case import without_simulated
 from syncline_design.study.factors import label
 from syncline_design.study.keys import PLATFORM_KEYS, put
+from syncline_design.verdict_file import read_verdict, text_of
 from syncline_design.verify import CheckSettings, check_loaded, exit_code
-from syncline_design.yaml_reader import Document, KeyPath, Problem, parse, read_bytes
+from syncline_design.yaml_reader import Document, KeyPath, parse
 
 Json = dict[str, Any]
 SCHEMA = "syncline-design/diff/v1"
@@ -78,41 +78,12 @@ def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None
 def read_side(path: Path, settings: CheckSettings) -> Side:
     """A verdict file as it is; a spec is checked."""
     if path.suffix == ".json":
-        return Side(str(path), _verdict_file(path))
-    document = parse(_text_of(path), str(path))
+        return Side(str(path), read_verdict(path))
+    document = parse(text_of(path), str(path))
     if document.data is None:
         raise BadInput(document.problems)
     loaded = load_document(document, path, catalogs_of(document, path))
     return Side(str(path), check_loaded(loaded, settings), loaded, document)
-
-
-def _text_of(path: Path) -> str:
-    from syncline_design.yaml_reader import StopReadingError
-
-    try:
-        return read_bytes(path).decode("utf-8-sig")
-    except (OSError, StopReadingError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        message = f"cannot read the file: {reason.lower()}"
-        raise BadInput((Problem(str(path), 1, 1, "", message),)) from None
-
-
-def _verdict_file(path: Path) -> Json:
-    try:
-        data = json.loads(_text_of(path))
-    except json.JSONDecodeError as error:
-        message = f"not JSON: {error.msg}"
-        raise BadInput((Problem(str(path), error.lineno, error.colno, "", message),)) from None
-    except RecursionError:
-        raise BadInput((Problem(str(path), 1, 1, "", "nested too deeply"),)) from None
-    wanted = "a verdict as `check --output json:PATH` writes it, of one spec"
-    words = ("meets", "fails", "infeasible", "indeterminate")
-    shape = isinstance(data, dict) and data.get("verdict") in words
-    if not shape or not isinstance(data.get("requirements"), list):
-        found = str(data.get("schema", "")) if isinstance(data, dict) else ""
-        raise BadInput((Problem(str(path), 1, 1, "", "not a verdict", wanted, found),))
-    result: Json = data
-    return result
 
 
 def _causes(before: Side, after: Side) -> Iterator[Cause]:
