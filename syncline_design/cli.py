@@ -7,16 +7,32 @@ from __future__ import annotations
 
 import gc
 import os
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from syncline_design import __version__
 from syncline_design.commands import design, evidence, library
+from syncline_design.commands.shared import NO_VERDICT
 from syncline_design.processes import forget_working_folder
+from syncline_design.streams import say, secure_streams
+
+
+class _Commands(TyperGroup):
+    """The commands; an empty argument (an unset variable, say) is not the working folder."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        for argument in args:
+            if not argument or (argument.startswith("--") and argument.endswith("=")):
+                shown = argument or '""'
+                ctx.fail(f"an empty argument ({shown}); expected a path or a value")
+        return super().parse_args(ctx, args)
+
 
 app = typer.Typer(
     name="syncline-design",
+    cls=_Commands,
     help="Choose, verify and diagnose sensor payloads and their time synchronisation.",
     no_args_is_help=True,
     add_completion=False,
@@ -58,9 +74,14 @@ def _options(
 
 def main() -> None:
     """Entry point of the `syncline-design` command."""
+    secure_streams()
     forget_working_folder()
     _start_quickly()
-    app()
+    try:
+        app()
+    except OSError as error:  # help, or the version, to a standard output that takes nothing
+        say(f"syncline-design: standard output: cannot write: {error.strerror or error}")
+        raise SystemExit(NO_VERDICT) from None
 
 
 def _start_quickly() -> None:

@@ -21,6 +21,7 @@ from typing import Any
 import yaml
 
 from syncline_design.input_files import UnsuitableError, read_plain
+from syncline_design.streams import harmless
 from syncline_design.yaml_scalars import Number as Number
 from syncline_design.yaml_scalars import plain_scalar as plain_scalar
 
@@ -67,7 +68,7 @@ class Problem:
             parts.append(f"found {self.found}")
         if self.hint:
             parts.append(self.hint)
-        return "; ".join(parts)
+        return harmless("; ".join(parts), one_line=True)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -27,6 +26,7 @@ from syncline_design.commands.shared import (
     road,
     watched,
 )
+from syncline_design.streams import say
 
 
 @guarded
@@ -57,7 +57,7 @@ def check(
         verdicts = check_files(found.files, settings)
     refused = [verdict for verdict in verdicts if verdict["verdict"] == "refused"]
     for verdict in refused:
-        print(verdict["text"], file=sys.stderr)
+        say(verdict["text"])
     if refused:  # no file is written; what goes to standard output may say so
         targets = [target for target in targets if target.path == STDOUT]
     text = "\n".join(verdict_text(v) for v in verdicts if v not in refused)
@@ -65,7 +65,7 @@ def check(
         summary = summary_line(verdicts)
         text = f"{text}\n{summary}\n" if text else f"{summary}\n"
     if found.skipped and not quiet:
-        print(skipped_text(found.skipped), file=sys.stderr)
+        say(skipped_text(found.skipped))
     emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
     return max((exit_code(verdict) for verdict in verdicts), default=0)
 
@@ -118,7 +118,7 @@ def _write_design(found: Any, path: Path) -> None:
     from syncline_design.spec_writer import write_spec
 
     write_spec(pinned_text(found.loaded, found.problem, found.designs[0]), path)
-    print(f"design written to {path}", file=sys.stderr)
+    say(f"design written to {path}")
 
 
 @guarded

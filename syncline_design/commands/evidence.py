@@ -21,6 +21,7 @@ from syncline_design.commands.shared import (
     guarded,
     output_targets,
 )
+from syncline_design.streams import say
 
 
 @guarded
@@ -46,7 +47,8 @@ def simulate(
     targets = output_targets(output, SIMULATE_FORMATS, [spec])
     loaded = load(spec)
     run = simulate_spec(loaded, seed=seed, samples=samples, workers=workers)
-    text = f"{visible(loaded.spec.name)} ({spec})\n\n{summary_text(run.result, run.system)}"
+    head = f"{visible(loaded.spec.name)} ({visible(spec)})"
+    text = f"{head}\n\n{summary_text(run.result, run.system)}"
     emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
     return 0
 
@@ -85,7 +87,8 @@ def diagnose(
     with _progress(quiet) as progress:
         found = diagnose_log(as_measured(loaded), log or (), settings, progress)
         means = meaning(loaded, found, seed)
-    data, text = found.to_json(), f"{visible(loaded.spec.name)} ({spec})\n\n{summary_text(found)}"
+    data = found.to_json()
+    text = f"{visible(loaded.spec.name)} ({visible(spec)})\n\n{summary_text(found)}"
     if means is not None:
         data["design"] = means.to_json()
         text += f"\nWhat it means for the design:\n{means.text()}"
@@ -93,9 +96,9 @@ def diagnose(
         from syncline_design.spec_writer import write_spec as write_checked
 
         write_checked(means.spec_text, write_spec)
-        print(f"spec with the findings written to {write_spec}", file=sys.stderr)
+        say(f"spec with the findings written to {write_spec}")
     elif write_spec is not None:
-        print("nothing was found: no spec written", file=sys.stderr)
+        say("nothing was found: no spec written")
     emit(text, targets, lambda name: render_diagnose(name, data), quiet=quiet)
     return found.exit_code
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
 import typer
 
-from syncline_design.commands.shared import guarded, refuse
+from syncline_design.commands.shared import guarded, refuse, show
 
 
 @guarded
@@ -24,7 +23,7 @@ def catalog_list(
 
     if section is not None and section not in SECTIONS:
         refuse(f"syncline-design: catalog list {section}: expected one of {', '.join(SECTIONS)}")
-    sys.stdout.write(list_text(load_builtin(), section))
+    show(list_text(load_builtin(), section))
     return 0
 
 
@@ -41,7 +40,7 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
             f"syncline-design: catalog show {identity}: no such entry"
             f"{suggestion(catalog, identity)}"
         )
-    sys.stdout.write(text)
+    show(text)
     return 0
 
 
@@ -54,7 +53,7 @@ def schema(
     """Print the JSON Schema of specs, catalogs or studies, for editors."""
     from syncline_design.schema import schema_text
 
-    sys.stdout.write(schema_text(name))
+    show(schema_text(name))
     return 0
 
 
@@ -63,8 +62,8 @@ def init(
     directory: Annotated[Path, typer.Argument(help="Folder for the starter files.")],
 ) -> int:
     """Write a commented starter spec, a study over it and their schemas into a folder."""
+    from syncline_design.report.text import visible
     from syncline_design.scaffold import init_project
 
-    for path in init_project(directory):
-        print(path)
+    show("".join(f"{visible(path)}\n" for path in init_project(directory)))
     return 0

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
 import typer
 
 from syncline_design.report import formats
+from syncline_design.streams import say, without_commands
 
 if TYPE_CHECKING:
     from syncline_design.report.write import Target
@@ -54,7 +55,7 @@ ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FO
 
 
 def refuse(message: str, code: int = BAD_INPUT) -> NoReturn:
-    print(message, file=sys.stderr)
+    say(message)
     raise typer.Exit(code)
 
 
@@ -79,6 +80,7 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
         except OutputError as error:
             refuse(f"syncline-design: {error}", NO_VERDICT)
         except KeyboardInterrupt:
+            _end_quietly()
             refuse("syncline-design: interrupted", INTERRUPTED)
         except MemoryError:
             refuse("syncline-design: out of memory; no verdict", NO_VERDICT)
@@ -89,6 +91,19 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
         raise typer.Exit(code)
 
     return run
+
+
+def _end_quietly() -> None:
+    """After an interrupt, what a library fails to tidy up at exit is nobody's concern."""
+    if not hasattr(sys, "ps1"):
+        sys.unraisablehook = lambda _: None
+
+
+def show(text: str) -> None:
+    """Print a text that is the whole result."""
+    from syncline_design.report.write import STDOUT, Target, write_outputs
+
+    write_outputs([(Target("text", STDOUT), text)])
 
 
 def refuse_unexpected(error: Exception) -> NoReturn:
@@ -154,7 +169,7 @@ def emit(
         (target, render(target.format)) for target in targets
     ]
     if text and not quiet and not any(target.path == STDOUT for target in targets):
-        rendered.append((Target("text", STDOUT), text))
+        rendered.append((Target("text", STDOUT), without_commands(text)))
     write_outputs(rendered)
 
 

@@ -113,7 +113,7 @@ def write_outputs(rendered: Sequence[tuple[Target, str | bytes]]) -> None:
 
 
 def _encoded(text: str | bytes) -> bytes:
-    return text if isinstance(text, bytes) else text.encode("utf-8")
+    return text if isinstance(text, bytes) else text.encode("utf-8", "backslashreplace")
 
 
 def _print(text: str | bytes) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from typing import Any
 
+from syncline_design.processes import ended_by_signals, interrupts_held_back, starting_safely
 from syncline_design.study.case import CaseSettings, canonical
 from syncline_design.study.loading import Study
 from syncline_design.study.pool import Result, encoded_case
@@ -33,17 +35,34 @@ def run_on_cluster(
             "and --dask to use local processes"
         ) from None
 
-    with ExitStack() as stack:
+    with ExitStack() as stack, ended_by_signals(), _quiet_when_stopped():
         target: Any = address
         if address is None:
-            target = stack.enter_context(
-                dask.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
-            )
+            with (
+                starting_safely(),
+                interrupts_held_back(),
+            ):  # the threads and processes that it starts get none
+                target = stack.enter_context(
+                    dask.LocalCluster(
+                        n_workers=workers, threads_per_worker=1, dashboard_address=None
+                    )
+                )
         try:
             client = stack.enter_context(dask.Client(target, timeout=TIMEOUT))
         except (OSError, TimeoutError, ValueError) as error:
             raise ClusterError(f"no Dask scheduler answers at {address}: {error}") from None
         yield from run_with_client(client, study, settings, indices)
+
+
+@contextmanager
+def _quiet_when_stopped() -> Iterator[None]:
+    """Spare the user what the parts of a cluster log about each other when it is stopped."""
+    try:
+        yield
+    except (KeyboardInterrupt, SystemExit):
+        for name in ("distributed", "distributed.scheduler", "distributed.nanny", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+        raise
 
 
 def run_with_client(
