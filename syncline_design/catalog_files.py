@@ -25,6 +25,7 @@ from syncline_design.yaml_reader import (
 )
 
 BUILTIN_PACKAGE = "syncline_design.catalogs"
+MOST_PATH = 4096  # characters; following a longer one takes seconds
 
 
 @dataclass
@@ -120,6 +121,8 @@ def inside_folder(
     wanted = "a file inside the spec's folder"
     if Path(name).is_absolute() or name.startswith(("~", "\\")) or ":" in name[:3]:
         return problem_at(document, path, "an absolute path", wanted, name, "write it relative")
+    if len(name) > MOST_PATH:
+        return problem_at(document, path, f"a path of {len(name)} characters", wanted, name)
     note_place(folder / name)
     try:
         target = (folder / name).resolve()

@@ -379,4 +379,5 @@ def _column(
     for unit in units:
         if f"{name}_{unit}" in columns:
             return columns[f"{name}_{unit}"] * _UNITS[unit]
-    raise SimulationError(f"{path}: expected a column {name}_{usual}, found {', '.join(columns)}")
+    found = ", ".join(list(columns)[:12]) + (" ..." if len(columns) > 12 else "")
+    raise SimulationError(f"{path}: expected a column {name}_{usual}, found {found[:400]}")

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from syncline_design.catalog_files import Collection, problem_at
+from syncline_design.catalog_files import MOST_PATH, Collection, problem_at
 from syncline_design.input_files import note_read
 from syncline_design.loading import BadInput, LoadedSpec, catalogs_of, load_document
 from syncline_design.references import unknown_ids
@@ -130,7 +130,8 @@ def _note_files(base: Base, grid: Sequence[Factor]) -> None:
     for factor in grid:
         for value in factor.values if factor.listed else ():
             for text in _texts(value):
-                note_read(base.path.parent / text)
+                if len(text) <= MOST_PATH:
+                    note_read(base.path.parent / text)
 
 
 def _texts(value: Any) -> Iterator[str]:

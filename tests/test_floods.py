@@ -1,0 +1,85 @@
+"""Files made to keep the program busy are refused in bounded time, pipes are not waited for."""
+
+from __future__ import annotations
+
+import json
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+from syncline_design.loading import BadInput, load_text
+from syncline_design.study import StudySettings, load_study, run_study
+from test_study_inputs import BELOW, GRID, OWN, SPEC, STUDY, track
+
+ROOT = Path(__file__).resolve().parent.parent
+COUNT = 100_000
+FLOODS = {
+    "blanks in a quantity": "3" + " " * COUNT + "cm",
+    "blanks and tolerances": "1 +/- " * (COUNT // 6),
+    "ranges": "1 .. " * (COUNT // 5),
+    "slashes": "+/-" * COUNT,
+    "digits": "1" * COUNT,
+    "colons": "1:" * COUNT,
+    "brackets": "a [" * COUNT,
+    "exponents": "1e" * COUNT,
+}
+PLACES = (
+    "horizon: {duration: FLOOD}", "coverage_factor: FLOOD", "catalogs: [FLOOD]", "FLOOD: 1",
+    "log: {files: [FLOOD], columns: {roll_deg: FLOOD}}", "currency: FLOOD",
+    "effects: [{effect: FLOOD, sensor: FLOOD, parameters: {FLOOD: FLOOD}}]",
+    "timestamping: {candidates: [FLOOD]}", "monte_carlo: {samples: FLOOD}",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("flood", FLOODS.values(), ids=FLOODS.keys())
+def test_no_value_of_a_spec_takes_long_to_refuse(flood: str) -> None:
+    """A second of processor time over all places together; the worst took 34 s in one."""
+    spec = (ROOT / "specs" / "position_track.yaml").read_text()
+    started = time.process_time()
+    for place in PLACES:
+        text = spec + "\n" + place.replace("FLOOD", json.dumps(flood)) + "\n"
+        with pytest.raises(BadInput) as caught:
+            load_text(text, ROOT / "specs" / "flooded.yaml")
+        assert len(str(caught.value)) < 10_000
+    assert time.process_time() - started < 2.0
+
+
+def write(folder: Path, study: str = STUDY) -> Path:
+    (folder / "more").mkdir()
+    for name, text in (
+        ("spec.yaml", SPEC), ("own.yaml", OWN), ("more/below.yaml", BELOW), ("study.yaml", study),
+        ("delays.txt", "ms\n1.1\n"), ("others.txt", "ms\n1.5\n"), ("more/logger.txt", "us\n7\n"),
+        ("path.csv", track()),
+    ):  # fmt: skip
+        (folder / name).write_text(text)
+    return folder / "study.yaml"
+
+
+@pytest.mark.parametrize("name", ["spec.yaml", "own.yaml", "more/below.yaml", "delays.txt",
+                                  "more/logger.txt", "path.csv", "study.yaml"])  # fmt: skip
+@pytest.mark.parametrize("kind", ["a pipe", "a folder", "a device"])
+def test_a_study_does_not_wait_for_what_is_no_file(tmp_path: Path, name: str, kind: str) -> None:
+    path = write(tmp_path)
+    place = tmp_path / name
+    place.unlink()
+    if kind == "a pipe":
+        os.mkfifo(place)
+    elif kind == "a folder":
+        place.mkdir()
+    else:
+        place.symlink_to("/dev/zero")
+    with pytest.raises(BadInput):
+        load_study(path)
+
+
+def test_nor_does_a_case_whose_file_the_grid_names(tmp_path: Path) -> None:
+    path = write(tmp_path, GRID)
+    (tmp_path / "others.txt").unlink()
+    os.mkfifo(tmp_path / "others.txt")
+    result = run_study(path, StudySettings(workers=1))
+    assert result.counts["refused"] == 2
+    problems = [p for c in result.cases() for p in c.record.get("problems", ())]
+    assert problems
+    assert all("not a regular file" in problem["message"] for problem in problems)
