@@ -107,6 +107,14 @@ def proven(
     return None
 
 
+def as_written(loaded: LoadedSpec, problem: Problem, part: Part, value: Fraction) -> Fraction:
+    """The limit that a value becomes once it is written with so many figures."""
+    afters = [after for _, _, after in _moves(loaded, problem, part, value)]
+    if part.kind == "cost":
+        return min((loaded.spec.in_currency(after) for after in afters), default=value)
+    return min((after.exact for after in afters), default=value)
+
+
 def _widened(part: Part, value: Fraction, attempt: int) -> Fraction:
     return value * (1 + attempt * WIDENING) if part.kind == SIMULATED else value
 

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 
-from syncline_design.choose.fixes import Fix, proven
+from syncline_design.choose.fixes import Fix, as_written, proven
 from syncline_design.choose.outcome import NoVerdict
 from syncline_design.choose.parts import Part, is_feasible, least, lifted, moved, parts_of
 from syncline_design.choose.variations import Build
@@ -20,13 +20,14 @@ def joint_fixes(loaded: LoadedSpec, problem: Problem, build: Build) -> tuple[tup
     """The smallest sets of requirements that have to move, and by how little.
 
     One after the other each is moved to the least limit that the rest allow while those after it
-    are lifted: the first as little as any design permits, the next as little as is left then.
+    are lifted: the first as little as any design permits, the next as little as is left then, with
+    the first as it is written.
     """
     found: list[tuple[Fix, ...]] = []
     for together in _sets(problem):
         for order in itertools.permutations(together):
             try:
-                values = _least_in_turn(problem, order)
+                values = _least_in_turn(loaded, problem, order)
                 fixes = values and proven(loaded, problem, build, values)
             except NoVerdict:  # what cannot be proven is not offered
                 continue
@@ -54,14 +55,16 @@ def _sets(problem: Problem) -> Iterator[tuple[Part, ...]]:
             return
 
 
-def _least_in_turn(problem: Problem, order: tuple[Part, ...]) -> dict[Part, Fraction] | None:
+def _least_in_turn(
+    loaded: LoadedSpec, problem: Problem, order: tuple[Part, ...]
+) -> dict[Part, Fraction] | None:
     values: dict[Part, Fraction] = {}
     for place, part in enumerate(order):
         eased = lifted(moved(problem, _floats(values)), order[place + 1 :])
         value = least(eased, part)
         if value is None:
             return None
-        values[part] = value
+        values[part] = as_written(loaded, problem, part, value)
     return values
 
 
