@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 
+from syncline_design.estimates import figure
 from syncline_design.loading import BadInput, LoadedSpec
 from syncline_design.model.system import EffectEntry, RoleName, System
 from syncline_design.spec import EffectChoice
-from syncline_design.units import Dimension, format_quantity, suffix_unit
 from syncline_design.yaml_reader import KeyPath, Problem, show_path
 
 
@@ -102,18 +102,13 @@ def _problem(
 
 
 def describe(entry: EffectEntry) -> str:
-    """An effect in one sentence, its parameters with units."""
+    """An effect in one sentence, its parameters printed as `diagnose` prints them."""
     from syncline_design.effects import registry
 
-    shown = {name: parameter_text(name, value) for name, value in entry.parameters}
-    return registry()[entry.effect].sentence.format(sensor=entry.sensor, **shown)
-
-
-def parameter_text(name: str, value: float | str) -> str:
-    """A parameter in the unit its name says: `latency_s`, 0.0871 -> `87.1 ms`."""
-    if isinstance(value, str):
-        return value
-    dimension = suffix_unit(name)[1]
-    if dimension is Dimension.DIMENSIONLESS:
-        return f"{value:.4g}"
-    return format_quantity(value, dimension)
+    effect = registry()[entry.effect]
+    units = {parameter.name: parameter.unit for parameter in effect.parameters}
+    shown = {
+        name: value if isinstance(value, str) else figure(value, None, units.get(name, ""))
+        for name, value in entry.parameters
+    }
+    return effect.sentence.format(sensor=entry.sensor, **shown)

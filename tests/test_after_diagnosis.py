@@ -128,6 +128,33 @@ def test_a_drift_is_charged_for_the_stated_horizon(
     assert found.to_json()["horizon"]["duration_s"] == seconds
 
 
+@pytest.mark.parametrize(
+    ("effect", "parameters", "words"),
+    [
+        ("latency", {"latency_s": 0.0871}, "87.1 ms"),
+        ("clock_drift", {"rate": 59e-6}, "59 ppm"),
+        ("lever_arm", {"x_m": 0.123, "y_m": -0.004, "z_m": 0.0}, "12.3 cm"),
+        ("heading_drift", {"rate_radps": 1e-4}, "20.63 deg/h"),
+    ],
+)
+def test_a_finding_in_a_spec_reads_as_it_was_found(
+    effect: str, parameters: dict[str, float], words: str
+) -> None:
+    """The sentence of `check` about a known effect has the figures of `diagnose`'s sentence."""
+    from syncline_design.diagnose.findings import Figure, Finding
+    from syncline_design.effects import registry
+    from syncline_design.known_effects import describe
+    from syncline_design.model.system import EffectEntry
+
+    sensor = registry()[effect].sensors[0]
+    units = {p.name: p.unit for p in registry()[effect].parameters}
+    figures = {name: Figure(value, None, units[name]) for name, value in parameters.items()}
+    found = Finding(registry()[effect], sensor, "uav", figures, (), (), 1.0, None)
+    said = describe(EffectEntry(effect, sensor, "uav", tuple(parameters.items())))
+    assert words in said
+    assert said[0].upper() + said[1:] == found.sentence
+
+
 def test_page_and_markdown_show_all_three_beside_each_other() -> None:
     found = of("latency", {"latency_s": 0.045})
     data = {"verdict": "explained", "design": found.to_json()}
