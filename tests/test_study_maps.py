@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -123,6 +124,18 @@ def test_tables_of_costs_have_few_columns_and_every_cost(
     costs = sorted(cost for row in heat.cost for cost in row if cost is not None)
     sorts = [cell.sort for row in shown.rows for cell in row if cell.text.endswith("EUR")]
     assert sorted(sort for sort in sorts if sort is not None) == costs
+
+
+def test_a_cell_without_a_verdict_is_not_said_to_fail(tmp_path: Path) -> None:
+    summary = summarise(done(tmp_path, GRID.format(across=3, up=3)))
+    unmet = [i for i, brief in enumerate(summary.briefs) if not brief.meets]
+    assert unmet
+    briefs = list(summary.briefs)
+    briefs[unmet[0]] = replace(briefs[unmet[0]], verdict="indeterminate")
+    heat = heat_map(replace(summary, briefs=tuple(briefs)))
+    assert heat is not None
+    assert heat.undecided == 1
+    assert heat_table(heat, "EUR").note == "In 1 cells a case got no verdict."
 
 
 @pytest.mark.browser

@@ -33,6 +33,13 @@ _VERDICT_WORDS = {
     "refused": "cannot be as combined",
     "indeterminate": "got no verdict",
 }
+_ONE = {
+    "meets": "meets its requirements",
+    "fails": "does not meet them",
+    "infeasible": "is infeasible",
+    "refused": "cannot be as combined",
+    "indeterminate": "got no verdict",
+}
 _WHEN = {
     "all": "every case meets its requirements",
     "any": "at least one case meets its requirements",
@@ -49,8 +56,10 @@ def outcome(result: StudyResult) -> Outcome:
 def count_sentence(result: StudyResult) -> str:
     """`13 of 25 cases meet their requirements, 12 are infeasible`."""
     counts = result.counts
-    parts = [f"{counts['meets']} of {len(result)} cases {_VERDICT_WORDS['meets']}"]
-    parts += [f"{n} {_VERDICT_WORDS[w]}" for w, n in counts.items() if n and w != "meets"]
+    words = _ONE if counts["meets"] == 1 else _VERDICT_WORDS
+    parts = [f"{counts['meets']} of {len(result)} cases {words['meets']}"]
+    others = [(n, _ONE if n == 1 else _VERDICT_WORDS, w) for w, n in counts.items() if n]
+    parts += [f"{n} {said[w]}" for n, said, w in others if w != "meets"]
     return sentence_list(parts)
 
 
@@ -121,7 +130,12 @@ def heat_table(heat: HeatMap, currency: str) -> Table:
         [Cell(name), *(_cost_cell(cost, currency) for cost in line)]
         for name, line in zip(sides, costs, strict=True)
     ]
-    return table(LEAST_COST, heads, rows)
+    return table(LEAST_COST, heads, rows, _undecided_note(heat))
+
+
+def _undecided_note(heat: HeatMap) -> str:
+    """Cells without a cost in which a case got no verdict: not the same as none that meets."""
+    return f"In {heat.undecided} cells a case got no verdict." if heat.undecided else ""
 
 
 def _cell_table(heat: HeatMap, currency: str) -> Table:
@@ -136,6 +150,7 @@ def _cell_table(heat: HeatMap, currency: str) -> Table:
     more = max(0, len(rows) - MOST_ROWS)
     note = f"In {left} cells no case meets." if left else ""
     note += f" {more} further rows are left out." if more else ""
+    note += f" {_undecided_note(heat)}"
     heads = (heat.y.key, heat.x.key, "Least cost #", "Payload")
     return table(LEAST_COST, heads, rows[:MOST_ROWS], note.strip())
 

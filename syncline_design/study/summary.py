@@ -69,6 +69,7 @@ class HeatMap:
     y_labels: tuple[str, ...]
     cost: tuple[tuple[float | None, ...], ...]  # [y][x]
     picks: tuple[tuple[str, ...], ...]  # the payload of that case
+    undecided: int = 0  # cells without a cost in which a case got no verdict
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,12 +174,18 @@ def _filled(summary: Summary, x: Factor, y: Factor) -> HeatMap:
             held = best.get(cell)
             if held is None or brief.cost < (held.cost or 0.0):
                 best[cell] = brief
+    open_cells = {
+        (brief.labels[across], brief.labels[up])
+        for brief in summary.briefs
+        if brief.verdict == "indeterminate"
+    }
     columns, rows = axis_values(x), axis_values(y)
     found = [[best.get((column, row)) for column in columns] for row in rows]
     return HeatMap(
         x, y, columns, rows,
         tuple(tuple(None if b is None else b.cost for b in row) for row in found),
         tuple(tuple("" if b is None else payload(b) for b in row) for row in found),
+        len(open_cells - set(best)),
     )  # fmt: skip
 
 
