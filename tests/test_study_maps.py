@@ -95,7 +95,8 @@ def test_a_sample_crossed_with_a_grid_keeps_its_map(tmp_path: Path) -> None:
 
 
 def test_dearer_cells_are_stronger_whatever_the_theme(tmp_path: Path) -> None:
-    heat = heat_map(summarise(done(tmp_path, GRID.format(across=5, up=6))))
+    result = done(tmp_path, GRID.format(across=4, up=5))
+    heat = heat_map(summarise(result))
     assert heat is not None
     svg = cost_map(heat, "EUR").svg
     cells = svg.partition('id="fig-heat-legend')[0]
@@ -108,11 +109,10 @@ def test_dearer_cells_are_stronger_whatever_the_theme(tmp_path: Path) -> None:
     order = sorted(range(len(costs)), key=lambda i: costs[i])
     assert [strengths[i] for i in order] == sorted(strengths)
     assert svg.count("\u2715") == sum(cost is None for row in heat.cost for cost in row)
-    page = str(render_study("html", done(tmp_path, GRID.format(across=5, up=6))))
-    assert "darker" not in page
+    assert "darker" not in str(render_study("html", result))
 
 
-@pytest.mark.parametrize(("across", "up"), [(3, 12), (12, 3), (12, 12)])
+@pytest.mark.parametrize(("across", "up"), [(2, 9), (9, 2), (9, 9)])
 def test_tables_of_costs_have_few_columns_and_every_cost(
     tmp_path: Path, across: int, up: int
 ) -> None:
@@ -139,25 +139,25 @@ def test_a_cell_without_a_verdict_is_not_said_to_fail(tmp_path: Path) -> None:
 
 
 @pytest.mark.browser
-@pytest.mark.parametrize("theme", ["light", "dark"])
 def test_no_table_of_a_study_is_wider_than_the_page(
     browser: Any,  # noqa: F811
     tmp_path: Path,
-    theme: str,
 ) -> None:
     more = WORDS + (
         '    "stages[uav].omega_max": 10 deg/s .. 90 deg/s\n'
         '    "requirements[ACC-1].limit": 0.1 m .. 0.5 m\n'
     )
-    studies = {"sample": SAMPLE.format(count=20, more=more), "grid": GRID.format(across=12, up=9)}
+    studies = {"sample": SAMPLE.format(count=9, more=more), "grid": GRID.format(across=9, up=9)}
     for name, text in studies.items():
         page = tmp_path / f"{name}.html"
         page.write_text(str(render_study("html", done(tmp_path, text))), encoding="utf-8")
-        size = {"width": 1200, "height": 900}
-        with Opened(browser, page, viewport=size, color_scheme=theme) as opened:
-            widths = opened.page.evaluate(
-                "[...document.querySelectorAll('.scroll')].map(e => e.scrollWidth - e.clientWidth)"
-            )
-            assert widths
-            assert max(widths) <= 0, name
-            assert opened.console == []
+        for theme in ("light", "dark"):
+            size = {"width": 1200, "height": 900}
+            with Opened(browser, page, viewport=size, color_scheme=theme) as opened:
+                widths = opened.page.evaluate(
+                    "[...document.querySelectorAll('.scroll')]"
+                    ".map(e => e.scrollWidth - e.clientWidth)"
+                )
+                assert widths
+                assert max(widths) <= 0, name
+                assert opened.console == []
