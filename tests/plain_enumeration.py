@@ -133,10 +133,11 @@ class Stage:
 
 
 class Enumeration:
-    """Every design of one spec."""
+    """Every design of one spec; gnss_everywhere: those that cannot work for want of GNSS too."""
 
-    def __init__(self, spec: dict[str, Any]) -> None:
+    def __init__(self, spec: dict[str, Any], gnss_everywhere: bool = False) -> None:
         self.spec = spec
+        self.gnss_everywhere = gnss_everywhere
         self.catalog = read_catalog()
         self.k = spec.get("coverage_factor", 3)
         self.stages = [self._stage(raw) for raw in spec["stages"]]
@@ -176,6 +177,9 @@ class Enumeration:
         found: list[Option] = []
         for name, method in itertools.product(self._sensors(wanted, role), methods):
             sensor, stamping = self.catalog["sensors"][name], self.catalog["timestamping"][method]
+            listens = sensor.get("type") == "gnss" or self._needs_gnss(sensor)
+            if not self.has_gnss(slot[0]) and (listens or self._needs_gnss(stamping)):
+                continue
             error, tau = sensor_error(sensor, stage.d_m), bound_of(stamping["error"], self.k)
             common = {*sensor["primitives"], "arrival"} & set(stamping["primitives"])
             found += [
@@ -185,15 +189,41 @@ class Enumeration:
             ]
         return found
 
-    def __iter__(self) -> Iterator[Outcome]:
-        clocks = [
-            next((raw["clock"]["candidates"] for raw in self._raw_of(name) if "clock" in raw), None)
-            for name in self.vehicles
-        ]
+    def clocks(self, vehicle: str) -> list[str | None]:
+        """Clocks that a vehicle's host can have; None alone where the spec names none."""
+        named = [raw["clock"]["candidates"] for raw in self._raw_of(vehicle) if "clock" in raw]
+        return [name for name in named[0] if self._works(name, vehicle)] if named else [None]
+
+    @property
+    def count(self) -> int:
+        """How many designs there are."""
         tables = [self.options(slot) for slot in self.slots]
-        for chosen_clocks in itertools.product(*(c or [None] for c in clocks)):
+        return math.prod(map(len, (*tables, *map(self.clocks, self.vehicles))))
+
+    def __iter__(self) -> Iterator[Outcome]:
+        tables = [self.options(slot) for slot in self.slots]
+        offered = [self.clocks(vehicle) for vehicle in self.vehicles]
+        for chosen_clocks in itertools.product(*offered):
             for options in itertools.product(*tables):
                 yield self.outcome(options, chosen_clocks)
+
+    def has_gnss(self, stage: int) -> bool:
+        """GNSS is on the first stage unless it is at a depth, and nowhere else by itself."""
+        if self.gnss_everywhere:
+            return True
+        raw = self.spec["stages"][stage]
+        deep = number(raw.get("depth", "0 m")) > 0
+        return bool({"yes": True, "no": False}.get(raw.get("gnss"), stage == 0 and not deep))
+
+    def _needs_gnss(self, entry: dict[str, Any]) -> bool:
+        """Whether an entry, or the shared hardware that it requires, says so."""
+        hardware = [self.catalog["infrastructure"][name] for name in entry.get("requires", ())]
+        return any("gnss" in one.get("needs", ()) for one in (entry, *hardware))
+
+    def _works(self, clock: str, vehicle: str) -> bool:
+        aboard = [i for i, stage in enumerate(self.stages) if stage.vehicle == vehicle]
+        entry = self.catalog["clocks"][clock]
+        return not self._needs_gnss(entry) or any(map(self.has_gnss, aboard))
 
     def _raw_of(self, vehicle: str) -> list[dict[str, Any]]:
         pairs = zip(self.spec["stages"], self.stages, strict=True)
