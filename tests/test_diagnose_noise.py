@@ -224,6 +224,29 @@ def test_tails_are_told_from_normal_noise() -> None:
     assert tails_of(struck).outlier_rate == pytest.approx(0.02, abs=0.006)
 
 
+@pytest.mark.parametrize(
+    ("freedom", "rate"),
+    [(3.0, 0.0), (5.0, 0.0), (2.3, 0.0), (200.0, 0.03), (200.0, 0.1), (6.0, 0.05)],
+)
+def test_far_rows_are_tails_or_outliers_and_not_both(freedom: float, rate: float) -> None:
+    """What the fit charges is the deviation of what was drawn, known to 15 % from the mixture.
+
+    3000 rows of three axes; a row is normal with ten times the deviation, or Student's t.  At
+    nu = 2.3 the deviation itself hangs on the last draws: there only the share is judged.
+    """
+    rng = np.random.default_rng(int(freedom * 10 + 1000 * rate))
+    drawn = rng.standard_t(freedom, (3000, 3))
+    struck = rng.random(3000) < rate
+    drawn[struck] = 10.0 * rng.standard_normal((int(struck.sum()), 3))
+    found = tails_of(drawn)
+    assert found.outlier_rate == pytest.approx(rate, abs=0.01)
+    if freedom > 2.5:
+        variance = (1 - rate) * freedom / (freedom - 2) + 100 * rate
+        nu = found.degrees_of_freedom
+        fitted = (1 - found.outlier_rate) * nu / (nu - 2) + 100 * found.outlier_rate
+        assert np.sqrt(fitted) == pytest.approx(np.sqrt(variance), rel=0.15)
+
+
 def test_whole_seconds_are_a_slip_and_others_a_latency() -> None:
     slip = whole_seconds(1.0005, 0.0001)
     assert slip is not None

@@ -11,15 +11,20 @@ from syncline_design.diagnose.axes import Axes
 from syncline_design.diagnose.fitting import Data, Model
 from syncline_design.diagnose.noise import NoiseLevel, Structure, white_covariance
 from syncline_design.effects.base import Array
+from syncline_design.effects.heavy_tails import OUTLIER_FACTOR
 
 FREEDOMS = np.geomspace(1.2, 30.0, 25)
-FAR = 5.0  # core standard deviations beyond which a row is an outlier
-MAD_TO_STD = 1.4826  # of a normal distribution
+FAR = 5.0  # core standard deviations beyond which a row is taken for an outlier at first
+OUTLIER_NATS = 5.0  # what outliers beside Student's t have to be worth to be reported
+MIXTURE_STEPS = 12
 
 
 @dataclass(frozen=True, slots=True)
 class Tails:
-    """gain: log likelihood [nat] of Student's t over the normal; the fit behind it."""
+    """gain: log likelihood [nat] of Student's t over the normal; the fit behind it.
+
+    outlier_rate: share of the rows that Student's t does not explain.
+    """
 
     gain: float
     degrees_of_freedom: float
@@ -61,15 +66,44 @@ def tails_of(z: Array) -> Tails:
     for freedom in FREEDOMS:
         scale = _scale(values, float(freedom))
         found.append(float(np.sum(t.logpdf(values, freedom, scale=scale))))
+    gain = max(found) - plain
+    mixed = [_mixture(z, float(freedom)) for freedom in FREEDOMS]
+    rate = 0.0
+    if max(likelihood for likelihood, _ in mixed) > max(found) + OUTLIER_NATS:
+        found = [likelihood for likelihood, _ in mixed]
+        rate = mixed[int(np.argmax(found))][1]
     best = int(np.argmax(found))
-    core = MAD_TO_STD * float(np.median(np.abs(values)))
-    struck = np.max(np.abs(z), axis=1) > FAR * core
-    return Tails(
-        found[best] - plain,
-        float(FREEDOMS[best]),
-        _spread(found, best),
-        float(np.mean(struck)),
-    )
+    return Tails(gain, float(FREEDOMS[best]), _spread(found, best), rate)
+
+
+def _mixture(z: Array, freedom: float) -> tuple[float, float]:
+    """(log likelihood [nat], share of outliers) of the mixture that `heavy_tails` is.
+
+    A row is Student's t of one scale or, with some probability, normal with OUTLIER_FACTOR times
+    that scale, so that what one part explains the other does not count again.  By expectation and
+    maximisation, from the rows far outside the core.
+    """
+    square, axes = z**2, z.shape[1]
+    peak = math.lgamma(0.5 * (freedom + 1.0)) - math.lgamma(0.5 * freedom)
+    peak -= 0.5 * math.log(freedom * math.pi)  # log density of Student's t of scale 1 at 0
+    scale2 = float(np.median(square)) / 0.455
+    rate = float(np.clip(np.mean(square.max(axis=1) > FAR**2 * scale2), 1e-4, 0.5))
+    for step in range(MIXTURE_STEPS + 1):
+        log_scale = 0.5 * math.log(scale2)
+        spread = np.sum(np.log1p(square / (freedom * scale2)), axis=1)
+        inside = axes * (peak - log_scale) - 0.5 * (freedom + 1.0) * spread + math.log1p(-rate)
+        flat = axes * (log_scale + math.log(OUTLIER_FACTOR * math.sqrt(2.0 * math.pi)))
+        outside = (
+            math.log(rate) - flat - 0.5 * np.sum(square, axis=1) / (OUTLIER_FACTOR**2 * scale2)
+        )
+        likely = np.logaddexp(inside, outside)
+        if step == MIXTURE_STEPS:
+            break
+        struck = np.exp(outside - likely)[:, None]
+        weight = (1.0 - struck) * (freedom + 1.0) / (freedom + square / scale2)
+        scale2 = float(np.mean((weight + struck / OUTLIER_FACTOR**2) * square))
+        rate = float(np.clip(struck.mean(), 1e-6, 0.5))
+    return float(np.sum(likely)), rate
 
 
 def _scale(values: Array, freedom: float) -> float:
