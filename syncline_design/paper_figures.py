@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from syncline_design.catalog import Catalog, SensorEntry
+from syncline_design.horizon import Horizon
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.model.system import Platform, RoleName, Sensor, Stage, System
@@ -36,6 +37,7 @@ FIGURE_6_PAYLOADS: tuple[Payload, ...] = (
     ("ublox_f9p_rtk", "sbg_ellipse", "sonardyne_usbl7000"),
 )
 FIGURE_7_PAYLOAD: Payload = ("ublox_f9p_rtk", "kongsberg_mru5", "kongsberg_hipap502")
+LEVEL = Horizon(tilt_rad=0.0)  # the paper simulates level vehicles
 FREE_CHOICE = "The paper does not name the payloads; these are chosen here."
 
 
@@ -136,7 +138,8 @@ def georeferencing_system(catalog: Catalog, platform: str, payload: Payload) -> 
     """One vehicle with GNSS, INS and LiDAR, perfectly synchronised (example 1)."""
     position, attitude, ranging = (_sensor(catalog, name) for name in payload)
     figures = platform_of(catalog, platform)
-    return System((Stage(platform, platform, figures, position, attitude, ranging),))
+    stage = Stage(platform, platform, figures, position, attitude, ranging)
+    return System((stage,), horizon=LEVEL)
 
 
 def survey_system(
@@ -147,7 +150,7 @@ def survey_system(
     second = Stage(
         auv, auv, platform_of(catalog, auv), None, first.attitude, _sensor(catalog, sonar)
     )
-    return System((first, second))
+    return System((first, second), horizon=LEVEL)
 
 
 def figures(catalog: Catalog) -> tuple[Figure, ...]:

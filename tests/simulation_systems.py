@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 
+from syncline_design.horizon import Horizon
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.timing import Distribution, TimingError, Uniform
 
@@ -20,6 +21,11 @@ def sensor(
     timeline: str = "host:vehicle",
 ) -> Sensor:
     return Sensor(role, role, sigma, TimingError(distribution), timeline, lever_arm)  # type: ignore[arg-type]
+
+
+def tilted(system: System, tilt_rad: float = 0.0) -> System:
+    """The same with this largest tilt, level by default."""
+    return dataclasses.replace(system, horizon=Horizon(tilt_rad=tilt_rad))
 
 
 def fixed_wing(distribution: Distribution = DEFAULT_ERROR) -> System:

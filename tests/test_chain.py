@@ -21,6 +21,7 @@ from syncline_design.simulate.chain import (
     stage_error,
 )
 from syncline_design.simulate.draws import RandomSource, generator, stage_draw, timing_draws
+from syncline_design.simulate.surroundings import Moment, placed_rows
 from tests.simulation_systems import DEG, altered, fixed_wing, position_only, survey
 
 
@@ -137,6 +138,12 @@ def drawn(system, index: int = 0, inside: bool = False, count: int = 2000, seed:
     return stage_draw(system, index, timing_draws(system, source), source, inside)
 
 
+def level_rows(draw: kernel.Draw):
+    """The draw for the row-wise chain: level, at the start, the object at the origin."""
+    count = draw.bearing.shape[1]
+    return placed_rows(draw, Moment(np.zeros(count), np.zeros((2, count))), np.zeros((2, count)))
+
+
 @pytest.mark.parametrize("scale", [0.0, 1.0, 1e3, 3e4])
 @pytest.mark.parametrize("inside", [False, True])
 @pytest.mark.parametrize(
@@ -148,7 +155,7 @@ def test_kernel_agrees_with_chain(system, inside: bool, scale: float) -> None:
         for shift in (draw.mu_position_s, draw.mu_attitude_s, draw.mu_ranging_s):
             shift *= scale
         carried = generator(4, index).normal(size=(3, 2000))
-        rows, motion, noise = kernel.as_rows(draw)
+        rows, motion, noise = level_rows(draw)
         expected = stage_error(rows, motion, noise, carried_m=carried.T).T
         found = kernel.stage_error(draw, carried)
         size = max(1.0, stage.platform.distance_m, float(np.abs(expected).max()))
@@ -161,7 +168,7 @@ def test_kernel_agrees_with_chain_at_gimbal_lock() -> None:
     draw.rate_radps[:] = np.array([[0.0], [math.pi / 2], [0.0]])
     draw.mu_position_s[:], draw.mu_ranging_s[:] = 0.2, 0.0
     draw.mu_attitude_s[:200], draw.mu_attitude_s[200:] = 1.0, -1.0
-    rows, motion, noise = kernel.as_rows(draw)
+    rows, motion, noise = level_rows(draw)
     expected = stage_error(rows, motion, noise).T
     np.testing.assert_allclose(kernel.stage_error(draw), expected, atol=1e-9, rtol=0)
     # noiseless, lock or not: the measured rotation is the turned one
@@ -184,7 +191,7 @@ def test_kernel_agrees_with_chain_straight_up_and_down() -> None:
         draw.bearing[:, columns] = np.array([[0.0], [0.0], [z]])
     draw.bearing[:, 400:] = np.array([[3e-9], [-4e-9], [1.0]])
     draw.angle_noise_rad[3:] *= 100.0
-    rows, motion, noise = kernel.as_rows(draw)
+    rows, motion, noise = level_rows(draw)
     expected = stage_error(rows, motion, noise).T
     np.testing.assert_allclose(kernel.stage_error(draw), expected, atol=1e-10, rtol=0)
 
@@ -294,7 +301,7 @@ def test_no_shift_and_no_noise_is_no_error(system) -> None:
 @pytest.mark.parametrize("changes", [{"v_max_mps": 0.0}, {"omega_max_radps": 0.0}])
 def test_zero_speed_and_zero_rate(changes) -> None:
     draw = drawn(altered(fixed_wing(), **changes))
-    rows, motion, noise = kernel.as_rows(draw)
+    rows, motion, noise = level_rows(draw)
     expected = stage_error(rows, motion, noise).T
     np.testing.assert_allclose(kernel.stage_error(draw), expected, atol=1e-10, rtol=0)
 

@@ -17,7 +17,7 @@ from syncline_design.simulate import comparison, worst_cases
 from syncline_design.simulate.bounds import references
 from syncline_design.simulate.worst_case import _Search, blocks
 from syncline_design.timing import NO_ERROR
-from tests.simulation_systems import DEG, altered, fixed_wing, position_only, survey
+from tests.simulation_systems import DEG, altered, fixed_wing, position_only, survey, tilted
 
 
 def without_arms(system: System) -> System:
@@ -88,9 +88,23 @@ def test_position_only_worst_case_adds_the_arm() -> None:
 
 def test_sensor_noise_alone_at_tau_zero() -> None:
     """tau = 0, attitude and bearing noise across, range noise along: sigma_p + hypot of both."""
-    system = without_arms(fixed_wing())
+    sensor_noise_alone(tilt_rad=0.0)
+
+
+def test_tilt_lets_roll_and_yaw_noise_add_up() -> None:
+    """tau = 0 at pitch p: equal roll and yaw noise turn by sqrt(1 + sin p) times their length.
+
+    The axes of roll and yaw enclose pi/2 - p: |a + b|^2 = |a|^2 + |b|^2 + 2 a b sin p.
+    """
+    for tilt_rad in (0.2, 0.7):
+        sensor_noise_alone(tilt_rad)
+
+
+def sensor_noise_alone(tilt_rad: float) -> None:
+    system = tilted(without_arms(fixed_wing()), tilt_rad)
     (found,) = worst_cases(system, np.array([0.0]))
-    across = 100.0 * (0.002 * DEG * math.sqrt(3) + 0.006 * DEG * math.sqrt(2))
+    turn = 0.002 * DEG * math.sqrt(3) * math.sqrt(1.0 + math.sin(tilt_rad))
+    across = 100.0 * (turn + 0.006 * DEG * math.sqrt(2))
     expected = 0.01 * math.sqrt(3) + math.hypot(across, 0.01)
     assert found.value_m == pytest.approx(expected, rel=1e-3)
     assert found.ratio == pytest.approx(found.value_m / budget(system).sensor_error_m, rel=1e-12)
@@ -161,9 +175,9 @@ def test_fixed_wing_figure_holds_within_its_stated_band() -> None:
     """The paper's first comparison, 1 us to 0.3 s: ratio between 0.84 and 1.02.
 
     Below tau_crit the range noise, along the line of sight, cannot add to the errors across it;
-    the certificate shows that nothing larger exists (gap below 0.5 %).
+    the certificate shows that nothing larger exists in level flight (gap below 0.5 %).
     """
-    rows = comparison(dataclasses.replace(fixed_wing()), tuple(np.logspace(-6, -0.5, 12)))
+    rows = comparison(tilted(fixed_wing()), tuple(np.logspace(-6, -0.5, 12)))
     ratios = [row.worst_case.ratio for row in rows]
     assert 0.83 < min(ratios) < 0.86
     assert 1.0 < max(ratios) < 1.02
@@ -235,8 +249,8 @@ def paper_systems() -> dict[str, System]:
     vessel, vehicle = survey().stages
     rtk = dataclasses.replace(vessel.position, sigma=(0.01,) * 3)
     return {
-        "fixed wing": System((dataclasses.replace(wing, **bare),)),
-        "small SV and AUV": System((dataclasses.replace(vessel, position=rtk), vehicle)),
+        "fixed wing": tilted(System((dataclasses.replace(wing, **bare),))),
+        "small SV and AUV": tilted(System((dataclasses.replace(vessel, position=rtk), vehicle))),
     }
 
 

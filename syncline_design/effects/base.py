@@ -208,6 +208,7 @@ class Effect:
     spread: covariance of a stochastic effect.
     contribute: what it adds to the Syncline of a stage.
     applies: whether a stage can have it.
+    tilted: acts by roll and pitch, which the simulator then draws over the horizon's tilt.
     sentence: for people, a format string over {sensor} and the parameters.
     """
 
@@ -224,6 +225,7 @@ class Effect:
     contribute: Contribute
     spread: Spread | None = None
     applies: Applies = everywhere
+    tilted: bool = False
 
     def slopes(self) -> tuple[Parameter, ...]:
         """The parameters that `sensitivity` has a column for."""

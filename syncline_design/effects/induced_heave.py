@@ -75,4 +75,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     applies=_applies,
+    tilted=True,
 )

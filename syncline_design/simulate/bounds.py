@@ -1,4 +1,10 @@
-"""Upper bounds of the error by geometry: what no choice of directions can exceed."""
+"""Upper bounds of the error by geometry: what no choice of directions can exceed.
+
+They hold in a stated envelope: every pair's relative shift at most tau (plus what effects add),
+tilt at most the horizon's, every sensor at one sigma in each of its norms, speed, turn rate and
+distance at most the platform's, time and place within the horizon, and known effects at most at
+what the budget charges for them.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +21,30 @@ ExtraTau = Mapping[tuple[str, RoleName], float]
 
 
 @dataclass(frozen=True, slots=True)
+class Added:
+    """What known effects add to one stage at most.
+
+    position_s, attitude_s: to the relative shifts; turn_rad: turn of the measured attitude;
+    euler_rad: noise of roll, pitch and yaw; sight_rad: turn of the line of sight in the body;
+    offset_m: displacements.
+    """
+
+    position_s: float = 0.0
+    attitude_s: float = 0.0
+    turn_rad: float = 0.0
+    euler_rad: float = 0.0
+    sight_rad: float = 0.0
+    offset_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class StageBound:
     """One stage's largest error [m] at given relative shifts, and what it is made of.
 
     bound_m: by chords and the law of cosines; triangle_m: the plain sum of terms with arcs;
     lever_arm_m: what lever arms add to triangle_m; arc_m, chord_m: the swing of the line of sight
     as the arc d w tau and as the chord it is; across_m: errors across the line of sight;
-    range_m: the range noise along it.
+    range_m: the range noise along it; tilt_m: what tilted Euler axes add to the attitude noise.
     """
 
     bound_m: float
@@ -31,6 +54,7 @@ class StageBound:
     chord_m: float
     across_m: float
     range_m: float
+    tilt_m: float
 
 
 def chord(angle_rad: float) -> float:
@@ -38,43 +62,49 @@ def chord(angle_rad: float) -> float:
     return 2.0 * math.sin(0.5 * min(angle_rad, math.pi))
 
 
-def stage_bound(stage: Stage, first: bool, tau_p_s: float, tau_a_s: float) -> StageBound:
-    """Largest |e| [m] of one stage for position shifts up to tau_p and attitude shifts up to tau_a.
+def stage_bound(
+    stage: Stage, first: bool, tau_s: float, tilt_rad: float, added: Added
+) -> StageBound:
+    """Largest |e| [m] of one stage for relative shifts up to tau_s plus what effects add.
 
-    |dp| <= v tau_p + sigma_p; the antenna's arm l_G turns by at most w tau_p; the measured
-    attitude is off by at most a = w tau_a + sigma_Theta sqrt(1 + sin(pitch)), pitch <= w tau_a +
-    sigma_Theta (a path of length s in Euler angles turns by at most s sqrt(1 + |sin pitch|)); the
+    |dp| <= v tau_p + sigma_p; the antenna's arm l_G turns by at most w tau_p, in two parts where
+    an effect displaces by its own; the measured attitude is off by at most
+    a = w tau_a + turn + sigma_Theta sqrt(1 + |sin pitch|) (a path of length s in Euler angles turns
+    by at most s sqrt(1 + |sin pitch|)), |pitch| at most tilt + w tau_a + turn + sigma_Theta; the
     measured vector and the true one enclose at most a + sigma_u, and their lengths differ by at
     most sigma_r, which bounds their distance by the law of cosines.
     """
-    platform = stage.platform
-    v, omega = float(platform.v_max_mps), float(platform.omega_max_radps)
+    v, omega = float(stage.platform.v_max_mps), float(stage.platform.omega_max_radps)
     sigma_p = 0.0 if stage.position is None else math.hypot(*stage.position.sigma)
     antenna, difference = arm_lengths(stage, first)
-    turn_p, turn_a = omega * tau_p_s, omega * tau_a_s
-    position = v * tau_p_s + sigma_p
+    turn_p = omega * (tau_s + added.position_s)
+    position = v * (tau_s + added.position_s) + sigma_p + added.offset_m
+    arms = (chord(omega * tau_s) + chord(omega * added.position_s)) * antenna
     if stage.ranging is None or stage.attitude is None:
         arc = position + turn_p * antenna
-        chorded = position + chord(turn_p) * antenna
-        return StageBound(chorded, arc, turn_p * antenna, 0.0, 0.0, 0.0, 0.0)
-    d = float(platform.distance_m)
-    sigma_a = math.hypot(*stage.attitude.sigma)
-    sigma_u = math.hypot(*stage.ranging.sigma[1:])
+        return StageBound(position + arms, arc, turn_p * antenna, 0.0, 0.0, 0.0, 0.0, 0.0)
+    d = float(stage.platform.distance_m)
+    sigma_a = math.hypot(*stage.attitude.sigma) + added.euler_rad
+    sigma_u = math.hypot(*stage.ranging.sigma[1:]) + added.sight_rad
     sigma_r = float(stage.ranging.sigma[0])
-    pitch = min(turn_a + sigma_a, 0.5 * math.pi)
-    tilt = turn_a + sigma_a * math.sqrt(1.0 + math.sin(pitch))
-    arms = chord(turn_p) * antenna + chord(tilt) * difference
-    sight = _vector_distance(d, sigma_r, tilt + sigma_u)
+    turn_a = omega * (tau_s + added.attitude_s) + added.turn_rad
+    pitch = min(tilt_rad + turn_a + sigma_a, 0.5 * math.pi)
+    off = turn_a + sigma_a * math.sqrt(1.0 + math.sin(pitch))
     lever = turn_p * antenna + (turn_a + sigma_a) * difference
     across = d * (turn_a + sigma_a + sigma_u)
+    swing = omega * (tau_s + added.attitude_s)
     return StageBound(
-        bound_m=position + arms + sight,
+        bound_m=position
+        + arms
+        + chord(off) * difference
+        + _vector_distance(d, sigma_r, off + sigma_u),
         triangle_m=position + lever + across + sigma_r,
         lever_arm_m=lever,
-        arc_m=d * turn_a,
-        chord_m=d * chord(turn_a),
+        arc_m=d * swing,
+        chord_m=d * chord(swing),
         across_m=across,
         range_m=sigma_r,
+        tilt_m=d * sigma_a * (math.sqrt(1.0 + math.sin(min(tilt_rad, 0.5 * math.pi))) - 1.0),
     )
 
 
@@ -88,15 +118,26 @@ def _vector_distance(length: float, longer_by: float, angle_rad: float) -> float
 def chain_bounds(system: System, tau_s: float) -> tuple[StageBound, ...]:
     """Each stage's bound with every pair's relative shift at most tau plus what effects add."""
     extra, _ = known_effects.contributions(system)
+    tilt = system.horizon.tilt_rad
     return tuple(
-        stage_bound(
-            stage,
-            index == 0,
-            tau_s + pair_extra_s(system, index, "position", extra),
-            tau_s + pair_extra_s(system, index, "attitude", extra),
-        )
+        stage_bound(stage, index == 0, tau_s, tilt, _added(system, index, extra))
         for index, stage in enumerate(system.stages)
     )
+
+
+def _added(system: System, index: int, extra: ExtraTau) -> Added:
+    """The effects of one stage, summed; scattered Euler angles apart from fixed turns."""
+    turn = euler = sight = offset = 0.0
+    for one, what in known_effects.stage_contributions(system, index):
+        if one.effect.kind == "stochastic":
+            euler += what.turn_rad
+        else:
+            turn += what.turn_rad
+        sight += what.sight_rad
+        offset += what.systematic_m
+    position = pair_extra_s(system, index, "position", extra)
+    attitude = pair_extra_s(system, index, "attitude", extra)
+    return Added(position, attitude, turn, euler, sight, offset)
 
 
 def pair_extra_s(system: System, index: int, role: RoleName, extra: ExtraTau) -> float:
@@ -120,7 +161,6 @@ def references(system: System, tau_s: float) -> tuple[float, float, float]:
     Syncline is the paper's [eq:syncline], (sum of v + d w) tau + sensor errors.
     """
     extra, systematic = known_effects.contributions(system)
-    added = math.fsum(value for _, _, value in systematic)
     bounds = chain_bounds(system, tau_s)
     widest = max(
         pair_extra_s(system, index, role, extra)
@@ -132,7 +172,7 @@ def references(system: System, tau_s: float) -> tuple[float, float, float]:
         figures.sensor_error_m + figures.systematic_m + figures.sync_rate_mps * (tau_s + widest)
     )
     return (
-        math.fsum(part.bound_m for part in bounds) + added,
-        math.fsum(part.triangle_m for part in bounds) + added,
+        math.fsum(part.bound_m for part in bounds),
+        math.fsum(part.triangle_m for part in bounds),
         syncline,
     )

@@ -21,6 +21,7 @@ CAUSES = {
     "chord": "a turn moves the object along a chord, shorter than the Syncline's arc",
     "range_noise": "range noise acts along the line of sight, angular errors across it, so that "
     "they do not add up as in the Syncline",
+    "tilt": "on a tilted vehicle the noises of roll and yaw turn about axes no longer square",
 }
 
 
@@ -57,6 +58,7 @@ def _parts(system: System, found: WorstCase) -> list[tuple[float, str, str]]:
     lever = math.fsum(part.lever_arm_m for part in bounds) / whole
     bent = math.fsum(part.arc_m - part.chord_m for part in bounds) / whole
     lost = math.fsum(_lost_range(part) for part in bounds) / whole
+    leaning = math.fsum(part.tilt_m for part in bounds) / whole
     turn = max(stage.platform.omega_max_radps for stage in system.stages) * found.tau_s
     return [
         (lever, "lever_arm", f"{CAUSES['lever_arm']} (up to {100 * lever:.1f} %)"),
@@ -66,6 +68,7 @@ def _parts(system: System, found: WorstCase) -> list[tuple[float, str, str]]:
             f"{CAUSES['chord']} (a turn of {math.degrees(turn):.0f} deg, {100 * bent:.1f} %)",
         ),
         (lost, "range_noise", f"{CAUSES['range_noise']} ({100 * lost:.1f} %)"),
+        (leaning, "tilt", f"{CAUSES['tilt']} (up to {100 * leaning:.1f} %)"),
     ]
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from syncline_design.effects.base import Array, StageRows
-from syncline_design.simulate.chain import ConstantTwist, Noise
+from syncline_design.effects.base import Array
+from syncline_design.simulate.chain import Noise
 
 _SERIES_LIMIT = 1.0  # squared angle up to which the series is used
 _SERIES_ERROR = 1e-15  # relative size of the first term left out
@@ -260,42 +260,8 @@ def turn_columns(vector: Array, axis: int, sine: Array, cosine: Array) -> None:
     vector[i] = first
 
 
-def as_rows(draw: Draw) -> tuple[StageRows, ConstantTwist, Noise]:
-    """The same draw for the row-wise chain: (rows, motion, noise), arrays (n, ...)."""
-    count = draw.bearing.shape[1]
-    yaw = np.arctan2(draw.sin_yaw, draw.cos_yaw)
-    rotation = np.zeros((count, 3, 3))
-    rotation[:, 0, 0] = rotation[:, 1, 1] = draw.cos_yaw
-    rotation[:, 1, 0], rotation[:, 0, 1] = draw.sin_yaw, -draw.sin_yaw
-    rotation[:, 2, 2] = 1.0
-    azimuth = np.arctan2(draw.bearing[1], draw.bearing[0])
-    elevation = np.arctan2(-draw.bearing[2], np.hypot(draw.bearing[0], draw.bearing[1]))
-    antenna, ranging = (
-        np.broadcast_to(lever, (3, count)).T for lever in (draw.antenna_m, draw.ranging_m)
-    )
-    vector = draw.range_m * draw.bearing + ranging.T
-    target = np.einsum("nij,jn->ni", rotation, vector)
-    zero = np.zeros((count, 3))
-    velocity, rate = draw.velocity_mps.T, draw.rate_radps.T
-    rows = StageRows(
-        time_s=np.zeros(count),
-        position_m=zero,
-        rotation=rotation,
-        euler_rad=np.stack([np.zeros(count), np.zeros(count), yaw], axis=-1),
-        velocity_mps=velocity,
-        acceleration_mps2=np.cross(rate, velocity),
-        rate_radps=rate,
-        range_m=draw.range_m,
-        azimuth_rad=azimuth,
-        elevation_rad=elevation,
-        antenna_m=antenna,
-        ranging_m=ranging,
-        target_m=target,
-    )
-    return rows, ConstantTwist(rotation, velocity, rate), _noise_rows(draw)
-
-
-def _noise_rows(draw: Draw) -> Noise:
+def noise_rows(draw: Draw) -> Noise:
+    """The noise and timestamp errors of a draw, for the row-wise chain."""
     return Noise(
         position_m=draw.position_noise_m.T,
         attitude_rad=draw.angle_noise_rad[:3].T,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from syncline_design.effects.base import (
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.system import EffectEntry, RoleName, System
 from syncline_design.simulate import kernel
-from syncline_design.simulate.chain import stage_error
+from syncline_design.simulate.chain import Motion, Noise, stage_error
 from syncline_design.simulate.draws import arm_lengths
 from syncline_design.simulate.settings import SimulationError
+from syncline_design.simulate.surroundings import Moment, placed_rows
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +53,11 @@ def by_stage(system: System) -> ByStage:
         acting = Acting(known[entry.effect], entry.sensor, values)  # type: ignore[arg-type]
         found[entry.stage] = (*found.get(entry.stage, ()), acting)
     return found
+
+
+def tilts(system: System) -> bool:
+    """Whether some effect of the system acts by roll and pitch."""
+    return any(one.effect.tilted for acting in by_stage(system).values() for one in acting)
 
 
 def _demand_entry(
@@ -111,20 +117,53 @@ def departures(
     return total
 
 
-def drawn_error(
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What a stage hands on to the next one.
+
+    error_m (3, n): error of the object it georeferences, NED; ranging_shift_s (n,): what effects
+    add to mu of its ranging sensor, whose stamp the next stage's position carries.
+    """
+
+    error_m: Array
+    ranging_shift_s: Array
+
+
+def level_error(draw: kernel.Draw, before: Carried | None) -> Carried:
+    """Error of one stage where no stage has an effect: the fast kernel, level."""
+    error = kernel.stage_error(draw, None if before is None else before.error_m)
+    return Carried(error, _NO_SHIFT)
+
+
+def placed_error(
     draw: kernel.Draw,
+    around: tuple[Moment, Array],
     acting: tuple[Acting, ...],
     generator: np.random.Generator | None,
-    carried_m: Array | None,
-    systematic_only: bool = False,
-) -> Array:
-    """Error [m] of one stage, NED, (3, n): the fast kernel, or with effects the row-wise chain."""
-    if not acting:
-        return kernel.stage_error(draw, carried_m)
-    rows, motion, noise = kernel.as_rows(draw)
-    world = departures(acting, rows, generator, systematic_only)
-    carried = None if carried_m is None else carried_m.T
-    return np.ascontiguousarray(stage_error(rows, motion, noise, world, carried).T)
+    before: Carried | None,
+) -> Carried:
+    """Error of one stage at its moment and lean (roll, pitch), with effects: the row-wise chain."""
+    return moved_error(placed_rows(draw, *around), acting, generator, before)
+
+
+def moved_error(
+    rows: tuple[StageRows, Motion, Noise],
+    acting: tuple[Acting, ...],
+    generator: np.random.Generator | None,
+    before: Carried | None,
+) -> Carried:
+    """Error of one stage, row by row; without a generator stochastic effects do not act."""
+    state, motion, noise = rows
+    carried = None
+    if before is not None:
+        carried = before.error_m.T
+        noise = replace(noise, mu_position_s=noise.mu_position_s + before.ranging_shift_s)
+    world = departures(acting, state, generator, systematic_only=generator is None)
+    error = np.ascontiguousarray(stage_error(state, motion, noise, world, carried).T)
+    return Carried(error, world.ranging_shift_s)
+
+
+_NO_SHIFT = np.zeros(1)
 
 
 def basis_of(system: System, index: int) -> Basis:

@@ -21,10 +21,12 @@ from syncline_design.simulate.distribution import KEPT_VALUES, Binned, Values
 from syncline_design.simulate.draws import RandomSource, generator, stage_draw, timing_draws
 from syncline_design.simulate.kernel import norm
 from syncline_design.simulate.settings import SimulationSettings, demand_simulable
+from syncline_design.simulate.surroundings import moment_draw, tilt_draw
 from syncline_design.time_limit import in_force
 
 JOB = 16384  # samples: what a job works on stays in the second-level cache
 PLAIN_STREAM = 1  # first word of the stream key, see draws.generator
+EFFECTS_STREAM = 4  # apart, so that a spec with and without an effect shares its other numbers
 Consume = Callable[[int, Array], None]
 
 
@@ -34,16 +36,45 @@ def job_errors(system: System, settings: SimulationSettings, job: int) -> Array:
     if settings.envelope == "trajectory":
         from syncline_design.simulate.trajectory import trajectory_errors
 
-        return trajectory_errors(system, settings, stream, JOB)
+        apart = generator(settings.seed, EFFECTS_STREAM, job)
+        return trajectory_errors(system, settings, stream, apart, JOB)
+    if known_effects.by_stage(system):
+        return _errors_with_effects(system, settings, stream, job)
     source = RandomSource(stream, JOB)
-    acting = known_effects.by_stage(system)
     shifts = timing_draws(system, source)
-    carried: Array | None = None
+    carried: known_effects.Carried | None = None
+    for index in range(len(system.stages)):
+        draw = stage_draw(system, index, shifts, source, settings.envelope == "inside")
+        carried = known_effects.level_error(draw, carried)
+    assert carried is not None
+    return carried.error_m
+
+
+def _errors_with_effects(
+    system: System, settings: SimulationSettings, stream: np.random.Generator, job: int
+) -> Array:
+    """The same with known effects: times, places and tilts over the horizon."""
+    source = RandomSource(stream, JOB)
+    apart = generator(settings.seed, EFFECTS_STREAM, job)
+    around = RandomSource(apart, JOB)
+    acting = known_effects.by_stage(system)
+    moment = moment_draw(system.horizon, around)
+    shifts = timing_draws(system, source)
+    carried: known_effects.Carried | None = None
     for index, stage in enumerate(system.stages):
         draw = stage_draw(system, index, shifts, source, settings.envelope == "inside")
-        carried = known_effects.drawn_error(draw, acting.get(stage.name, ()), stream, carried)
+        where = (moment, lean_draw(system, around))
+        effects = acting.get(stage.name, ())
+        carried = known_effects.placed_error(draw, where, effects, apart, carried)
     assert carried is not None
-    return carried
+    return carried.error_m
+
+
+def lean_draw(system: System, source: RandomSource) -> Array:
+    """(roll, pitch) [rad] (2, n): level, unless an effect acts by tilt."""
+    if known_effects.tilts(system):
+        return tilt_draw(system.horizon, source)
+    return np.zeros((2, source.count))
 
 
 def sample_errors(system: System, settings: SimulationSettings) -> Array:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
@@ -91,11 +90,6 @@ def demand_simulable(system: System) -> None:
         _demand_roles(stage, index == 0, len(system.stages) > 1)
         for sensor in stage.sensors():
             _demand_sensor(stage, sensor)
-        if stage.ranging is not None:
-            for name, arm in _lever_arms(stage, index == 0):
-                path = f"stages.{stage.name}"
-                text = f"a {name} of at most the distance {stage.platform.distance_m:g} m"
-                _demand(arm <= stage.platform.distance_m, path, text, f"{arm:g} m")
     for timeline, error in system.clock_offsets:
         path = f"clock_offsets.{timeline}"
         _demand_distribution(path, error.distribution)
@@ -160,16 +154,3 @@ def _demand_distribution(path: str, distribution: Distribution) -> None:
 def _is_number(value: object) -> bool:
     real = isinstance(value, int | float) and not isinstance(value, bool)
     return real and math.isfinite(float(value))  # type: ignore[arg-type]
-
-
-def _lever_arms(stage: Stage, first: bool) -> Iterator[tuple[str, float]]:
-    """(what it is, length [m]) of each lever arm the simulator uses."""
-    given = stage.transponder_lever_arm_m
-    if first and stage.position is not None:
-        given = stage.position.lever_arm_m
-    if given is None:
-        yield "baseline (the position lever arm when none is given)", stage.platform.baseline_m
-    else:
-        yield "position lever arm", math.hypot(*given)
-    if stage.ranging is not None and stage.ranging.lever_arm_m is not None:
-        yield "ranging lever arm", math.hypot(*stage.ranging.lever_arm_m)

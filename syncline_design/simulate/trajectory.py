@@ -16,7 +16,7 @@ import csv
 import io
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -33,7 +33,6 @@ from syncline_design.simulate.chain import (
     euler_to_rotation,
     rotation_exp,
     rotation_to_euler,
-    stage_error,
 )
 from syncline_design.simulate.draws import (
     RandomSource,
@@ -50,6 +49,7 @@ from syncline_design.simulate.settings import (
     SimulationError,
     SimulationSettings,
 )
+from syncline_design.simulate.surroundings import Moment, moment_draw, on_the_level
 
 _FIGURE_EIGHT_RAD = 2.404825557695773  # first zero of the Bessel function J_0
 _KNOT_TURN_RAD = 0.01  # turn from knot to knot of a named manoeuvre
@@ -133,27 +133,46 @@ class Along:
 
 
 def trajectory_errors(
-    system: System, settings: SimulationSettings, stream: np.random.Generator, count: int
+    system: System,
+    settings: SimulationSettings,
+    stream: np.random.Generator,
+    apart: np.random.Generator,
+    count: int,
 ) -> Array:
-    """Errors [m] of the chain at `count` random moments, NED, (3, count)."""
+    """Errors [m] of the chain at `count` random moments, NED, (3, count).
+
+    apart: the stream of what effects draw.
+    """
     source = RandomSource(stream, count)
     shifts = timing_draws(system, source)
     acting = known_effects.by_stage(system)
+    mission = moment_draw(system.horizon, RandomSource(apart, count)) if acting else None
     moment = source.uniform(1)[0]
-    carried: Array | None = None
+    repeated = settings.trajectory is None or str(settings.trajectory) in MANOEUVRES
+    carried: known_effects.Carried | None = None
     for index, stage in enumerate(system.stages):
         track = _stage_track(system, settings, index)
         margin = time_margin_s(system)
         first, last = track.time_s[0] + margin, track.time_s[-1] - margin
         time_s = first + (last - first) * moment
         rows = _rows(stage, index == 0, track, time_s, source)
+        if mission is not None and repeated:
+            rows = _somewhere(rows, mission)
         noise = _noise(system, index, shifts, source)
-        world = known_effects.departures(acting.get(stage.name, ()), rows, stream)
-        carried = stage_error(rows, Along(track, time_s), noise, world, carried)
-        if settings.trajectory is None or str(settings.trajectory) in MANOEUVRES:
+        motion = Along(track, time_s)
+        effects = acting.get(stage.name, ())
+        carried = known_effects.moved_error((rows, motion, noise), effects, apart, carried)
+        if repeated:
             moment = source.uniform(1)[0]  # vehicles on manoeuvres of their own are not in step
     assert carried is not None
-    return np.ascontiguousarray(carried.T)
+    return carried.error_m
+
+
+def _somewhere(rows: StageRows, mission: Moment) -> StageRows:
+    """The rows of a manoeuvre that is repeated all through a mission and all over its extent."""
+    target = on_the_level(mission)
+    moved = rows.position_m + target - rows.target_m
+    return replace(rows, time_s=mission.elapsed_s, start_s=0.0, position_m=moved, target_m=target)
 
 
 def _rows(
@@ -192,6 +211,8 @@ def _rows(
         antenna_m=antenna,
         ranging_m=ranging,
         target_m=position + rotate(rotation, vector),
+        start_s=float(track.time_s[0]),
+        independent=True,
     )
 
 

@@ -15,10 +15,12 @@ from typing import Literal
 import numpy as np
 
 from syncline_design.effects.base import Array
+from syncline_design.horizon import Horizon
 from syncline_design.model.system import Stage, System
 from syncline_design.simulate import kernel, known_effects
 from syncline_design.simulate.bounds import references
 from syncline_design.simulate.draws import generator, lever_arms, position_lever_arm
+from syncline_design.simulate.surroundings import Moment, lean
 
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
 _STEP = 1e-6  # of the forward differences, in units of each block
@@ -42,10 +44,11 @@ class Block:
 class WorstCase:
     """The largest error found at relative shifts of at most tau_s.
 
-    value_m: |e| of the best directions found; bound_m: no directions give more; triangle_m: the
-    terms' sum, lever arms included; syncline_m: the Syncline at tau_s plus systematic terms.
-    gap: 1 - value / bound.  Known effects enter the bound with what they add to the budget, to
-    first order, and stochastic ones do not act here.
+    value_m: |e| of the best directions found; bound_m: nothing in the envelope that `bounds`
+    states gives more; triangle_m: the terms' sum, lever arms included; syncline_m: the Syncline at
+    tau_s plus systematic terms; tilt_rad: largest tilt searched and bounded.
+    gap: 1 - value / bound.  Stochastic effects do not act in the search; the bound holds them at
+    what the budget charges.
     """
 
     tau_s: float
@@ -53,6 +56,7 @@ class WorstCase:
     bound_m: float
     triangle_m: float
     syncline_m: float
+    tilt_rad: float
 
     @property
     def ratio(self) -> float:
@@ -67,27 +71,42 @@ class WorstCase:
         return 1.0 - self.value_m / self.bound_m if self.bound_m > 0.0 else 0.0
 
 
+_SYSTEM = -1  # the stage number of blocks that all stages share
+
+
+def _is_placed(system: System) -> bool:
+    """Whether heading, tilt, time or place can matter: else the fast level kernel will do."""
+    aimed = any(stage.ranging is not None for stage in system.stages)
+    return bool(system.effects) or (aimed and system.horizon.tilt_rad > 0.0)
+
+
 def blocks(system: System) -> tuple[Block, ...]:
-    """What may be chosen, stage by stage."""
+    """What may be chosen: once for the system when and where, then stage by stage."""
     found: list[Block] = []
     start = 0
+    kinds: list[tuple[int, str, Kind, int]] = []
+    if system.effects:
+        kinds = [(_SYSTEM, "time", "ball", 1), (_SYSTEM, "place", "ball", 2)]
     for index, stage in enumerate(system.stages):
-        for name, kind, size in _stage_blocks(stage, index):
-            found.append(Block(index, name, kind, slice(start, start + size)))
-            start += size
+        kinds += [(index, *one) for one in _stage_blocks(stage, index, _is_placed(system))]
+    for index, name, kind, size in kinds:
+        found.append(Block(index, name, kind, slice(start, start + size)))
+        start += size
     return tuple(found)
 
 
-def _stage_blocks(stage: Stage, index: int) -> list[tuple[str, Kind, int]]:
+def _stage_blocks(stage: Stage, index: int, placed: bool) -> list[tuple[str, Kind, int]]:
     found: list[tuple[str, Kind, int]] = [
         ("velocity", "ball", 3),
         ("rate", "ball", 3),
         ("position_shift", "ball", 1),
     ]
+    if placed:
+        found.append(("lean", "ball", 2))
+    if placed or index > 0:  # a level vehicle alone errs alike in every heading
+        found.append(("yaw", "sphere", 2))
     if index == 0:
         found.append(("position_noise", "ball", 3))
-    else:
-        found.append(("yaw", "sphere", 2))
     if position_lever_arm(stage, index == 0) is None:
         found.append(("lever_arm", "sphere", 3))
     if stage.ranging is not None:
@@ -122,7 +141,7 @@ def worst_cases(
     value = search.ascend(search.starting_points(seed), enough, settled, iterations)
     best = value.reshape(-1, starts).max(axis=1)
     return tuple(
-        WorstCase(float(tau), float(found), *reference)
+        WorstCase(float(tau), float(found), *reference, system.horizon.tilt_rad)
         for tau, found, reference in zip(taus, best, figures, strict=True)
     )
 
@@ -136,18 +155,29 @@ class _Search:
         self.starts = starts
         self.blocks = blocks(system)
         self.acting = known_effects.by_stage(system)
+        self.placed = _is_placed(system)
         self.size = self.blocks[-1].rows.stop
 
     def error_m(self, point: Array, tau_s: Array) -> Array:
         """|e| [m] of points (p, n) at tau (n,)."""
-        carried: Array | None = None
+        carried: known_effects.Carried | None = None
+        moment = None
+        if self.placed:
+            moment = _moment(self.system.horizon, self._chosen(point, _SYSTEM), tau_s.shape[0])
         for index, stage in enumerate(self.system.stages):
-            chosen = {b.name: point[b.rows] for b in self.blocks if b.stage == index}
+            chosen = self._chosen(point, index)
             draw = _bounded_draw(stage, index == 0, chosen, tau_s)
+            if moment is None:
+                carried = known_effects.level_error(draw, carried)
+                continue
+            where = (moment, _leaning(self.system.horizon, chosen["lean"]))
             acting = self.acting.get(stage.name, ())
-            carried = known_effects.drawn_error(draw, acting, None, carried, systematic_only=True)
+            carried = known_effects.placed_error(draw, where, acting, None, carried)
         assert carried is not None
-        return kernel.norm(carried)
+        return kernel.norm(carried.error_m)
+
+    def _chosen(self, point: Array, stage: int) -> dict[str, Array]:
+        return {b.name: point[b.rows] for b in self.blocks if b.stage == stage}
 
     def starting_points(self, seed: int) -> Array:
         """(p, n): directions at random, every second start with its terms lined up.
@@ -261,6 +291,22 @@ class _Search:
             scaled = slope[block.rows] / np.where(felt, length, 1.0)
             target[block.rows] = np.where(felt, scaled, point[block.rows])
         return target
+
+
+def _moment(horizon: Horizon, chosen: Mapping[str, Array], count: int) -> Moment:
+    """When and where: the unit interval and disc stretched to the horizon."""
+    time, place = chosen.get("time"), chosen.get("place")
+    if time is None or place is None:
+        return Moment(np.zeros(count), np.zeros((2, count)))
+    return Moment(horizon.duration_s * 0.5 * (1.0 + time[0]), horizon.extent_m * place)
+
+
+def _leaning(horizon: Horizon, disc: Array) -> Array:
+    """(roll, pitch) [rad] (2, n) of points of the unit disc: as far out, as steep."""
+    length = np.sqrt(disc[0] ** 2 + disc[1] ** 2)
+    along, across = disc / np.where(length > 0.0, length, 1.0)
+    tilt = horizon.tilt_rad * np.minimum(length, 1.0)
+    return lean(np.sin(tilt), np.cos(tilt), along, across)
 
 
 def _bounded_draw(
