@@ -7,8 +7,10 @@ fails here until it has one.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +21,8 @@ from syncline_design.effects import registry
 from syncline_design.effects.base import Array
 from syncline_design.horizon import Horizon
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
-from syncline_design.simulate import SimulationSettings, sample_errors
+from syncline_design.simulate import SimulationSettings, cross_check, sample_errors
+from syncline_design.simulate.known_effects import contributions
 from syncline_design.simulate.sampling import JOB
 from syncline_design.timing import NO_ERROR
 
@@ -183,6 +186,39 @@ CASES: dict[tuple[str, str], Case] = {
 }  # fmt: skip
 
 
+def bent_by_sound(error: float) -> Oracle:
+    """Range and sine off the array's normal (along down) times 1 + error, |sin el| uniform."""
+    height = (np.arange(100_000) + 0.5) / 100_000
+    elevation = np.arcsin(height)
+    seen = np.arccos(np.minimum(np.cos(elevation) * (1.0 + error), 1.0))
+    along = (1.0 + error) * np.stack([np.cos(seen), np.sin(seen)])
+    moved = np.sort(D * np.linalg.norm(along - [np.cos(elevation), np.sin(elevation)], axis=0))
+    return lambda x: float(np.searchsorted(moved, x) / moved.size)
+
+
+def student_with_outliers(x: float) -> float:
+    """|N| of 3 axes at 2 cm: Student's t of 4 degrees of freedom; in 10 % normal at 20 cm."""
+    tail = float(stats.f(3, 4.0).cdf((x / 0.02) ** 2 / 3.0))
+    return 0.9 * tail + 0.1 * float(stats.chi(3).cdf(x / 0.2))
+
+
+CASES |= {
+    ("sound_speed", "ranging"): ({"relative_error": -0.01}, STRAIGHT, bent_by_sound(-0.01)),
+    ("heavy_tails", "position"): (
+        {"degrees_of_freedom": 4.0, "outlier_rate": 0.1}, NOISY, student_with_outliers
+    ),
+}  # fmt: skip
+
+
+def rms_of_bend() -> float:
+    """C f, f = a - g u: E a_i^2 = (2/9) (v w)^2, E u_z^2 = (1 + c + c^2) / 3, c = cos(tilt)."""
+    c = math.cos(TILT)
+    down = (1.0 + c + c * c) / 3.0
+    push, pull = 2.0 / 9.0 * (V * W) ** 2, 9.80665**2
+    side = push + pull * 0.5 * (1.0 - down)
+    return math.sqrt((0.02**2 + 0.01**2) * side + 0.03**2 * (push + pull * down))
+
+
 def rms_of_tilt() -> float:
     """gain |z x a / g x q|, a = w x v, all isotropic: three factors sqrt(2/3)."""
     return 0.01 * D * V * W / 9.80665 * math.sqrt(8.0 / 27.0)
@@ -196,6 +232,7 @@ def rms_of_enu() -> float:
 MOVING = {"v": V, "w": W}
 RMS_CASES: dict[tuple[str, str], tuple[dict[str, float | str], dict[str, object], float]] = {
     ("acceleration_tilt", "attitude"): ({"gain": 0.01}, MOVING, rms_of_tilt()),
+    ("flexure", "ranging"): ({"x": 0.02, "y": -0.01, "z": 0.03}, MOVING, rms_of_bend()),
     ("frame_convention", "position"): ({"convention": "enu"}, STRAIGHT, rms_of_enu()),
 }
 
@@ -239,3 +276,72 @@ def test_the_monte_carlo_has_the_effect_s_rms(pair: tuple[str, str]) -> None:
 def test_every_effect_has_an_oracle() -> None:
     known = {(e.name, sensor) for e in registry().values() for sensor in e.sensors}
     assert known == set(CASES) | set(RMS_CASES)
+
+
+def test_inside_the_limits_speed_is_a_factor_of_what_motion_carries() -> None:
+    """Speed uniform below v: V U rate T U' has P = z (1 - ln z); a grid does not mind the speed."""
+    drift = made("clock_drift", "position", {"rate": 1e-4}, STRAIGHT)
+    top = V * 1e-4 * T
+    agrees(
+        lengths(drift, "inside"), lambda x: min(x / top, 1.0) * (1 - math.log(min(x / top, 1.0)))
+    )
+    grid = made("grid_scale", "target", {"scale": 1e-3}, STRAIGHT)
+    agrees(lengths(grid, "inside"), lambda x: min(x / (1e-3 * EXTENT), 1.0) ** 2)
+
+
+def test_intervals_of_slow_noise_hold_what_they_promise() -> None:
+    """95 % intervals of the 0.95 quantile, 60 seeds: fewer than 50 of 60 is one in 30 000."""
+    slow = made("correlated_noise", "position", {"std_m": 0.3, "time_constant_s": 60.0}, STRAIGHT)
+    truth = 0.3 * float(stats.chi(3).ppf(0.95))
+    held = 0
+    for seed in range(60):
+        found = cross_check(slow, SimulationSettings(samples=2000, seed=seed)).quantile(0.95)
+        held += found.low_m <= truth <= found.high_m
+    assert held >= 50
+
+
+def test_a_late_ranging_sensor_is_late_for_the_stage_it_carries() -> None:
+    """A vessel at rest, its USBL 0.2 s old: the AUV's fix is 0.2 s behind at 2 m/s."""
+    (vessel,) = made("latency", "ranging", {"latency_s": 0.2}, {"v": 0.0, "w": 0.0}).stages
+    (carried,) = made("latency", "ranging", {"latency_s": 0.2}, {"v": 2.0, "w": 0.0}).stages
+    carried = dataclasses.replace(carried, name="auv", vehicle="auv", position=None)
+    entry = EffectEntry("latency", "ranging", "boat", (("latency_s", 0.2),))
+    chain = System((vessel, carried), effects=(entry,), horizon=HORIZON)
+    for envelope in ("limits", "trajectory"):
+        settings = SimulationSettings(samples=500, envelope=envelope, trajectory=None)
+        found = np.linalg.norm(sample_errors(chain, settings), axis=1)
+        np.testing.assert_allclose(found, 0.4, rtol=1e-9)
+    assert contributions(chain)[0] == {("boat", "ranging"): 0.2}
+
+
+def test_along_a_file_time_counts_from_its_start(tmp_path: Path) -> None:
+    """Due north at 10 m/s, stamps from 5 000 s on for 100 s: the lag is v rate (t - 5 000)."""
+    lines = ["time_s,position_north_m,position_east_m,position_down_m,roll_deg,pitch_deg,yaw_deg"]
+    lines += [f"{5000 + k},{10 * k},0,0,0,0,0" for k in range(101)]
+    path = tmp_path / "north.csv"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    drift = made("clock_drift", "position", {"rate": 1e-3}, STRAIGHT)
+    settings = SimulationSettings(samples=SAMPLES, envelope="trajectory", trajectory=path)
+    agrees(np.linalg.norm(sample_errors(drift, settings), axis=1), uniform(10.0 * 1e-3 * 100.0))
+
+
+def test_a_manoeuvre_is_repeated_all_through_the_mission_and_its_extent() -> None:
+    settings = SimulationSettings(samples=SAMPLES, envelope="trajectory", trajectory="straight")
+    for effect, sensor, values in (
+        ("clock_drift", "position", {"rate": 1e-4}),
+        ("grid_scale", "target", {"scale": 1e-3}),
+        ("correlated_noise", "position", {"std_m": 0.3, "time_constant_s": 60.0}),
+    ):
+        found = np.linalg.norm(
+            sample_errors(made(effect, sensor, values, STRAIGHT), settings), axis=1
+        )
+        agrees(found, CASES[effect, sensor][2])
+
+
+def test_an_effect_leaves_the_other_random_numbers_alone() -> None:
+    """The same noise with an effect of no size: sample by sample."""
+    noise = {"position": (0.02, 0.03, 0.05), "attitude": (1e-3,) * 3, "ranging": (0.03, 1e-3, 1e-3)}
+    still = system("range_bias", "ranging", {"bias_m": 0.0}, V, W, **noise)
+    settings = SimulationSettings(samples=3000, seed=3)
+    plain = sample_errors(dataclasses.replace(still, effects=()), settings)
+    np.testing.assert_allclose(sample_errors(still, settings), plain, atol=1e-12)

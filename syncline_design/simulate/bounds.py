@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from syncline_design.model.budget import budget
+from syncline_design.model.pairing import distance_m
 from syncline_design.model.system import RoleName, Stage, System
 from syncline_design.simulate import known_effects
 from syncline_design.simulate.draws import arm_lengths
@@ -126,7 +127,13 @@ def chain_bounds(system: System, tau_s: float) -> tuple[StageBound, ...]:
 
 
 def _added(system: System, index: int, extra: ExtraTau) -> Added:
-    """The effects of one stage, summed; scattered Euler angles apart from fixed turns."""
+    """The effects of one stage, summed; scattered Euler angles apart from fixed turns.
+
+    What moves the measured object at d moves it by a share sigma_r / d more with range noise.
+    """
+    stage = system.stages[index]
+    d = distance_m(stage)
+    stretched = stage.ranging.sigma[0] / d if stage.ranging is not None and d > 0.0 else 0.0
     turn = euler = sight = offset = 0.0
     for one, what in known_effects.stage_contributions(system, index):
         if one.effect.kind == "stochastic":
@@ -134,7 +141,7 @@ def _added(system: System, index: int, extra: ExtraTau) -> Added:
         else:
             turn += what.turn_rad
         sight += what.sight_rad
-        offset += what.systematic_m
+        offset += what.systematic_m * (1.0 + stretched if one.sensor == "ranging" else 1.0)
     position = pair_extra_s(system, index, "position", extra)
     attitude = pair_extra_s(system, index, "attitude", extra)
     return Added(position, attitude, turn, euler, sight, offset)
