@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from syncline_design.loading import LoadedSpec
@@ -17,10 +18,11 @@ Json = dict[str, Any]
 def cautions(
     loaded: LoadedSpec, verified: Verified, assumed: Sequence[Mapping[str, Any]]
 ) -> list[Json]:
-    """The `warnings` of a verdict: a code to filter by, a sentence to read."""
+    """The `warnings` of a verdict: a code to filter by, a sentence to read, what it is about."""
     return [
-        {"code": code, "message": message}
-        for code, message in (
+        caution.to_json()
+        for caution in (
+            *_worst_case(verified),
             *_lever_arm(verified),
             *_clocks(loaded, verified),
             *_waivers(verified),
@@ -30,7 +32,21 @@ def cautions(
     ]
 
 
-Caution = tuple[str, str]
+@dataclass(frozen=True, slots=True)
+class Caution:
+    """One warning; entry: of a catalog; key: its figure; requirement: an id of the spec."""
+
+    code: str
+    message: str
+    entry: str = ""
+    key: str = ""
+    requirement: str = ""
+
+    def to_json(self) -> Json:
+        """The entry under `warnings`; what it is not about is left out."""
+        about = {"entry": self.entry, "key": self.key, "requirement": self.requirement}
+        named = {name: text for name, text in about.items() if text}
+        return {"code": self.code, "message": self.message} | named
 
 
 def _time(value: float) -> str:
@@ -41,6 +57,23 @@ def _length(value: float) -> str:
     return format_quantity(value, Dimension.LENGTH)
 
 
+def _worst_case(verified: Verified) -> Iterator[Caution]:
+    """A design that meets its tightest accuracy limit while its worst case exceeds it."""
+    accuracy = [row for row in verified.requirements if row.kind == "accuracy"]
+    if verified.monte_carlo is None or not accuracy:
+        return
+    tightest = min(accuracy, key=lambda row: row.limit)
+    worst = verified.monte_carlo.worst_case
+    if tightest.status == "pass" and worst.value_m > tightest.limit:
+        yield Caution(
+            "worst-case-above-limit",
+            f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet with every sensor "
+            f"at one sigma and relative shifts up to {_time(worst.tau_s)} the worst case found is "
+            f"{_length(worst.value_m)}: the Syncline leaves out what lever arms and tilt add",
+            requirement=tightest.id,
+        )
+
+
 def _lever_arm(verified: Verified) -> Iterator[Caution]:
     """Where leaving the lever arm out, as the paper does, is optimistic by more than 10 %."""
     figures = verified.figures
@@ -48,7 +81,7 @@ def _lever_arm(verified: Verified) -> Iterator[Caution]:
         if differs(row.tau_crit_s, row.tau_crit_lever_arm_s):
             ratio = row.tau_crit_s / row.tau_crit_lever_arm_s
             broken = " and is exceeded" if not row.tau_s < row.tau_crit_lever_arm_s else ""
-            yield (
+            yield Caution(
                 "lever-arm",
                 f"{row.stage}.{row.role}: with the lever arm, tau_crit is "
                 f"{_time(row.tau_crit_lever_arm_s)} instead of {_time(row.tau_crit_s)} "
@@ -56,7 +89,7 @@ def _lever_arm(verified: Verified) -> Iterator[Caution]:
             )
     lever = figures.lever_arm
     if differs(figures.total_m, lever.total_m):
-        yield (
+        yield Caution(
             "lever-arm",
             f"with lever arms the total error is {_length(lever.total_m)} instead of "
             f"{_length(figures.total_m)}",
@@ -69,7 +102,7 @@ def _clocks(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
     timed = {stage.vehicle_name for stage in loaded.spec.stages if stage.clock is not None}
     silent = sorted(vehicles - timed)
     if len(vehicles) > 1 and silent:
-        yield (
+        yield Caution(
             "common-clock",
             f"the clocks of {', '.join(sorted(vehicles))} are taken as common because "
             f"{', '.join(silent)} gives no `clock`; across vehicles without a common clock "
@@ -81,7 +114,7 @@ def _clocks(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
             continue
         if stage.ranging is None:
             if stage.position is not None and stage.position.timeline != UTC:
-                yield (
+                yield Caution(
                     "common-clock",
                     f"{stage.name} is stamped on the host clock and held against true time, and "
                     "no `clock` says how far these are apart: the offset is taken as 0",
@@ -89,7 +122,7 @@ def _clocks(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
             continue
         lines = {"utc" if s.timeline == UTC else "host" for s in stage.sensors()}
         if len(lines) > 1:
-            yield (
+            yield Caution(
                 "common-clock",
                 f"{stage.name} has sensors on the host clock and on UTC, and no `clock` says how "
                 "far these are apart: the offset is taken as 0",
@@ -100,15 +133,16 @@ def _waivers(verified: Verified) -> Iterator[Caution]:
     for row in verified.requirements:
         if row.waiver is not None:
             state = "expired on" if row.waiver["expired"] else "in force until"
-            yield (
+            yield Caution(
                 "waiver",
                 f"{row.id}: waiver {state} {row.waiver['expires']}: {row.waiver['reason']}",
+                requirement=row.id,
             )
 
 
 def _simulation(verified: Verified) -> Iterator[Caution]:
     if verified.monte_carlo is None:
-        yield "no-monte-carlo", f"no Monte Carlo cross-check: {verified.trouble}"
+        yield Caution("no-monte-carlo", f"no Monte Carlo cross-check: {verified.trouble}")
 
 
 def _assumptions(assumed: Sequence[Mapping[str, Any]]) -> Iterator[Caution]:
@@ -117,4 +151,5 @@ def _assumptions(assumed: Sequence[Mapping[str, Any]]) -> Iterator[Caution]:
     for one in assumed:
         by_entry.setdefault(str(one["entry"]), []).append(str(one["figure"]))
     for entry, figures in by_entry.items():
-        yield "assumption", f"assumption, no public source: {', '.join(figures)} of {entry}"
+        message = f"assumption, no public source: {', '.join(figures)} of {entry}"
+        yield Caution("assumption", message, entry=entry, key=", ".join(figures))

@@ -41,7 +41,7 @@ from syncline_design.simulate.sampling import error_distribution, job_errors
 from syncline_design.simulate.worst_case import WorstCase
 from tests.simulation_systems import DEG, fixed_wing, survey
 
-UNUSED = WorstCase(0.0, 1.0, 1.0, 1.0, 1.0)
+UNUSED = WorstCase(0.0, 1.0, 1.0, 1.0, 1.0, 0.0)
 
 
 def test_normal_quantile_against_mpmath() -> None:

@@ -6,8 +6,10 @@ import math
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from textwrap import wrap
 from typing import Any
 
+from syncline_design.horizon import duration_words
 from syncline_design.report.text import visible
 from syncline_design.units import Dimension, format_quantity
 
@@ -225,6 +227,19 @@ def _syncline(data: Data) -> list[str]:
         f" sync rate {format_quantity(s['sync_rate_mps'], Dimension.SPEED)}",
         f"  {other} model: {_length(s['models'][other]['total_m'])};"
         f" with lever arms: {_length(lever['total_m'])}, tau_crit {_time(lever['tau_crit_s'])}",
+        *horizon_line(data),
+    ]
+
+
+def horizon_line(data: Data) -> list[str]:
+    """What drifts, grids and heave are charged for."""
+    horizon = data.get("horizon")
+    if not horizon:
+        return []
+    return [
+        f"  horizon {duration_words(horizon['duration_s'])}, extent {_length(horizon['extent_m'])},"
+        f" tilt {format_quantity(horizon['tilt_rad'], Dimension.ANGLE)}: what drifts, grids and heave are"
+        " charged for"
     ]
 
 
@@ -264,13 +279,29 @@ def _monte_carlo(data: Data) -> list[str]:
     if worst:
         ratio = f"{worst['ratio_to_syncline']:.4f} of the Syncline"
         if worst.get("bound_m") is not None:
-            ratio += f"; upper bound {_length(worst['bound_m'])}"
+            ratio += f"; upper bound {_length(worst['bound_m'])}{_tilt(worst)}"
         rows.append(["worst case, directions free", _length(worst["value_m"]), ratio])
-    return [*lines, *table(rows)]
+    lines += table(rows)
+    text = (mc.get("ensemble") or {}).get("text")
+    return (
+        [*lines, *wrap(f"{text}", 96, initial_indent="  ", subsequent_indent="  ")]
+        if text
+        else lines
+    )
+
+
+def _tilt(worst: Data) -> str:
+    """Where the bound holds, as far as the reader may not expect it."""
+    envelope = (worst.get("certificate") or {}).get("envelope")
+    if envelope is None:
+        return ""
+    return f" at tilts up to {format_quantity(envelope['tilt_rad'], Dimension.ANGLE)}"
 
 
 def _warnings(data: Data) -> list[str]:
-    lines = [f"  ! {visible(w['message'])}" for w in data.get("warnings", ())]
+    lines = [
+        f"  ! {visible(w['message'])} [{visible(w['code'])}]" for w in data.get("warnings", ())
+    ]
     return ["Warnings", *lines] if lines else []
 
 

@@ -13,7 +13,7 @@ from syncline_design.report.text import spreadsheet_safe
 from syncline_design.report.verdict_words import Json, items
 
 _COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value", "limit", "unit",
-            "margin", "line")  # fmt: skip
+            "margin", "line", "warnings")  # fmt: skip
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
@@ -45,5 +45,12 @@ def render_csv(verdicts: Sequence[Json]) -> str:
         head = {"spec": spec_name(verdict), "file": spec_file(verdict),
                 "verdict": verdict.get("verdict")}  # fmt: skip
         found = items(verdict, "requirements")
-        rows += [{**row, **head, "requirement": row.get("id")} for row in found] or [head]
+        rows += [{**row, **head, **_about(verdict, row)} for row in found] or [head]
     return csv_text(_COLUMNS, rows)
+
+
+def _about(verdict: Json, row: Json) -> dict[str, Any]:
+    """A requirement's id, and the codes of the warnings about it."""
+    name = row.get("id")
+    found = [w for w in items(verdict, "warnings") if name and w.get("requirement") == name]
+    return {"requirement": name, "warnings": " ".join(str(w.get("code")) for w in found)}

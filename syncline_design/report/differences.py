@@ -56,7 +56,7 @@ def effect_words(data: Json) -> str:
     error = numbers.finite(part(data, "error").get("change"))
     if error and abs(error) > 1e-12:
         word = "larger" if error > 0 else "smaller"
-        parts.append(f"worst-case error {numbers.length(abs(error))} {word}")
+        parts.append(f"Syncline error {numbers.length(abs(error))} {word}")
     if not _has_designs(data):
         parts = []
     return ", ".join([*parts, _verdict_words(part(data, "verdict"))])
@@ -154,7 +154,7 @@ def _sums(data: Json) -> Iterator[str]:
 def sum_name(entry: Json) -> str:
     """The word for one of the sums."""
     name = str(entry.get("name"))
-    return "worst-case error" if name == "error" else name
+    return "Syncline error" if name == "error" else name
 
 
 def _margins(data: Json) -> Iterator[str]:

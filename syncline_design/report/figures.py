@@ -179,7 +179,7 @@ def _syncline_labels(axes: Axes) -> None:
     axes.set_ylabel("accuracy 1/error [1/m]")
     scales.grid(axes)
     scales.inverse_axis(axes, "x", "timestamp error \u03c4", scales.short_time)
-    scales.inverse_axis(axes, "y", "worst-case error", scales.short_length)
+    scales.inverse_axis(axes, "y", "Syncline error", scales.short_length)
 
 
 def _describe(curve: SynclineCurve) -> str:

@@ -93,7 +93,7 @@ def _ticks(axes: Axes) -> None:
     axes.set_ylabel("accuracy 1/error [1/m]", color=INK)
     scales.grid(axes)
     scales.inverse_axis(axes, "x", "timestamp error \u03c4", scales.short_time)
-    scales.inverse_axis(axes, "y", "worst-case error", scales.short_length)
+    scales.inverse_axis(axes, "y", "Syncline error", scales.short_length)
     axes.tick_params(colors=MUTED, labelcolor=INK)
 
 

@@ -183,7 +183,7 @@ def pareto_front(
         scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
         _money_ticks(axes)
         axes.set_xlabel(f"cost [{currency}]")
-        axes.set_ylabel("worst-case error (Syncline)")
+        axes.set_ylabel("Syncline error")
         scales.grid(axes)
 
     title = "Pareto front of cost against error"

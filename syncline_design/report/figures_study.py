@@ -123,7 +123,7 @@ def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts")
         scales.grid(axes)
         _count_axis(axes)
         axes.set_xlabel(f"cost [{currency}]")
-        axes.set_ylabel("worst-case error (Syncline)")
+        axes.set_ylabel("Syncline error")
         figure.legend(loc="outside lower left", ncols=1, fontsize=9)
 
     errors = [error for front in shown for _, error in front.points]

@@ -59,8 +59,8 @@ def findings(verdict: Json) -> list[Finding]:
     if verdict.get("verdict") in ("infeasible", "indeterminate") and not found_failure(found):
         found.insert(0, _no_design(verdict, file))
     found += [
-        Finding("warning", str(entry.get("code") or "warning"), "", file, _place(entry, "line"),
-                _place(entry, "column"), str(entry.get("message")))
+        Finding("warning", str(entry.get("code") or "warning"), "", file,
+                *_about(entry, rows), str(entry.get("message")))
         for entry in items(verdict, "warnings")
     ]  # fmt: skip
     return found
@@ -74,6 +74,14 @@ def found_failure(found: list[Finding]) -> bool:
 def _place(entry: Json, key: str) -> int:
     value = numbers.finite(entry.get(key))
     return 1 if value is None or value < 1 else int(value)
+
+
+def _about(entry: Json, requirements: list[Json]) -> tuple[int, int]:
+    """Line and column of a warning: its own, else those of the requirement it is about."""
+    named = entry.get("requirement")
+    at = next((row for row in requirements if named and row.get("id") == named), entry)
+    at = entry if entry.get("line") is not None else at
+    return _place(at, "line"), _place(at, "column")
 
 
 def _problem(entry: Json, file: str) -> Finding:
@@ -127,7 +135,7 @@ def _fixes(verdict: Json) -> str:
 
 
 def requirement_sentence(row: Json) -> str:
-    """`ACC-1: worst-case error (Syncline) 93.9 mm exceeds its limit 50 mm (87.8 % over)`."""
+    """`ACC-1: Syncline error 93.9 mm exceeds its limit 50 mm (87.8 % over)`."""
     status = str(row.get("status"))
     limit = value_text(row, "limit")
     if row.get("kind") == "feasible" and status == "fail":

@@ -43,7 +43,7 @@ def _suite(verdict: Json) -> ElementTree.Element:
     for finding in cases:
         suite.append(_case(finding, spec_file(verdict)))
     lines = [outcome(verdict).word]
-    lines += [f"warning: {visible(f.message)}" for f in found if f.level == "warning"]
+    lines += [f"warning [{f.rule}]: {visible(f.message)}" for f in found if f.level == "warning"]
     ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)
     return suite
 

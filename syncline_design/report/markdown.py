@@ -31,8 +31,25 @@ def _one(verdict: Json) -> str:
     if next(verdict_tables.roles(verdict), None) is not None:
         lines.append(markdown_table(verdict_tables.payload(verdict)))
         lines.append(markdown_table(verdict_tables.taus(verdict)))
-    lines += [f"- Warning: {markdown_safe(w.get('message'))}" for w in items(verdict, "warnings")]
+    lines += [f"- {markdown_safe(text)}" for text in _simulated_over(verdict)]
+    for entry in items(verdict, "warnings"):
+        code = markdown_safe(entry.get("code") or "warning")
+        lines.append(f"- Warning ({code}): {markdown_safe(entry.get('message'))}")
     return "\n".join(lines).rstrip() + "\n"
+
+
+def _simulated_over(verdict: Json) -> list[str]:
+    """The horizon, and over what the simulated quantiles run."""
+    found = []
+    if horizon := part(verdict, "horizon"):
+        found.append(f"Horizon: {numbers.horizon(horizon)}")
+    monte_carlo = part(verdict, "monte_carlo")
+    if text := part(monte_carlo, "ensemble").get("text"):
+        found.append(f"Monte Carlo: {text}")
+    certificate = part(part(monte_carlo, "worst_case"), "certificate")
+    if text := certificate.get("text"):
+        found.append(f"Worst case: {text}")
+    return found
 
 
 def _price(verdict: Json) -> str:
@@ -42,7 +59,7 @@ def _price(verdict: Json) -> str:
     if cost is not None:
         facts.append(f"**Price** {numbers.money(cost, verdict_tables.currency_of(verdict))}")
     if total is not None:
-        facts.append(f"**worst-case error** {numbers.length(total)}")
+        facts.append(f"**Syncline error** {numbers.length(total)}")
     return (", ".join(facts) + "\n") if facts else ""
 
 

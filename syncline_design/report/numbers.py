@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any, Final
 
 from syncline_design import estimates
+from syncline_design.horizon import duration_words
 from syncline_design.units import Dimension, format_quantity
 
 MISSING: Final = "\N{EM DASH}"
@@ -45,6 +47,13 @@ def time(value: Any, digits: int = 4) -> str:
     return _shown(value, Dimension.TIME, digits)
 
 
+def horizon(entry: Mapping[str, Any]) -> str:
+    """`1 h, extent 1 km, tilt 10 deg`."""
+    duration = finite(entry.get("duration_s"))
+    shown = MISSING if duration is None else duration_words(duration)
+    return f"{shown}, extent {length(entry.get('extent_m'))}, tilt {angle(entry.get('tilt_rad'))}"
+
+
 def time_limit(value: Any, digits: int = 4) -> str:
     """A tau_crit: null means that motion does not matter, so nothing limits it."""
     return "unlimited" if value is None or value == math.inf else time(value, digits)
@@ -53,6 +62,11 @@ def time_limit(value: Any, digits: int = 4) -> str:
 def speed(value: Any, digits: int = 4) -> str:
     """Metres per second."""
     return _shown(value, Dimension.SPEED, digits)
+
+
+def angle(value: Any, digits: int = 4) -> str:
+    """Radians, shown in degrees."""
+    return _shown(value, Dimension.ANGLE, digits)
 
 
 def angular_rate(value: Any, digits: int = 4) -> str:

@@ -64,5 +64,5 @@ def _overview(verdicts: Sequence[Json]) -> Table:
             numbers.MISSING if tight is None
             else f"{verdict_words.margin_text(tight)} ({tight.get('id')})",
         ))  # fmt: skip
-    heads = ("Spec", "Verdict", "Price #", "Worst-case error #", "Tightest margin")
+    heads = ("Spec", "Verdict", "Price #", "Syncline error #", "Tightest margin")
     return table("Verdicts", heads, rows)

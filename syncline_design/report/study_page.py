@@ -166,7 +166,7 @@ def _case_table(summary: Summary, currency: str) -> Table:
         ])  # fmt: skip
     keys = [factor.key for _, factor in several] if len(several) <= MOST_KEYS else ["Setting"]
     varying = [*(["Base"] if many else []), *keys]
-    ends = ["Verdict", "Price #", "Worst-case error #", "Payload, or why there is none"]
+    ends = ["Verdict", "Price #", "Syncline error #", "Payload, or why there is none"]
     heads = ["Case #", *varying, *ends]
     more = len(summary.briefs) - MOST_CASES
     note = f"{more} further cases are in the CSV and Parquet tables." if more > 0 else ""

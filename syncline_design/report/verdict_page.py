@@ -146,7 +146,7 @@ def _key_facts(verdict: Json) -> list[tuple[str, str]]:
     if syncline.get("total_m") is not None:
         total = numbers.length(syncline["total_m"])
         of = f" of {numbers.length(target)}" if target else ""
-        facts.append(("Worst-case error", total + of))
+        facts.append(("Syncline error", total + of))
     row = verdict_words.tightest(items(verdict, "requirements"))
     if row is not None:
         facts.append(("Tightest margin", f"{row.get('id')}: {verdict_words.margin_text(row)}"))
@@ -198,6 +198,13 @@ def simulation_facts(verdict: Json) -> list[tuple[str, str]]:
         facts.append(
             ("Worst case found", f"{numbers.length(worst['value_m'])}, {ratio} of the Syncline")
         )
+    if text := part(worst, "certificate").get("text"):
+        facts.append(("Upper bound", f"{numbers.length(worst.get('bound_m'))}. {text}"))
+    if text := part(monte_carlo, "ensemble").get("text"):
+        facts.append(("Quantiles over", str(text)))
+    horizon = part(verdict, "horizon")
+    if horizon:
+        facts.append(("Horizon", numbers.horizon(horizon)))
     return facts
 
 

@@ -36,7 +36,7 @@ STATUSES: Final[dict[str, Outcome]] = {
     "indeterminate": Outcome("warn", "?", "no verdict"),
 }
 KINDS: Final[dict[str, str]] = {
-    "accuracy": "worst-case error (Syncline)",
+    "accuracy": "Syncline error",
     "sync": "\u03c4 / \u03c4_crit, largest",
     "cost": "cost",
     "mass": "mass",

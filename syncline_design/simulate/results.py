@@ -12,6 +12,7 @@ import numpy as np
 from syncline_design import __version__
 from syncline_design.effects.base import Array
 from syncline_design.simulate.distribution import Binned, Values
+from syncline_design.simulate.ensemble import Ensemble
 from syncline_design.simulate.worst_case import WorstCase
 
 SCHEMA = "syncline-design/simulation/v1"
@@ -79,6 +80,7 @@ class MonteCarlo:
     within_target: ProportionEstimate | None
     worst_case: WorstCase
     histogram: Histogram
+    ensemble: Ensemble | None = None
     distribution: Values | Binned | None = field(default=None, repr=False, compare=False)
 
     def quantile(self, quantile: float) -> QuantileEstimate:
@@ -95,6 +97,7 @@ class MonteCarlo:
             "estimator": self.estimator,
             "effective_samples": self.effective_samples,
             "confidence": self.confidence,
+            "ensemble": None if self.ensemble is None else self.ensemble.to_json(),
             "quantiles": {repr(q.quantile): q.to_json() for q in self.quantiles},
             "probability_within_target": None if within is None else within.to_json(),
             "worst_case": worst_case_json(self.worst_case),
@@ -170,10 +173,24 @@ def worst_case_json(found: WorstCase) -> Json:
         "certificate": {
             "gap": found.gap,
             "triangle_m": found.triangle_m,
-            "text": "no choice of directions gives more than the bound; what was found is "
+            "envelope": {
+                "shift_s": found.tau_s,
+                "tilt_rad": found.tilt_rad,
+                "sensors": "one sigma",
+            },
+            "text": f"{envelope_words(found)}, nothing exceeds the bound; what was found is "
             f"{100 * found.gap:.2g} % below it",
         },
     }
+
+
+def envelope_words(found: WorstCase) -> str:
+    """Where the bound holds."""
+    tilt = f"{math.degrees(found.tilt_rad):.3g} deg"
+    return (
+        f"With every sensor at one sigma, relative time shifts up to {found.tau_s:.4g} s (and what "
+        f"known effects add), tilt up to {tilt}, and known effects at what they are charged"
+    )
 
 
 def finite(value: float) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from syncline_design.model.budget import budget
 from syncline_design.model.system import System
 from syncline_design.simulate import distribution
 from syncline_design.simulate.distribution import Binned, Values
+from syncline_design.simulate.ensemble import ensemble_of
 from syncline_design.simulate.intervals import proportion_interval, quantile_ranks
 from syncline_design.simulate.results import (
     MonteCarlo,
@@ -52,8 +53,10 @@ def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS)
     if settings.estimator == "conditioned":
         from syncline_design.simulate.conditioned import conditioned_monte_carlo
 
-        return conditioned_monte_carlo(system, settings, worst)
-    return _monte_carlo(settings, error_distribution(system, settings), worst)
+        found = conditioned_monte_carlo(system, settings, worst)
+    else:
+        found = _monte_carlo(settings, error_distribution(system, settings), worst)
+    return replace(found, ensemble=ensemble_of(system, settings.envelope))
 
 
 def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> SimulationResult:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from itertools import groupby
 
 from syncline_design.model.system import System
@@ -54,6 +55,8 @@ def monte_carlo_lines(found: MonteCarlo, trajectory: str | None = None) -> list[
             f"  P(error <= {length(within.target_m)}) = {within.value:.6g}  "
             f"[{within.low:.6g}, {within.high:.6g}]"
         )
+    if found.ensemble is not None:
+        lines.append(f"  {found.ensemble.text()}")
     lines.append(f"  intervals hold with {100 * found.confidence:g} % confidence")
     lines.append(
         "  the Syncline adds one-sigma magnitudes and is no quantile (39 % of errors exceed it "
@@ -67,8 +70,9 @@ def _worst_case_lines(result: SimulationResult) -> list[str]:
     return [
         f"Worst case at tau = {duration(worst.tau_s)}, every magnitude at most its Syncline term: "
         f"{length(worst.value_m)}, {worst.ratio:.4f} of the Syncline's {length(worst.syncline_m)}",
-        f"  no choice of directions exceeds {length(worst.bound_m)} "
-        f"({100 * worst.gap:.2g} % above what was found)",
+        f"  nothing exceeds {length(worst.bound_m)} ({100 * worst.gap:.2g} % above what was found) "
+        f"at tilts up to {math.degrees(worst.tilt_rad):.3g} deg and these shifts, with sensors at "
+        "one sigma",
     ]
 
 

@@ -56,7 +56,7 @@ class WorstCase:
     bound_m: float
     triangle_m: float
     syncline_m: float
-    tilt_rad: float
+    tilt_rad: float = 0.0
 
     @property
     def ratio(self) -> float:

@@ -1,0 +1,100 @@
+"""Warnings of a verdict: their codes, what they are about, and that every format shows them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from syncline_design.loading import load_text
+from syncline_design.report.checks import render_checks
+from syncline_design.report.console import verdict_text
+from syncline_design.verify import CheckSettings, check_loaded
+
+SPEC = """\
+syncline: 1
+name: tow boat
+requirements:
+  - {{id: FAR, kind: accuracy, limit: 2 m}}
+  - {{id: NEAR, kind: accuracy, limit: {limit}}}
+{more}
+monte_carlo: {{samples: 2000}}
+horizon: {{tilt: 0 deg}}
+stages:
+  - name: boat
+    platform: {{v_max: 2 m/s, omega_max: 30 deg/s, distance: 10 m, baseline: 1 m}}
+    position:
+      sensor: {{modality: position, sigma_position: 5 cm, primitives: [pps], basis: assumption}}
+      timestamping: {{error: {{distribution: uniform, low: -20 ms, high: 20 ms}}}}
+      lever_arm: [8 m, 0 m, 0 m]
+    attitude:
+      sensor: {{modality: attitude, sigma_attitude: 1 deg, primitives: [pps]}}
+      timestamping: {{error: {{distribution: constant, value: 0 s}}}}
+    ranging:
+      sensor: {{modality: ranging, sigma_range: 1 mm, sigma_bearing: 1 mdeg, primitives: [pps]}}
+      timestamping: {{error: {{distribution: constant, value: 0 s}}}}
+      lever_arm: [-8 m, 0 m, 0 m]
+"""
+WORST = "worst-case-above-limit"
+
+
+def verdict(limit: str, more: str = "") -> dict[str, Any]:
+    text = SPEC.format(limit=limit, more=more)
+    return check_loaded(load_text(text, "boat.yaml"), CheckSettings())
+
+
+def worst_by_hand_m() -> float:
+    """Level, all in one line at shifts of tau: the turned attitude acts on 10 m and 16 m of arms.
+
+    v tau + sigma_p + w tau 8 m (the antenna) + (1 deg sqrt(3) + w tau) 26 m, to first order.
+    """
+    tau, rate = 0.02, math.radians(30.0)
+    turned = math.radians(1.0) * math.sqrt(3.0) + rate * tau
+    return 2.0 * tau + 0.05 * math.sqrt(3.0) + rate * tau * 8.0 + turned * 26.0
+
+
+def test_a_design_that_meets_while_its_worst_case_does_not_is_warned_of() -> None:
+    found = verdict("0.80 m")
+    assert found["verdict"] == "meets"
+    assert found["syncline"]["total_m"] < 0.80 < worst_by_hand_m()
+    (warned,) = [w for w in found["warnings"] if w["code"] == WORST]
+    assert warned["requirement"] == "NEAR"
+    shown = found["monte_carlo"]["worst_case"]["value_m"]
+    assert shown == pytest.approx(worst_by_hand_m(), rel=2e-3)
+    assert shown <= found["monte_carlo"]["worst_case"]["bound_m"]
+
+
+def test_no_warning_above_the_worst_case_nor_where_the_limit_is_missed() -> None:
+    for limit, word in (("1.9 m", "meets"), ("0.2 m", "fails")):
+        found = verdict(limit)
+        assert found["verdict"] == word
+        assert not [w for w in found["warnings"] if w["code"] == WORST]
+
+
+def test_warnings_say_what_they_are_about() -> None:
+    more = "  - {id: LOW, kind: sync, limit: 0.0001, waiver: {reason: trial, expires: 2999-01-01}}"
+    for warned in verdict("0.80 m", more)["warnings"]:
+        assert warned["code"]
+        assert warned["message"]
+        if warned["code"] == "assumption":
+            assert warned["entry"]
+            assert warned["key"]
+        if warned["code"] == "waiver":
+            assert warned["requirement"] == "LOW"
+
+
+@pytest.mark.parametrize("form", ["json", "html", "junit", "sarif", "github", "markdown", "csv"])
+def test_every_format_shows_the_warning(form: str) -> None:
+    found = verdict("0.80 m")
+    shown = render_checks(form, [found])
+    assert WORST in shown
+    if form not in ("csv", "json"):
+        assert "worst case found is 1.269" in shown
+
+
+def test_the_console_shows_warning_horizon_envelope_and_ensemble() -> None:
+    shown = " ".join(verdict_text(verdict("0.80 m"), colour=False).split())
+    assert f"[{WORST}]" in shown
+    for text in ("horizon 1 h, extent 1 km, tilt 0 deg", "at tilts up to 0 deg", "over missions"):
+        assert text in shown
