@@ -116,6 +116,7 @@ def _worst_ratios(platform: str) -> list[float]:
     text = (
         "syncline: 1\nname: x\nrequirements:\n  - {id: A, kind: accuracy, limit: 1 km}\n"
         "  - {id: S, kind: sync, limit: 1000000}\n"
+        "horizon: {tilt: 0 deg}\n"
         f"stages:\n  - name: s\n    platform: {platform}\n"
         f"    position: {{sensor: ublox_f9p_rtk, {how}}}\n"
         f"    attitude: {{sensor: kongsberg_mru5, {how}}}\n"

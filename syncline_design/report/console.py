@@ -236,10 +236,10 @@ def horizon_line(data: Data) -> list[str]:
     horizon = data.get("horizon")
     if not horizon:
         return []
+    tilt = format_quantity(horizon["tilt_rad"], Dimension.ANGLE)
     return [
         f"  horizon {duration_words(horizon['duration_s'])}, extent {_length(horizon['extent_m'])},"
-        f" tilt {format_quantity(horizon['tilt_rad'], Dimension.ANGLE)}: what drifts, grids and heave are"
-        " charged for"
+        f" tilt {tilt}: what drifts, grids and heave are charged for"
     ]
 
 
