@@ -20,6 +20,7 @@ from syncline_design.timing import Constant, Distribution, Empirical, Normal, Un
 
 UNKNOWN_VARIANCE_M2 = 1e8  # of a component whose truth the log does not hold
 FLOOR_M = 1e-6  # keeps a row's covariance positive definite where a sensor is claimed perfect
+NEGLIGIBLE = 1e-6  # share of every row's variance below which it matters not whose noise it is
 MATTERS = 0.01  # share of the row's variance below which slow attitude noise is not modelled
 
 
@@ -48,9 +49,26 @@ def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
             if role != "ranging":
                 slow.append(Slow((stage.name, role), loading, True))
     kept = tuple(s for s in slow if _matters(s, white))
-    common = np.concatenate(stamped, axis=2) if stamped else None
+    common, negligible = _split_small(stamped, white)
+    fixed = fixed + negligible
     once = one_reading(view)
     return Structure(view.log.time_s, tuple(white), kept, fixed, directed, common, once)
+
+
+def _split_small(stamped: list[Array], white: list[White]) -> tuple[Array | None, Array]:
+    """Timing scatter that matters, and the covariance of the rest, which no one could tell apart.
+
+    What rows of a stamp share costs states; hardware stamps of some ns are not worth them.
+    """
+    rest: Array = np.zeros((1, 3, 3))
+    kept = []
+    least = sum(np.einsum("nii->n", w.covariance) for w in white)
+    for slope in stamped:
+        if np.any(np.sum(slope**2, axis=(1, 2)) > NEGLIGIBLE * least):
+            kept.append(slope)
+        else:
+            rest = rest + slope @ np.swapaxes(slope, 1, 2)
+    return (np.concatenate(kept, axis=2) if kept else None), rest
 
 
 def one_reading(view: Scene) -> bool:
