@@ -26,6 +26,7 @@ FALLS_TO = 1.0 / 3.0
 FAR_FROM_NOISE = 4.0  # times the expected size
 MOST = 3  # gross faults at once
 ROWS = 3000
+LEAST_LEFT = 10  # rows
 WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
 SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of seconds
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
@@ -61,7 +62,8 @@ def unslipped(log: Log, seconds: float) -> Log:
     """The log with every position paired with the rows it belongs to.
 
     stamp = true + seconds, so the position that was true at t carries the stamp t + seconds.  Rows
-    whose position lies beyond the log or in a gap are left out.
+    whose position lies beyond the log or in a gap are left out; where that is nearly all of them
+    (windows of a very long log shorter than the slip), the log stays as it is.
     """
     first = log.stages[0]
     assert first.antenna_m is not None
@@ -70,6 +72,8 @@ def unslipped(log: Log, seconds: float) -> Log:
     right = np.clip(np.searchsorted(times, wanted), 1, times.shape[0] - 1)
     step = times[right] - times[right - 1]
     inside = (wanted >= times[0]) & (wanted <= times[-1]) & (step <= GAP_FACTOR * log.interval_s)
+    if np.count_nonzero(inside) < LEAST_LEFT:
+        return log
     track = first.velocity_track or Track(*per_stamp(log.time_s, first.velocity_mps))
     moved = [
         hermite(
