@@ -135,6 +135,38 @@ def test_files_that_only_the_grid_names_count_too(folder: Path) -> None:
     assert [c.record for c in changed.cases()] == [c.record for c in run(folder, "b").cases()]
 
 
+OVERRIDE = """\
+study: 1
+name: loggers
+base: [spec.yaml]
+grid:
+  "catalog.timestamping[logger].error":
+    - {distribution: empirical, file: logger.txt}
+    - {distribution: empirical, file: slow.txt}
+"""
+
+
+def test_delays_that_a_catalog_entry_takes_from_the_grid_count_too(folder: Path) -> None:
+    """The bound of an empirical error is its largest absolute value: 7.1 us, then 90 and 99 us."""
+    (folder / "study.yaml").write_text(OVERRIDE)
+    (folder / "more" / "slow.txt").write_text("us\n90\n")
+    taus = []
+    for text in ("90", "99"):
+        edit(folder / "more" / "slow.txt", (folder / "more" / "slow.txt").read_text()[3:5], text)
+        result = run(folder)
+        assert result.counts["meets"] == 2
+        stages = [case.record["design"]["stages"][0] for case in result.cases()]
+        taus.append([stage["roles"]["attitude"]["tau_s"] for stage in stages])
+    assert taus == [pytest.approx([7.1e-6, 90e-6]), pytest.approx([7.1e-6, 99e-6])]
+
+
+def test_nothing_kept_is_believed_when_all_is_asked_anew(folder: Path) -> None:
+    run(folder)
+    settings = StudySettings(workers=1, store=folder / "store", fresh=True)
+    again = run_study(folder / "study.yaml", settings)
+    assert (again.computed, again.reused) == (2, 0)
+
+
 def test_a_file_that_was_missing_is_looked_for_again(folder: Path) -> None:
     (folder / "study.yaml").write_text(GRID)
     (folder / "others.txt").rename(folder / "kept")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from typing import Any
 
 from syncline_design.catalog import Catalog
-from syncline_design.catalog_files import Collection, problem_at
+from syncline_design.catalog_files import Collection, fill_empirical, problem_at
 from syncline_design.loading import BadInput
 from syncline_design.study.factors import plain
 from syncline_design.study.keys import KeyPathError, put, value_at
@@ -28,26 +29,35 @@ def override_entry(catalogs: Collection, path: KeyPath, value: Any, spec: Docume
         changed = put(value_at(document.data, at), path[3:], value)
     except KeyPathError as error:
         raise BadInput((problem_at(spec, (), error.message, error.expected),)) from None
-    model, problems = _validated(document, section, identity, changed)
-    if model is None:
+    read = Collection()  # files of delays that the new value names
+    model, problems = _validated(document, (section, identity), changed, Path(spec.file), read)
+    if model is None or problems:
         raise BadInput(tuple(problems))
     result = catalogs.copy()
     result.entries[section][identity] = getattr(model, section)[identity]
     result.documents[section, identity] = (_entry_document(document, at, changed), at)
     shown = json.dumps([list(path), plain(value)], ensure_ascii=True)
-    result.digests.append(f"override {shown}")
+    result.digests += [f"override {shown}", *read.digests]
     return result
 
 
 def _validated(
-    document: Document, section: str, identity: str, entry: Any
+    document: Document, place: tuple[str, str], entry: Any, spec: Path, read: Collection
 ) -> tuple[Catalog | None, list[Problem]]:
-    """The entry through the catalog's own model, its errors placed in its own file."""
+    """The entry through the catalog's own model, its errors placed in its own file.
+
+    Files are named from the catalog's folder; a shipped catalog has none, the spec's counts.
+    """
+    section, identity = place
     single = Document(
         document.file, {section: {identity: entry}}, document.positions, document.key_positions,
         document.sha256, document.text,
     )  # fmt: skip
-    return validate(Catalog, single)
+    shipped = document.file.startswith("builtin:")
+    folder = (spec if shipped else Path(document.file)).parent
+    filled = fill_empirical(single, folder, spec.parent, read)
+    model, problems = validate(Catalog, single, filled)
+    return model, [*problems, *read.problems]
 
 
 def _entry_document(document: Document, at: KeyPath, entry: Any) -> Document:
