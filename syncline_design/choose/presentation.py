@@ -118,18 +118,24 @@ def slack_table(rows: Sequence[Slack]) -> list[str]:
         [
             [
                 f"{row.stage} {row.term}",
-                _figure(row.value, row.unit),
-                _figure(row.fails_at, row.unit),
+                format_quantity(row.value, UNITS[row.unit]),
+                _figure(row, row.fails_at, "verdict"),
                 row.limited_by or "",
-                _figure(row.payload_changes_at, row.unit),
+                _figure(row, row.payload_changes_at, "payload"),
             ]
             for row in rows
         ],
     )
 
 
-def _figure(value: float | None, unit: str) -> str:
-    return "never" if value is None else format_quantity(value, UNITS[unit])
+def _figure(row: Slack, value: float | None, what: str) -> str:
+    if value is not None:
+        return format_quantity(value, UNITS[row.unit])
+    if what in row.never:
+        return "never"
+    if row.searched_to is None:
+        return "not known"
+    return f"not up to {format_quantity(row.searched_to, UNITS[row.unit])}"
 
 
 def table(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

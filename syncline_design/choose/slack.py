@@ -8,14 +8,16 @@ The payload changes when the choice, made anew, names another sensor or method.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 from syncline_design.choose.decide import choose
 from syncline_design.choose.evaluate import broken, chosen_options, evaluate, pair_bound
+from syncline_design.choose.narrowed import narrowed
 from syncline_design.choose.outcome import Choice, NoVerdict, OutOfTime
+from syncline_design.choose.partition import best_of
 from syncline_design.choose.variations import (
     PLATFORM_FIGURES,
     Build,
@@ -27,19 +29,22 @@ from syncline_design.choose.variations import (
 from syncline_design.design_space import Design, Option, Problem, RoleTable
 from syncline_design.loading import LoadedSpec
 from syncline_design.problem import build_problem
+from syncline_design.time_limit import in_force
 
-GROWTHS = (1.02, 1.1, 1.25, 1.5, 2.0, 3.0, 5.0, 10.0, 30.0, 100.0)
-BISECTIONS = 30
-CLOSE = 1e-4
+# Values tried, over the term's own: from a nudge that only settles ties to a million times.
+GROWTHS = (1.0 + 1e-9, 1.0001, 1.01, 1.05, *(1.3**k for k in range(1, 53)), 1e6)
+COARSE = (1.0 + 1e-9, 1.1, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0)  # where each try is a simulation
+BISECTIONS = 60
+CLOSE = 1e-6
 
 
 @dataclass(frozen=True, slots=True)
 class Slack:
     """One term: its value, and the values at which verdict and payload change.
 
-    None: not up to a hundred times the value, or (payload only) not proven.
-
-    limited_by: kind of the requirement that then breaks.  unit: of all three figures.
+    None: not up to searched_to (None: no value was left out).  limited_by: kind of the requirement
+    that then breaks.  unit: of all four figures.  never: which of the two is proven never to come,
+    `verdict` or `payload`.
     """
 
     term: str
@@ -49,6 +54,8 @@ class Slack:
     fails_at: float | None
     limited_by: str | None
     payload_changes_at: float | None
+    searched_to: float | None = None
+    never: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The entry under `slack`."""
@@ -60,6 +67,8 @@ class Slack:
             "fails_at": self.fails_at,
             "limited_by": self.limited_by,
             "payload_changes_at": self.payload_changes_at,
+            "searched_to": self.searched_to,
+            "never": list(self.never),
         }
 
 
@@ -89,26 +98,27 @@ def _error_slack(problem: Problem, design: Design, r: int) -> Slack:
         total = evaluate(problem, design).total_m
         fails = float(own.error() + Fraction(limit) - total)
 
-    def changed(factor: float) -> Problem:
-        return _with_sensor(problem, r, own.sensor, factor)
+    def changed(value: float) -> Problem:
+        return _with_sensor(problem, r, own.sensor, Fraction(value))
 
-    until = fails / float(own.error()) if fails and own.error() else None
-    factor = _payload_factor(problem, design, changed, until)
-    value = own.sensor_error_m
-    at = None if factor is None else value * factor
-    kind = "accuracy" if fails is not None else None
-    return Slack(f"{table.role} sensor error", table.stage_name, value, "m", fails, kind, at)
+    row = Slack(f"{table.role} sensor error", table.stage_name, own.sensor_error_m, "m", fails,
+                None if fails is None else "accuracy", None)  # fmt: skip
+    sure = limit is None and problem.judge is None
+    return _with_payload(row, problem, design, changed, fails_never=sure)
 
 
-def _with_sensor(problem: Problem, r: int, sensor: str, factor: float) -> Problem:
-    """The problem with one sensor's error in one role grown; its exclusions are judged anew."""
+def _with_sensor(problem: Problem, r: int, sensor: str, error_m: Fraction) -> Problem:
+    """The problem with one sensor's error in one role set; its exclusions are judged anew."""
 
     def grown(option: Option) -> Option:
         if option.sensor != sensor:
             return option
-        exact = option.error() * Fraction(factor)
-        crit = option.tau_crit_s * factor
-        return replace(option, sensor_error_m=float(exact), exact_error_m=exact, tau_crit_s=crit)
+        crit = option.tau_crit_s
+        if option.error() > 0:
+            crit = float(Fraction(crit) * error_m / option.error()) if math.isfinite(crit) else crit
+        return replace(
+            option, sensor_error_m=float(error_m), exact_error_m=error_m, tau_crit_s=crit
+        )
 
     return _with_options(problem, grown, {r})
 
@@ -132,31 +142,24 @@ def _tau_slack(problem: Problem, design: Design, r: int) -> Slack:
     """A timestamp bound may grow until its own tau_crit, the system's, or the accuracy is met."""
     table, own = problem.roles[r], chosen_options(problem, design)[r]
     limits = list(_tau_limits(problem, design, r))
-    value = own.tau_s
-    name = f"{table.role} timestamp error"
-    if not limits:
-        return Slack(name, table.stage_name, value, "s", None, None, None)
-    fails, kind = min(limits)
-    # A larger tau makes nothing else feasible or cheaper: the payload changes when this one fails.
-    at = float(fails)
-    if problem.objective == "error":
-        factor = None
-        if own.tau() > 0:
-            factor = _payload_factor(
-                problem, design, lambda f: _with_method(problem, r, own, f), at / value
-            )
-        at = at if factor is None else value * factor
-    return Slack(name, table.stage_name, value, "s", float(fails), kind, at)
+    fails, kind = min(limits) if limits else (None, None)
+    row = Slack(f"{table.role} timestamp error", table.stage_name, own.tau_s, "s",
+                None if fails is None else float(fails), kind, None)  # fmt: skip
+
+    def changed(value: float) -> Problem:
+        return _with_method(problem, r, own.method, Fraction(value))
+
+    sure = not limits and problem.judge is None
+    return _with_payload(row, problem, design, changed, fails_never=sure)
 
 
-def _with_method(problem: Problem, r: int, own: Option, factor: float) -> Problem:
-    """The problem with the tau of one method in one role grown."""
+def _with_method(problem: Problem, r: int, method: str, tau_s: Fraction) -> Problem:
+    """The problem with the error of one method in one role set, whatever primitive it stamps."""
 
     def grown(option: Option) -> Option:
-        if (option.method, option.primitive) != (own.method, own.primitive):
+        if option.method != method:
             return option
-        exact = option.tau() * Fraction(factor)
-        return replace(option, tau_s=float(exact), exact_tau_s=exact)
+        return replace(option, tau_s=float(tau_s), exact_tau_s=tau_s)
 
     return _with_options(problem, grown, {r})
 
@@ -198,39 +201,25 @@ def _platform_slack(
     stage: int,
     figure: PlatformFigure,
 ) -> Slack | None:
-    """Growth of a platform figure: the same design evaluated, and the choice made, anew.
-
-    A faster vehicle makes no other design feasible, so that a payload chosen by cost, mass or
-    power changes when it fails; a larger distance also raises a tau_crit.
-    """
+    """Growth of a platform figure: the same design evaluated, and the choice made, anew."""
     words, dimension = PLATFORM_FIGURES[figure]
     value = float(platform_figure(loaded, stage, figure))
     if value <= 0.0:
         return None
 
-    def changed(factor: float) -> Problem:
-        grown = quantity(value * factor, dimension)
-        return build(with_platform_figure(loaded, stage, figure, grown))
+    def changed(at: float) -> Problem:
+        return build(with_platform_figure(loaded, stage, figure, quantity(at, dimension)))
 
-    def kinds_broken(factor: float) -> tuple[str, ...]:
-        other = changed(factor)
+    def kinds_broken(at: float) -> tuple[str, ...]:
+        other = changed(at)
         same = same_design(problem, design, other)
         return ("sync",) if same is None else broken(other, evaluate(other, same))
 
-    fails = _first(lambda factor: not kinds_broken(factor), None)
-    factor = fails
-    if problem.objective == "error" or figure == "distance":
-        factor = _payload_factor(problem, design, changed, fails)
+    fails = _first(lambda at: not kinds_broken(at), _tried(value, GROWTHS))
     unit = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}[figure]
-    return Slack(
-        words,
-        "",
-        value,
-        unit,
-        None if fails is None else value * fails,
-        None if fails is None else next(iter(kinds_broken(fails)), None),
-        None if factor is None else value * factor,
-    )
+    kind = None if fails is None else next(iter(kinds_broken(fails)), None)
+    row = Slack(words, "", value, unit, fails, kind, None)
+    return _with_payload(row, problem, design, changed, fails_never=False)
 
 
 def same_design(problem: Problem, design: Design, other: Problem) -> Design | None:
@@ -249,40 +238,88 @@ def payload(problem: Problem, design: Design) -> tuple[tuple[str, str], ...]:
     return tuple((option.sensor, option.method) for option in chosen_options(problem, design))
 
 
-def _payload_factor(
-    problem: Problem, design: Design, changed: Callable[[float], Problem], until: float | None
-) -> float | None:
-    """Least growth, up to a factor, at which the choice names another payload."""
+def _with_payload(
+    row: Slack,
+    problem: Problem,
+    design: Design,
+    changed: Callable[[float], Problem],
+    *,
+    fails_never: bool,
+) -> Slack:
+    """The row with the least value at which the choice, made anew, names another payload.
+
+    Every value is solved again: a term that grows can lose a tie of price long before a limit, and
+    a worse sensor can make a cheaper design keep its sync limit.
+    """
+    never = ("verdict",) if fails_never else ()
+    if fails_never and _is_sole(problem):
+        return replace(row, never=(*never, "payload"))
     now = payload(problem, design)
 
-    def same(factor: float) -> bool:
-        other = changed(factor)
-        found = choose(other, "front")
-        return isinstance(found, Choice) and payload(other, found.design) == now
+    def same(at: float) -> bool:
+        other = changed(at)
+        found = _chosen(other)
+        return found is not None and payload(other, found) == now
 
+    values = _tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
     try:
-        return _first(same, until)
+        at = _first(same, values, row.value)
     except OutOfTime:
         raise
     except NoVerdict:  # what cannot be proven is not claimed
-        return None
+        return replace(row, searched_to=row.value, never=never)
+    if at is not None and row.fails_at is not None and abs(at - row.fails_at) <= 1e-6 * at:
+        at = row.fails_at
+    return replace(row, payload_changes_at=at, searched_to=values[-1], never=never)
 
 
-def _first(holds: Callable[[float], bool], until: float | None) -> float | None:
-    """Least factor above 1 at which something no longer holds, to 1e-4; None: not up to 100."""
-    last = 1.0
-    for factor in (*(g for g in GROWTHS if until is None or g < until), until):
-        if factor is None or factor <= last:
-            continue
-        if not holds(factor * (1.0 + CLOSE) if factor == until else factor):
-            return _edge(holds, last, factor)
-        last = factor
+def _chosen(problem: Problem) -> Design | None:
+    """The choice of a changed problem; None where nothing meets it."""
+    if problem.judge is None:
+        whole = narrowed(
+            problem,
+            [range(len(table.options)) for table in problem.roles],
+            [range(len(table.clocks)) for table in problem.vehicles],
+        )
+        return best_of(whole, in_force())
+    found = choose(problem, "front")
+    return found.design if isinstance(found, Choice) else None
+
+
+def _is_sole(problem: Problem) -> bool:
+    """Whether there is one payload only, sync limit or not."""
+    for table in problem.roles:
+        pool = [*table.options, *(o.option for o in table.excluded if o.option is not None)]
+        if len({(option.sensor, option.method) for option in pool}) > 1:
+            return False
+    return True
+
+
+def _tried(value: float, growths: Sequence[float], fails_at: float | None = None) -> list[float]:
+    """Values to try, rising; just above the one at which the verdict fails is one of them."""
+    scale = value or (fails_at or 1.0) * 1e-6
+    values = {scale * growth for growth in growths}
+    if fails_at is not None:
+        edge = max(fails_at, value)
+        values |= {edge * (1.0 + 1e-9) or 1e-12, max(value, edge * (1.0 - CLOSE))}
+    return sorted(values)
+
+
+def _first(
+    holds: Callable[[float], bool], values: Sequence[float], start: float | None = None
+) -> float | None:
+    """Least of the values (and between them, to CLOSE) at which something no longer holds."""
+    last = values[0] if start is None else start
+    for value in values:
+        if not holds(value):
+            return _edge(holds, last, value)
+        last = value
     return None
 
 
 def _edge(holds: Callable[[float], bool], works: float, fails: float) -> float:
     for _ in range(BISECTIONS):
-        if fails - works <= CLOSE * works:
+        if fails - works <= CLOSE * abs(fails):
             break
         middle = 0.5 * (works + fails)
         works, fails = (middle, fails) if holds(middle) else (works, middle)

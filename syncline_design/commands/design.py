@@ -78,7 +78,7 @@ def optimize(
     quiet: QuietOption = False,
     method: MethodOption = "auto",
     time_limit: TimeLimitOption = None,
-    best: Annotated[int, typer.Option(min=1, help="How many truly different designs.")] = 1,
+    best: Annotated[int, typer.Option(min=1, help="How many designs that differ in a sensor.")] = 1,
     pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
     resource: Annotated[
         Literal["cost", "mass", "power"], typer.Option(help="What the front sets against error.")

@@ -30,7 +30,8 @@ SeedOption = Annotated[int, typer.Option(min=0, help="Seed of every random numbe
 QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No text, only the exit code.")]
 MethodOption = Annotated[str, typer.Option(help="auto, front, milp or enumerate.")]
 TimeLimitOption = Annotated[
-    float | None, typer.Option(min=0.0, help="Seconds for the choice; beyond: no verdict.")
+    float | None,
+    typer.Option(min=0.0, help="Seconds for the whole command; then what is known."),
 ]
 
 

@@ -50,17 +50,25 @@ def slack(verdict: Json) -> Table | None:
         rows.append((
             f"{entry.get('stage')} \u00b7 {entry.get('term')}",
             Cell(numbers.si_quantity(entry.get("value"), unit), numbers.finite(entry.get("value"))),
-            _threshold(entry.get("fails_at"), unit),
+            _threshold(entry, "fails_at", "verdict", unit),
             breaks,
-            _threshold(entry.get("payload_changes_at"), unit),
+            _threshold(entry, "payload_changes_at", "payload", unit),
         ))  # fmt: skip
     heads = ("Term", "Now #", "Verdict fails at #", "What then breaks", "Payload changes at #")
     return table("Slack: how far each term may grow", heads, rows) if rows else None
 
 
-def _threshold(value: object, unit: str) -> Cell:
-    known = numbers.finite(value)
-    return Cell("never" if known is None else numbers.si_quantity(known, unit), known)
+def _threshold(entry: Json, key: str, what: str, unit: str) -> Cell:
+    """A threshold; without one `never` where that is proven, else how far was looked."""
+    known = numbers.finite(entry.get(key))
+    if known is not None:
+        return Cell(numbers.si_quantity(known, unit), known)
+    if what in (entry.get("never") or ()):
+        return Cell("never", None)
+    searched = numbers.finite(entry.get("searched_to"))
+    if searched is None:
+        return Cell("not known", None)
+    return Cell(f"not up to {numbers.si_quantity(searched, unit)}", None)
 
 
 def measure_next(verdict: Json) -> Table | None:
