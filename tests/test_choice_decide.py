@@ -212,6 +212,24 @@ def test_role_without_options_is_infeasible_at_once() -> None:
     assert found.empty_roles == (0, 2)
 
 
+@pytest.mark.parametrize("order", [(0, 1), (1, 0)])
+def test_roads_that_differ_in_the_last_figures_agree(
+    monkeypatch: pytest.MonkeyPatch, order: tuple[int, int]
+) -> None:
+    """Two errors either side of where the 12th figure rounds: one verdict, the smaller error."""
+    near = [0.5 + 4.99e-12, 0.5 + 5.01e-12]
+    roles = [[option(f"a{k}", near[i], 0.0, 1) for k, i in enumerate(order)]]
+    roles += [[option("b", 0.25, 0.0, 1)], [option("c", 0.25, 0.0, 1)]]
+    problem = one_stage(roles, Limits(None, 1.0), 1.0, 1.0)
+    better = order.index(0)
+    for place in (0, 1):
+        other = Design((place, 0, 0), (0,))
+        monkeypatch.setattr(decide, "iter_best", lambda *_, d=other: iter((d,)))
+        found = choose(problem)
+        assert isinstance(found, Choice)
+        assert found.design.options[0] == better
+
+
 def test_roads_that_disagree_are_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
     roles = [[option(f"{n}{k}", 0.5, 0.0, k) for k in range(2)] for n in "abc"]
     problem = one_stage(roles, Limits(None, 1.0), 1.0, 1.0)

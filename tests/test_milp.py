@@ -136,7 +136,7 @@ def test_missing_solver_is_no_verdict(monkeypatch: pytest.MonkeyPatch) -> None:
         best_by_milp(two_options(0.1, 0.0, 0.0, 1.0), Deadline())
 
 
-def test_time_limit_is_no_verdict() -> None:
+def test_time_limit_is_no_proof() -> None:
     rng = random.Random(1)
     roles = [
         [option(f"s{i}", 10 ** rng.uniform(-2, 1), 1e-4 * (i % 6), rng.randint(1, 10**6))
@@ -144,8 +144,11 @@ def test_time_limit_is_no_verdict() -> None:
         for _ in range(3)
     ]  # fmt: skip
     problem = one_stage(roles, Limits(1.0, 4.0), 1.0, 1.0)
-    with pytest.raises(NoVerdict, match="time limit"):
-        choose(problem, "milp", time_limit_s=0.05)
+    try:
+        found = choose(problem, "milp", time_limit_s=0.05)
+    except NoVerdict:  # not even a design in hand by then
+        found = None
+    assert found is None or (isinstance(found, Choice) and not found.proof.optimal)
     with pytest.raises(NoVerdict, match="time limit"):
         choose(problem, "front", time_limit_s=0.0)
 

@@ -30,6 +30,7 @@ from syncline_design.time_limit import in_force
 
 SMALL = 300  # combinations up to which the automatic road also enumerates
 MOST_COUNTED = 1000  # better designs that fail simulation are counted up to here
+SAME = 1e-11  # errors that two roads may call the same: neither sums floats more exactly
 MOST_STEPS = 4000  # steps of the search that confirms the merge before it is left out
 
 
@@ -121,8 +122,7 @@ def best_by_front(problem: Problem, deadline: Deadline) -> Design | None:
         first = next(iter_best(problem, deadline, MOST_STEPS), None)
     except (TooLarge, OutOfTime):  # merging is the proof, the search confirms it
         return picked
-    _demand_agreement(problem, picked, first, "merging", "best-first search")
-    return first
+    return _agreed(problem, picked, first, "merging", "best-first search")
 
 
 def _auto(problem: Problem, deadline: Deadline) -> Choice | Infeasible:
@@ -136,7 +136,7 @@ def _auto(problem: Problem, deadline: Deadline) -> Choice | Infeasible:
             other = best_by_enumeration(problem, deadline)
         except OutOfTime:  # merging is the proof, enumeration confirms it
             return _outcome(problem, design, "front")
-        _demand_agreement(problem, design, other, "front", "enumeration")
+        design = _agreed(problem, design, other, "front", "enumeration")
         agrees = ("enumerate",)
     return _outcome(problem, design, "front", agrees)
 
@@ -152,21 +152,29 @@ def _by_milp(problem: Problem, deadline: Deadline) -> Choice | Infeasible:
         first = next(iter_best(problem, deadline, MOST_STEPS), None)
     except TooLarge:
         return _outcome(problem, found, "milp")
-    _demand_agreement(problem, found, first, "MILP", "best-first search")
-    return _outcome(problem, first, "milp", ("search",))
+    agreed = _agreed(problem, found, first, "MILP", "best-first search")
+    return _outcome(problem, agreed, "milp", ("search",))
 
 
-def _demand_agreement(
+def _agreed(
     problem: Problem, one: Design | None, other: Design | None, first: str, second: str
-) -> None:
-    """Both roads must reach the same objective and error, or both none."""
+) -> Design | None:
+    """What two roads found: the same objective and error, as far as sums of floats tell apart.
+
+    Of designs that agree so closely the earlier one in the exact order counts.
+    """
     if (one is None) != (other is None):
         raise NoVerdict(f"{first} and {second} disagree on whether any design meets the spec")
     if one is None or other is None:
-        return
-    ranks = [rank(problem, design, evaluate(problem, design))[:2] for design in (one, other)]
-    if ranks[0] != ranks[1]:
+        return None
+    sums = [evaluate(problem, design) for design in (one, other)]
+    errors = [found.error_m for found in sums]
+    alike = abs(errors[0] - errors[1]) <= SAME * max(errors)
+    if problem.objective != "error":
+        alike &= sums[0].amount(problem.objective) == sums[1].amount(problem.objective)
+    if not alike:
         raise NoVerdict(f"{first} and {second} disagree on the best design")
+    return min((one, other), key=lambda design: rank(problem, design, evaluate(problem, design)))
 
 
 def _outcome(
