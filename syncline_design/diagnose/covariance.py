@@ -27,14 +27,25 @@ _LEAST_STEP = 1e-9  # least dt / T: keeps 1 - phi^2 above rounding
 
 
 def inverse_3x3(matrix: Array) -> tuple[Array, Array]:
-    """Inverse (n, 3, 3) and determinant (n,) of symmetric 3 x 3 blocks, by cofactors."""
-    a, b, c = matrix[:, 0, 0], matrix[:, 0, 1], matrix[:, 0, 2]
-    d, e, f = matrix[:, 1, 1], matrix[:, 1, 2], matrix[:, 2, 2]
-    co00, co01, co02 = d * f - e * e, c * e - b * f, b * e - c * d
-    determinant = a * co00 + b * co01 + c * co02
-    co11, co12, co22 = a * f - c * c, b * c - a * e, a * d - b * b
-    rows = [[co00, co01, co02], [co01, co11, co12], [co02, co12, co22]]
-    inverse = np.moveaxis(np.array(rows), -1, 0) / determinant[:, None, None]
+    """Inverse (n, 3, 3) and determinant (n,) of symmetric positive 3 x 3 blocks.
+
+    By L D L': cofactors cancel where a row's sizes are very unlike, elimination does not.
+    Determinants that are not positive tell of blocks that are not.
+    """
+    a, d, f = matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2]
+    with np.errstate(all="ignore"):
+        l10, l20 = matrix[:, 0, 1] / a, matrix[:, 0, 2] / a
+        second = d - l10 * matrix[:, 0, 1]
+        mixed = matrix[:, 1, 2] - l10 * matrix[:, 0, 2]
+        l21 = mixed / second
+        third = f - l20 * matrix[:, 0, 2] - l21 * mixed
+        zero, one = np.zeros_like(a), np.ones_like(a)
+        rows = [[one, zero, zero], [-l10, one, zero], [l10 * l21 - l20, -l21, one]]
+        lower = np.moveaxis(np.array(rows), -1, 0)  # L^-1
+        pivots = np.stack([a, second, third], axis=1)
+        inverse = np.swapaxes(lower, 1, 2) @ (lower / pivots[:, :, None])
+        positive = np.all(pivots > 0.0, axis=1)
+        determinant = np.where(positive, np.prod(pivots, axis=1), -1.0)
     return inverse, determinant
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from syncline_design.diagnose.covariance import Precision
 from syncline_design.diagnose.fitting import Data, Model, inner, solve_scaled
 from syncline_design.diagnose.noise import (
     NoiseLevel,
+    as_specified,
     clipped,
     marginal_variance,
     precision,
@@ -26,6 +27,7 @@ PURGE_S = 5.0  # left out on both sides of a held-out block
 PURGE_SHARE = 0.1  # of a block, at most
 REGIME_SHARE = 0.3  # fastest share of the rows, held out as a regime
 LEAST_GAP = 1e-9  # nat per sample
+LEAST_SHARE = 1e-3  # of the RMS: less is no gap
 LEAST_TRAINING = 30  # rows
 NORMAL_95 = 1.959963984540054
 
@@ -46,9 +48,10 @@ class Fit:
 class Gap:
     """Before, after and floor on held-out rows.
 
-    floor: the same effects fitted to all rows, the held-out ones too; where something unexplained
-    remains, what the spec's noise alone would give, if that is lower.
-    closed_fraction: (before - after) / (before - floor) in NLL; None where there was no gap.
+    floor: the same effects fitted to all rows, the held-out ones too, or what the spec's own noise
+    would give, whichever is lower, in RMS and in NLL.  expected_rms_m: what the spec's noise gives.
+    closed_fraction: (before - after) / (before - floor), in NLL or in RMS, whichever is less; None
+    where nothing was held out (findings that only change the noise) or there was no gap.
     difference: NLL per sample saved, with its standard error over the blocks.
     """
 
@@ -58,6 +61,7 @@ class Gap:
     closed_fraction: float | None
     difference: float
     difference_error: float
+    expected_rms_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,13 +132,7 @@ def regime_fold(data: Data) -> tuple[str, Folds]:
     return f"{name} above {limit:.3g} {unit}", Folds(((training, held),))
 
 
-def gap(
-    data: Data,
-    model: Model,
-    folds: Folds,
-    unexplained: bool,
-    extra: Array | None = None,
-) -> Gap | None:
+def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> Gap | None:
     """Evaluate a model on held-out rows, its parameters fitted on the other rows.
 
     Around the fitted parameters the error is linear, so a fit to part of the rows is one step.
@@ -143,29 +141,48 @@ def gap(
     if not folds.pairs:
         return None
     columns = np.nan_to_num(slopes(data.view, model.acting))
+    held_out = columns.shape[2] > 0
     if extra is not None:
         columns = np.concatenate([columns, extra], axis=2)
     plain = data.error(())
     spec = clipped(model.level, spec_bounds(data.structure))
-    totals = {"before": _Sums(), "after": _Sums(), "floor": _Sums()}
+    totals = {name: _Sums() for name in ("before", "after", "fitted", "expected")}
     saved = []
     for training, held in folds.pairs:
         part = _Held(data, held, spec, model.level)
         left = model.error
         train = precision(data.structure.rows(training), model.level)
         learned = left[held] - columns[held] @ _step(train, columns[training], left[training])
-        before, after, floor = part.before(plain[held]), part.after(learned), part.after(left[held])
-        if unexplained:
-            floor = min(floor, part.noise_only(floor), key=lambda s: s.nll)
-        for name, sums in (("before", before), ("after", after), ("floor", floor)):
-            totals[name] = totals[name] + sums
-        saved.append((before.nll - after.nll) / before.samples)
-    before_fit, after_fit, floor_fit = (totals[n].fit() for n in ("before", "after", "floor"))
-    whole = before_fit.nll_per_sample - floor_fit.nll_per_sample
-    part_closed = before_fit.nll_per_sample - after_fit.nll_per_sample
+        found = {"before": part.before(plain[held]), "after": part.after(learned)}
+        found |= {"fitted": part.after(left[held]), "expected": part.noise_only()}
+        totals = {name: sums + found[name] for name, sums in totals.items()}
+        saved.append((found["before"].nll - found["after"].nll) / found["before"].samples)
+    before, after, fitted, expected = (totals[n].fit() for n in totals)
+    floor = replace(
+        fitted,
+        rms_m=min(fitted.rms_m, expected.rms_m),
+        nll_per_sample=min(fitted.nll_per_sample, expected.nll_per_sample),
+    )
     spread = float(np.std(saved, ddof=1) / np.sqrt(len(saved))) if len(saved) > 1 else 0.0
-    closed = part_closed / whole if whole > LEAST_GAP else None
-    return Gap(before_fit, after_fit, floor_fit, closed, part_closed, spread)
+    closed = _closed(before, after, floor) if held_out else None
+    gained = before.nll_per_sample - after.nll_per_sample
+    return Gap(before, after, floor, closed, gained, spread, expected.rms_m)
+
+
+def _closed(before: Fit, after: Fit, floor: Fit) -> float | None:
+    """Share of the gap that is closed, the lesser of NLL and RMS; 1 at most.
+
+    Better by the likelihood alone may be a larger noise, better by the RMS alone a lucky fit.
+    """
+    shares = []
+    if before.nll_per_sample - floor.nll_per_sample > LEAST_GAP:
+        gained = before.nll_per_sample - after.nll_per_sample
+        shares.append(gained / (before.nll_per_sample - floor.nll_per_sample))
+    if before.rms_m - floor.rms_m > LEAST_SHARE * before.rms_m:
+        shares.append((before.rms_m - after.rms_m) / (before.rms_m - floor.rms_m))
+    elif after.rms_m > (1.0 + LEAST_SHARE) * before.rms_m:
+        return None
+    return min(1.0, *shares) if shares else None
 
 
 def _step(known: Precision, columns: Array, error: Array) -> Array:
@@ -183,6 +200,9 @@ class _Held:
         structure = data.structure.rows(held)
         self.visible = np.isfinite(data.view.log.truth_m[held])
         self.spec, self.known = precision(structure, spec), precision(structure, fitted)
+        stated = as_specified(structure)
+        self.stated = precision(structure, stated)
+        self.stated_variance = marginal_variance(structure, stated)
         self.spec_variance = marginal_variance(structure, spec)
         self.known_variance = marginal_variance(structure, fitted)
 
@@ -192,14 +212,14 @@ class _Held:
     def after(self, error: Array) -> _Sums:
         return self._sums(self.known, self.known_variance, error)
 
-    def noise_only(self, like: _Sums) -> _Sums:
-        """What to expect when nothing but the spec's noise is left: chi-square 1."""
-        nll = 0.5 * (
-            self.spec.log_determinant + like.samples + self.visible.size * np.log(2 * np.pi)
-        )
-        squares = float(np.sum(self.spec_variance[self.visible]))
-        count = like.samples
-        return _Sums(squares, float(count), float(nll), 0.95 * count, like.rows, count)
+    def noise_only(self) -> _Sums:
+        """What to expect when nothing but the spec's own noise is left: chi-square 1."""
+        count = int(np.sum(self.visible))
+        unknown = self.visible.size * np.log(2 * np.pi)
+        nll = 0.5 * (self.stated.log_determinant + count + unknown)
+        squares = float(np.sum(self.stated_variance[self.visible]))
+        rows = self.visible.shape[0]
+        return _Sums(squares, float(count), float(nll), 0.95 * count, rows, count)
 
     def _sums(self, known: Precision, variance: Array, error: Array) -> _Sums:
         weighted = known.solve(error[:, :, None])[:, :, 0]

@@ -25,6 +25,7 @@ SLOW_LIMIT = 1.2  # slow variance over the spec's that still is of the spec's si
 FACTOR_LEAST = 0.05
 SLOW_LEAST = 1e-4
 OPEN = 1e6
+RELATIVE_FLOOR = 1e-12  # of a row's variances: keeps them invertible whatever sizes meet in a row
 TIME_LEAST_S = 0.2
 TIME_MOST_S = 120.0
 TIME_USUAL_S = 25.0  # centre of the weak prior on time constants: minutes or fractions of one
@@ -200,6 +201,8 @@ def white_covariance(structure: Structure, level: NoiseLevel) -> Array:
     for directed, size in zip(structure.directed, level.size, strict=True):
         if size > 0.0:
             total += size**2 * (directed.direction @ np.swapaxes(directed.direction, 1, 2))
+    diagonal = np.einsum("nii->ni", total)
+    diagonal *= 1.0 + RELATIVE_FLOOR
     return total
 
 

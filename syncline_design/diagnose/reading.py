@@ -32,6 +32,7 @@ from syncline_design.effects.base import Array
 
 LEAST_ROWS = 10
 MOST_SPEED_MPS = 2000.0
+MOST_RANGE_M = 1e8  # a quarter of the way to the Moon
 
 
 @dataclass(slots=True)
@@ -208,6 +209,8 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
     else:
         rate = derived_rate(time_s, euler)
         draft.notes.append(f"rates of {name} were derived from its attitude")
+    if kind == "georeference":
+        _demand_reach(draft, prefix)
     distance, azimuth, elevation = (
         draft.columns[prefix + n] if kind == "georeference" else None for n in RANGING
     )
@@ -224,6 +227,19 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
         rate_track=draft.tracks.get(prefix + "rate"),
         follows_position=follows,
     )
+
+
+def _demand_reach(draft: _Draft, prefix: str) -> None:
+    farthest = float(np.max(np.abs(draft.columns[prefix + RANGING[0]])))
+    if farthest > MOST_RANGE_M:
+        raise refuse(
+            draft.path,
+            "farther than any sensor sees",
+            field=prefix + RANGING[0],
+            expected=f"at most {MOST_RANGE_M:.0e} m",
+            found=f"{farthest:.4g} m",
+            hint="is the unit in the column's name right?",
+        )
 
 
 def _velocity(

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
+from syncline_design.diagnose.checks import Check
 from syncline_design.diagnose.findings import Finding, figure_text
 from syncline_design.diagnose.gap import Gap
 from syncline_design.diagnose.regimes import Cell
@@ -32,6 +33,7 @@ class Diagnosis:
     """The outcome; `plots` holds what figures need, plain lists and numbers."""
 
     verdict: Verdict
+    checks: tuple[Check, ...]
     findings: tuple[Finding, ...]
     remaining: Remainder
     where_before: tuple[Cell, ...]
@@ -55,6 +57,11 @@ class Diagnosis:
         return EXIT_CODES[self.verdict]
 
     @property
+    def sound(self) -> bool:
+        """Whether the log contradicts neither itself nor the limits of the spec's platform."""
+        return all(check.severity != "contradiction" for check in self.checks)
+
+    @property
     def unexplained(self) -> bool:
         return self.verdict == "unexplained"
 
@@ -67,9 +74,12 @@ class Diagnosis:
         document = {
             "schema": SCHEMA,
             "verdict": self.verdict,
+            "sound": self.sound,
+            "checks": [asdict(check) for check in self.checks],
             "findings": [finding_json(f) for f in self.findings],
             "remaining": {
                 "unexplained": self.unexplained,
+                "spec_m": None if self.gap is None else self.gap.expected_rms_m,
                 "p": self.remaining.p,
                 "where": [_cell_json(c) for c in self.where_after],
             },
@@ -148,6 +158,7 @@ def _gap_json(gap: Gap | None) -> Json:
             "after": asdict(gap.after),
             "floor": asdict(gap.floor),
         },
+        "expected_rms_m": gap.expected_rms_m,
         "closed_fraction": gap.closed_fraction,
         "nll_saved_per_sample": {"value": gap.difference, "standard_error": gap.difference_error},
     }

@@ -12,6 +12,7 @@ import numpy as np
 from syncline_design import __version__
 from syncline_design.diagnose.axes import without_still_axes
 from syncline_design.diagnose.candidates import candidates, directed_parts
+from syncline_design.diagnose.checks import log_checks
 from syncline_design.diagnose.expected_noise import structure_of
 from syncline_design.diagnose.figures_data import plots
 from syncline_design.diagnose.findings import findings
@@ -32,6 +33,7 @@ from syncline_design.diagnose.search import Search, SearchResult, start_search
 from syncline_design.diagnose.settings import DiagnosisSettings, Progress, silent
 from syncline_design.diagnose.simulation import Acting, scene
 from syncline_design.diagnose.system import Measured, measured
+from syncline_design.linear_algebra import one_thread
 from syncline_design.loading import LoadedSpec, load
 
 MOST_ROWS = 20_000  # of a longer log, windows spread over it are worked on
@@ -50,8 +52,9 @@ def diagnose(
     """
     loaded = spec if isinstance(spec, LoadedSpec) else load(spec)
     progress("reading the log", 0.0)
-    inputs = measured(loaded, [Path(p) for p in log_paths])
-    return diagnose_measured(inputs, settings or DiagnosisSettings(), loaded, progress)
+    with one_thread():
+        inputs = measured(loaded, [Path(p) for p in log_paths])
+        return diagnose_measured(inputs, settings or DiagnosisSettings(), loaded, progress)
 
 
 def diagnose_measured(
@@ -82,7 +85,11 @@ def diagnose_measured(
     rest = remainder(data, result.model, search.rng)
     named = bool(result.model.labels or faults)
     left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
-    verdict: Verdict = "unexplained" if left else ("explained" if named else "agrees")
+    checks = log_checks(view)
+    sound = all(c.severity != "contradiction" for c in checks)
+    verdict: Verdict = "unexplained"
+    if sound and not left:
+        verdict = "explained" if named else "agrees"
     progress("measuring the gap", 0.8)
     shown = findings(result.final, faults)
     cells = where_map(view, result.base.error, result.model.precision)
@@ -91,15 +98,16 @@ def diagnose_measured(
     regime_name, regime = regime_fold(data)
     return Diagnosis(
         verdict=verdict,
+        checks=checks,
         findings=shown,
         remaining=rest,
         where_before=strongest(cells),
         where_after=strongest(cells_after),
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
-        gap=gap(data, result.model, folds, left),
-        regime=(regime_name, gap(data, result.model, regime, left)),
-        placebo=_placebo(data, search, result, left),
-        steps=_stairs(data, result, left),
+        gap=gap(data, result.model, folds),
+        regime=(regime_name, gap(data, result.model, regime)),
+        placebo=_placebo(data, search, result),
+        steps=_stairs(data, result),
         unseen=_unseen(data, search, result),
         log=log_json(replace(inputs.log, notes=view.log.notes))
         | {"fitted": len(view), "motion": _motion_json(data)},
@@ -146,20 +154,18 @@ def expected_size(inputs: Measured) -> float:
     return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
 
 
-def _stairs(data: Data, result: SearchResult, left: bool) -> tuple[Stairs, ...]:
+def _stairs(data: Data, result: SearchResult) -> tuple[Stairs, ...]:
     folds = block_folds(data)
     stairs = []
     for label, model in result.final.stairs:
-        found = gap(data, model, folds, left)
+        found = gap(data, model, folds)
         if found is not None:
             name, sensor, _ = label
             stairs.append(Stairs(f"{name} ({sensor})", found))
     return tuple(stairs)
 
 
-def _placebo(
-    data: Data, search: Search, result: SearchResult, left: bool
-) -> tuple[str, Gap | None]:
+def _placebo(data: Data, search: Search, result: SearchResult) -> tuple[str, Gap | None]:
     """The gap with one more effect, drawn from those that were not chosen."""
     free = [s for s in search.free_signatures(result.model) if not s.at]
     if not free or not result.model.labels:
@@ -167,7 +173,7 @@ def _placebo(
     chosen = free[int(search.rng.integers(len(free)))]
     name, sensor, _ = chosen.candidate.label
     columns = np.nan_to_num(chosen.columns)
-    found = gap(data, result.model, block_folds(data), left, columns)
+    found = gap(data, result.model, block_folds(data), columns)
     return f"{name} ({sensor})", found
 
 

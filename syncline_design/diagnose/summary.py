@@ -13,11 +13,19 @@ OPENING = {
     "explained": "EXPLAINED: what is missing was found, and what remains is noise.",
     "unexplained": "UNEXPLAINED: something remains that no effect of the dictionary explains.",
 }
+LARGE = 1.25  # times the RMS that the spec's noise expects: said in the verdict
+UNSOUND = (
+    "UNEXPLAINED: the log contradicts itself or the limits of the spec's platform. "
+    "Mend that first: every figure below rests on it."
+)
+BEYOND = " CAUTION: the log goes beyond the limits of the spec's platform."
 
 
 def summary_text(diagnosis: Diagnosis) -> str:
     """Verdict, findings, gap, what remains and what this log could not show."""
-    lines = [OPENING[diagnosis.verdict], ""]
+    lines = [_opening(diagnosis), ""]
+    if diagnosis.checks:
+        lines += [*(f"! {check.message}." for check in diagnosis.checks), ""]
     for number, finding in enumerate(diagnosis.findings, 1):
         lines += _finding_lines(number, finding, diagnosis)
     lines += _gap_lines(diagnosis)
@@ -30,6 +38,18 @@ def summary_text(diagnosis: Diagnosis) -> str:
         lines += ["", f"This log could not show: {', '.join(diagnosis.unseen)}."]
     lines += ["", *_log_lines(diagnosis)]
     return "\n".join(lines) + "\n"
+
+
+def _opening(diagnosis: Diagnosis) -> str:
+    """The verdict, or that the log is not fit for one; cautions are said with it."""
+    if not diagnosis.sound:
+        return UNSOUND
+    opening = OPENING[diagnosis.verdict]
+    gap = diagnosis.gap
+    if diagnosis.verdict == "explained" and gap and gap.after.rms_m > LARGE * gap.expected_rms_m:
+        times = gap.after.rms_m / gap.expected_rms_m
+        opening = OPENING["explained"][:-1] + f", {times:.2g} times what the spec expects."
+    return opening + BEYOND if diagnosis.checks else opening
 
 
 def _finding_lines(number: int, finding: Finding, diagnosis: Diagnosis) -> list[str]:
@@ -75,9 +95,11 @@ def _gap_lines(diagnosis: Diagnosis) -> list[str]:
 
 
 def _gap_text(gap: Gap) -> str:
-    closed = ""
-    if gap.closed_fraction is not None:
-        closed = f"; {100.0 * gap.closed_fraction:.0f} % of the gap is closed"
+    closed = f"; the spec's noise expects {figure(gap.expected_rms_m, None, 'm')}"
+    if gap.closed_fraction is not None and gap.closed_fraction > 0.0:
+        closed += f"; {100.0 * gap.closed_fraction:.0f} % of the gap is closed"
+    elif gap.closed_fraction is not None:
+        closed += "; nothing of the gap is closed"
     return (
         f"RMS {figure(gap.before.rms_m, None, 'm')} before, {figure(gap.after.rms_m, None, 'm')} "
         f"after, {figure(gap.floor.rms_m, None, 'm')} at best{closed}"

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from syncline_design.report.diagnosis_page import (
-    DIAGNOSES,
+    check_sentences,
     design_lines,
     finding_words,
     gap_table,
     meaning_table,
+    outcome_of,
     remaining_text,
     sentence_text,
 )
@@ -20,11 +21,13 @@ from syncline_design.report.verdict_words import Json, items, part
 
 def render_diagnosis_markdown(data: Json) -> str:
     """Outcome, every finding with its figures, the gap, what it means for the design."""
-    outcome = DIAGNOSES.get(str(data.get("verdict")), DIAGNOSES["unexplained"])
+    outcome = outcome_of(data)
     name = part(data, "spec").get("name") or "Measured log against simulation"
     lines = [f"## {outcome.mark} {markdown_safe(name)}: {outcome.word}", ""]
     found = items(data, "findings")
-    if not found:
+    if found:
+        lines += [text for check in check_sentences(data) for text in (markdown_safe(check), "")]
+    else:
         lines += [markdown_safe(sentence_text(data)), ""]
     for number, entry in enumerate(found, 1):
         lines += [*_finding(number, entry), ""]

@@ -18,6 +18,7 @@ DIAGNOSES: Final[dict[str, Outcome]] = {
     "explained": Outcome("warn", "!", "Something was missing, and it has a name"),
     "unexplained": Outcome("bad", "?", "Something remains unexplained"),
 }
+_UNSOUND: Final = Outcome("bad", "!", "The log contradicts itself or the platform's limits")
 _CONTENTS: Final = (
     ("findings", "Findings"),
     ("gap", "Gap"),
@@ -46,7 +47,7 @@ def render_diagnosis(data: Json) -> str:
         "diagnosis.html.j2",
         kind="Diagnosis",
         name=str(part(data, "spec").get("name") or "Measured log against simulation"),
-        outcome=DIAGNOSES.get(str(data.get("verdict")), DIAGNOSES["unexplained"]),
+        outcome=outcome_of(data),
         sentence=sentence_text(data),
         facts=_facts(data),
         contents=[(key, label) for key, label in _CONTENTS if sections[key]],
@@ -126,7 +127,25 @@ def _excluded_text(entry: Json) -> str:
     return _effect_text(entry) + (f", {worse:.3g} nat worse" if worse is not None else "")
 
 
+def outcome_of(data: Json) -> Outcome:
+    """The verdict's words; a log that contradicts itself is said to, whatever was named."""
+    if data.get("sound") is False:
+        return _UNSOUND
+    return DIAGNOSES.get(str(data.get("verdict")), DIAGNOSES["unexplained"])
+
+
+def check_sentences(data: Json) -> list[str]:
+    """What is wrong with the log itself, or beyond the platform's limits."""
+    said = [_full_stop(str(entry.get("message"))) for entry in items(data, "checks")]
+    return [text[0].upper() + text[1:] for text in said]
+
+
 def sentence_text(data: Json) -> str:
+    """What is wrong with the log first, then what was found in it."""
+    return " ".join([*check_sentences(data), _found_text(data)])
+
+
+def _found_text(data: Json) -> str:
     found = items(data, "findings")
     if not found:
         remaining = part(data, "remaining").get("unexplained")
@@ -148,6 +167,9 @@ def _facts(data: Json) -> list[tuple[str, str]]:
         rms = part(held_out, key).get("rms_m")
         if numbers.finite(rms) is not None:
             facts.append((label, _length(rms)))
+    expected = numbers.finite(part(data, "gap").get("expected_rms_m"))
+    if expected is not None:
+        facts.append(("The spec's noise expects", _length(expected)))
     if log.get("rows") is not None:
         facts.append(("Rows used", f"{numbers.count(log.get('used'))} of "
                                    f"{numbers.count(log.get('rows'))}"))  # fmt: skip

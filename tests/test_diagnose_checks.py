@@ -1,0 +1,230 @@
+"""Checks before names, an honest gap, and answers that neither size nor threads can upset.
+
+Oracles: the hidden world's motion, statistics of the raw columns, plain arithmetic.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from syncline_design.diagnose import Diagnosis, DiagnosisSettings, diagnose, summary_text
+from syncline_design.diagnose.checks import Check, log_checks
+from syncline_design.diagnose.covariance import inverse_3x3
+from syncline_design.diagnose.simulation import scene
+from syncline_design.diagnose.system import measured
+from syncline_design.loading import BadInput, load
+from syncline_design.report.diagnoses import render_diagnose
+from tests.world import Hidden, WorldLog, hidden, make_log, scenario
+
+Array = NDArray[np.float64]
+Change = Callable[[dict[str, Array]], None]
+LEVER = hidden("lever_arm", "position", x_m=0.3, y_m=-0.2, z_m=0.1)
+DELAY = hidden("latency", "position", latency_s=0.05)
+
+
+def times(stem: str, factor: float) -> Change:
+    def change(columns: dict[str, Array]) -> None:
+        for name in [n for n in columns if n.startswith(stem)]:
+            columns[name] = factor * columns[name]
+
+    return change
+
+
+def swapped(columns: dict[str, Array]) -> None:
+    north, east = "velocity_north_mps", "velocity_east_mps"
+    columns[north], columns[east] = columns[east], columns[north]
+
+
+def in_body(columns: dict[str, Array]) -> None:
+    """Forward and right instead of north and east, by the heading alone."""
+    yaw = np.radians(columns["yaw_deg"])
+    north, east = columns["velocity_north_mps"], columns["velocity_east_mps"]
+    columns["velocity_north_mps"] = np.cos(yaw) * north + np.sin(yaw) * east
+    columns["velocity_east_mps"] = -np.sin(yaw) * north + np.cos(yaw) * east
+
+
+def written(log: WorldLog, folder: Path, change: Change | None = None, limits: str = "") -> Path:
+    text = log.spec_yaml()
+    if limits:
+        key = limits.split(":")[0]
+        start = text.index(f"{key}: ")
+        text = text[:start] + limits + text[text.index(",", start) :]
+    (folder / "spec.yaml").write_text(text, encoding="utf-8")
+    if change is not None:
+        change(log.columns)
+    log.to_csv(folder / "log.csv")
+    return folder
+
+
+def run_of(platform: str, *effects: Hidden, kind: str = "georeference", seed: int = 7) -> WorldLog:
+    return make_log(scenario(platform, seed, 80.0, 5.0, kind), effects)
+
+
+def checked(folder: Path) -> tuple[Check, ...]:
+    inputs = measured(load(folder / "spec.yaml"), [folder / "log.csv"])
+    return log_checks(scene(inputs.system, inputs.log, inputs.known))
+
+
+def asked(folder: Path, **settings: Any) -> Diagnosis:
+    return diagnose(folder / "spec.yaml", [folder / "log.csv"], DiagnosisSettings(**settings))
+
+
+@pytest.mark.parametrize("platform", ["multirotor_lines", "car_stops", "vessel_figure_eights"])
+@pytest.mark.parametrize("effect", [None, LEVER, hidden("latency", "position", latency_s=0.25),
+                                    hidden("latency", "attitude", latency_s=0.2)])  # fmt: skip
+@pytest.mark.parametrize("kind", ["georeference", "position"])
+def test_sound_logs_pass(platform: str, effect: Hidden | None, kind: str, tmp_path: Path) -> None:
+    if effect is not None and (kind == "position" and effect.sensor == "attitude"):
+        effect = None
+    log = run_of(platform, *(() if effect is None else (effect,)), kind=kind)
+    found = checked(written(log, tmp_path))
+    assert not [c for c in found if c.severity == "contradiction"]
+
+
+COLUMNS = (
+    ("velocity_columns", times("velocity_", 1.2), 1.2),
+    ("velocity_columns", times("velocity_", 0.9), 0.9),
+    ("velocity_columns", times("velocity_", 1.943844), 1.943844),
+    ("velocity_columns", times("velocity_", -1.0), -1.0),
+    ("velocity_columns", swapped, 1.0),
+    ("velocity_columns", in_body, 1.0),
+    ("rate_columns", times("rate_", 1.25), 1.25),
+    ("rate_columns", times("rate_", -1.0), -1.0),
+    ("rate_columns", times("rate_", float(np.pi / 180.0)), float(np.pi / 180.0)),
+)
+
+
+@pytest.mark.parametrize(("code", "change", "factor"), COLUMNS)
+@pytest.mark.parametrize("platform", ["fixed_wing_circuits", "constant_speed_eights"])
+def test_columns_that_contradict_the_poses_are_said(
+    platform: str, code: str, change: Change, factor: float, tmp_path: Path
+) -> None:
+    found = checked(written(run_of(platform, DELAY), tmp_path, change))
+    (check,) = [c for c in found if c.code == code]
+    assert check.severity == "contradiction"
+    assert check.value == pytest.approx(factor, rel=0.02)
+
+
+@pytest.mark.parametrize(("limits", "code", "column"), [
+    ("v_max: 1 m/s", "speed", "velocity_"), ("omega_max: 2 deg/s", "turn_rate", "rate_"),
+    ("distance: 12 m", "range", "range_m"),
+])  # fmt: skip
+def test_a_log_beyond_the_limits_says_so(
+    limits: str, code: str, column: str, tmp_path: Path
+) -> None:
+    """The share beyond the limit against a plain count of the raw rows."""
+    log = run_of("multirotor_lines")
+    (check,) = [c for c in checked(written(log, tmp_path, None, limits)) if c.code == code]
+    assert check.severity == "contradiction"
+    parts = [v for n, v in log.columns.items() if n.startswith(column)]
+    size = np.sqrt(np.sum(np.square(parts), axis=0))
+    limit = float(limits.split()[1])
+    assert check.share == pytest.approx(np.mean(size > limit), abs=0.12)
+
+
+@pytest.mark.parametrize(("change", "limits"), [(times("velocity_", 1.2), ""),
+                                                (None, "v_max: 1 m/s")])  # fmt: skip
+def test_no_unsound_log_agrees_or_is_explained(
+    change: Change | None, limits: str, tmp_path: Path
+) -> None:
+    found = asked(written(run_of("car_stops", DELAY), tmp_path, change, limits))
+    document, text = found.to_json(), summary_text(found)
+    assert found.verdict == "unexplained"
+    assert found.exit_code == 1
+    assert document["sound"] is False
+    said = document["checks"][0]["message"]
+    assert text.index(said) < text.index("1. ")
+    for kind in ("html", "markdown"):
+        page = render_diagnose(kind, document)
+        assert "contradicts itself" in page
+        assert page.index(said[6:18]) < page.index("older than")
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_ranges_in_a_wrong_unit_are_an_answer_not_an_error(factor: float, tmp_path: Path) -> None:
+    folder = written(run_of("car_stops"), tmp_path, times("range_m", factor))
+    assert "range" in [c.code for c in asked(folder, max_effects=1).checks]
+
+
+def test_ranges_beyond_the_moon_are_refused(tmp_path: Path) -> None:
+    folder = written(run_of("car_stops"), tmp_path, times("range_m", 1e12))
+    with pytest.raises(BadInput, match="farther than any sensor sees"):
+        asked(folder)
+
+
+def test_unlike_sizes_are_inverted(tmp_path: Path) -> None:
+    """Variances from (1 um)^2 to (1000 km)^2 in one block, against mpmath with 60 digits."""
+    import mpmath
+
+    rng = np.random.default_rng(3)
+    for scales in ((1e-6, 1.0, 1e6), (1e6, 1e-3, 1e-3), (1e-2, 1e5, 1e-5)):
+        root = np.diag(scales) @ (np.eye(3) + 0.3 * rng.standard_normal((3, 3)))
+        block = root @ root.T
+        block = 0.5 * (block + block.T)
+        inverse, determinant = inverse_3x3(block[None])
+        with mpmath.workdps(60):
+            exact = mpmath.matrix(block.tolist()) ** -1
+            size = mpmath.det(mpmath.matrix(block.tolist()))
+            wanted = np.array([[float(exact[i, j]) for j in range(3)] for i in range(3)])
+        weight = np.outer(scales, scales)
+        assert inverse[0] * weight == pytest.approx(wanted * weight, rel=1e-7, abs=1e-7)
+        assert determinant[0] == pytest.approx(float(size), rel=1e-7)
+
+
+def test_noise_alone_closes_no_gap(tmp_path: Path) -> None:
+    """Nothing is held out when only the noise's size is fitted."""
+    louder = hidden("noise_understated", "position", factor=3.0)
+    found = asked(written(run_of("car_stops", louder), tmp_path))
+    assert {f.effect.name for f in found.findings} <= {"noise_understated", "heavy_tails"}
+    assert found.gap is not None
+    assert found.gap.closed_fraction is None
+    assert "of the gap is closed" not in summary_text(found)
+    assert "times what the spec expects" in summary_text(found)
+
+
+@pytest.mark.parametrize("exclude", [(), ("latency", "filter_lag", "packetised_timestamps")])
+def test_closed_is_never_more_than_the_rms_shows(exclude: tuple[str, ...], tmp_path: Path) -> None:
+    """With the true name and without it; before, after and the spec's noise by hand."""
+    folder = written(run_of("multirotor_lines", DELAY), tmp_path)
+    document = asked(folder, exclude_effects=exclude).to_json()
+    gap = document["gap"]
+    before, after = (gap["held_out"][key]["rms_m"] for key in ("before", "after"))
+    expected = gap["expected_rms_m"]
+    if gap["closed_fraction"] is not None:
+        by_hand = (before - after) / (before - min(expected, after))
+        assert gap["closed_fraction"] <= by_hand + 1e-3
+    if not exclude:
+        assert gap["closed_fraction"] > 0.95
+        assert after == pytest.approx(expected, rel=0.1)
+    bars = [step["held_out"]["after"]["rms_m"] for step in document["steps"]]
+    assert len(bars) == len(document["findings"])
+    if bars:
+        assert bars[-1] == pytest.approx(after)
+
+
+SCRIPT = """
+import sys
+from syncline_design.diagnose import diagnose
+from syncline_design.report.json_out import json_text
+print(json_text(diagnose(sys.argv[1], [sys.argv[2]]).to_json()))
+"""
+
+
+def test_threads_change_no_digit(tmp_path: Path) -> None:
+    """Used as a library, where nothing has set the environment."""
+    folder = written(run_of("constant_speed_eights", DELAY, LEVER), tmp_path)
+    printed = []
+    for threads in ("1", "2"):
+        environment = os.environ | {f"{n}_NUM_THREADS": threads for n in ("OMP", "OPENBLAS")}
+        command = [sys.executable, "-c", SCRIPT, folder / "spec.yaml", folder / "log.csv"]
+        printed.append(subprocess.run(command, env=environment, capture_output=True, check=True))
+    assert printed[0].stdout == printed[1].stdout
