@@ -6,9 +6,11 @@ a what-if (another distance, another limit) meets the same random numbers as the
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import date
-from typing import NoReturn
+from fractions import Fraction
+from typing import Any, NoReturn
 
 from syncline_design.choose.outcome import Unfinished
 from syncline_design.chosen_system import system_of
@@ -19,11 +21,22 @@ from syncline_design.input_files import FileContent
 from syncline_design.known_effects import effect_entries
 from syncline_design.loading import BadInput, LoadedSpec, Problem
 from syncline_design.model.system import ROLES, UTC, RoleName, Sensor, Stage, System
+from syncline_design.problem import with_everything
 from syncline_design.simulate import Decision, SimulationError, SimulationSettings, decide
+from syncline_design.simulate.run import DEFAULT_CAP
 from syncline_design.spec import Requirement
-from syncline_design.timing import NO_ERROR
+from syncline_design.timing import (
+    NO_ERROR,
+    Constant,
+    Distribution,
+    Empirical,
+    Normal,
+    TimingError,
+    Uniform,
+)
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
+WHAT_IF_CAP = 400_000  # samples after which a what-if is left open, and so not offered
 MOST_SIMULATED = 1000  # different systems simulated for one command before it gives up
 
 
@@ -66,6 +79,7 @@ class Simulations:
     )
     systems: set[System] = field(default_factory=set)
     gave_up: bool = False
+    asked: LoadedSpec | None = None  # the spec itself; every other one is a what-if
 
     def decide(
         self, loaded: LoadedSpec, system: System, quantile: float, limit_m: float
@@ -79,7 +93,8 @@ class Simulations:
             if len(self.systems) > self.most:
                 self.gave_up = True
                 raise Unfinished(f"the search stopped after {self.most} simulated designs")
-            self.known[key] = decide(nameless, settings, quantile, limit_m)
+            cap = DEFAULT_CAP if loaded is self.asked else WHAT_IF_CAP
+            self.known[key] = decide(nameless, settings, quantile, limit_m, cap)
         return self.known[key]
 
     def problem_of(self, loaded: LoadedSpec) -> DesignProblem:
@@ -87,10 +102,16 @@ class Simulations:
         wanted = [r for r in loaded.spec.requirements if r.kind == "monte_carlo"]
         wanted = [r for r in wanted if not self._is_waived(r)]
         problem = problem_of(loaded)
+        self.asked = self.asked or loaded
         if not wanted:
             return problem
         limits = tuple((r.id, float(r.limit)) for r in wanted)
-        return replace(problem, judge=_SpecJudge(self, loaded, tuple(wanted), limits))
+        figures = {
+            (table.stage_name, table.role, option.names): (option.error(), option.tau())
+            for table in with_everything(problem).roles
+            for option in table.options
+        }
+        return replace(problem, judge=_SpecJudge(self, loaded, tuple(wanted), limits, figures))
 
     def _is_waived(self, requirement: Requirement) -> bool:
         waiver = requirement.waiver
@@ -105,6 +126,7 @@ class _SpecJudge:
     loaded: LoadedSpec
     requirements: tuple[Requirement, ...]
     limits: tuple[tuple[str, float], ...]
+    figures: Mapping[tuple[str, RoleName, tuple[str, str, str]], tuple[Fraction, Fraction]]
 
     @property
     def gave_up(self) -> bool:
@@ -139,13 +161,25 @@ class _SpecJudge:
     def judge(self, problem: DesignProblem, design: Design) -> Judgement:
         """Every limit in turn; the first that fails settles it."""
         left_open: list[str] = []
-        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
+        system = self._system(problem, design)
         for name, limit in self.limits:
             status = self._status(system, name, limit)
             if status == "fail":
                 return Judgement(failed=(name,))
             left_open += [name] if status == "indeterminate" else []
         return Judgement(undecided=tuple(left_open))
+
+    def _system(self, problem: DesignProblem, design: Design) -> System:
+        """The design's system; an option whose error or tau was grown has its sensor's grown."""
+        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
+        for table, place in zip(problem.roles, design.options, strict=True):
+            option = table.options[place]
+            error, tau = self.figures[table.stage_name, table.role, option.names]
+            noise = option.error() / error if error else Fraction(1)
+            shift = option.tau() / tau if tau else Fraction(1)
+            if noise != 1 or shift != 1:
+                system = _grown(system, table.stage, table.role, float(noise), float(shift))
+        return system
 
     def _status(self, system: System, name: str, limit_m: float) -> str:
         try:
@@ -162,12 +196,42 @@ class _SpecJudge:
     def reached_m(self, problem: DesignProblem, design: Design, requirement: str) -> float:
         """Upper end of the interval of the quantile that the requirement limits [m]."""
         limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
-        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
-        return self._decision(system, requirement, limit).estimate.high_m
+        return self._decision(self._system(problem, design), requirement, limit).estimate.high_m
 
     def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
         """The same at other limits."""
         return replace(self, limits=limits)
+
+
+def _grown(system: System, stage: int, role: RoleName, noise: float, shift: float) -> System:
+    """A system with one sensor's noise and timestamp error times a factor each."""
+    own = system.stages[stage]
+    sensor: Sensor = getattr(own, role)
+    first, second, third = sensor.sigma
+    sensor = replace(
+        sensor,
+        sigma=(first * noise, second * noise, third * noise),
+        timing=_stretched(sensor.timing, shift),
+    )
+    stages = list(system.stages)
+    changed: dict[str, Any] = {role: sensor}
+    stages[stage] = replace(own, **changed)
+    return replace(system, stages=tuple(stages))
+
+
+def _stretched(error: TimingError, factor: float) -> TimingError:
+    """A timestamp error with all its figures times a factor."""
+    match error.distribution:
+        case Uniform(low, high):
+            distribution: Distribution = Uniform(low * factor, high * factor)
+        case Normal(mean, std):
+            distribution = Normal(mean * factor, std * factor)
+        case Constant(value):
+            distribution = Constant(value * factor)
+        case Empirical(values):
+            distribution = Empirical(tuple(value * factor for value in values))
+    left = None if error.calibrated_s is None else error.calibrated_s * factor
+    return replace(error, distribution=distribution, calibrated_s=left)
 
 
 def _noise_alone(system: System, stage: int, role: RoleName) -> System:

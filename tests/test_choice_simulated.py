@@ -223,6 +223,17 @@ def test_measured_figures_flip_the_choice_by_simulation(tmp_path: Path) -> None:
     assert flips["c sigma_position"]["at"] == pytest.approx(0.18)
 
 
+def test_the_ledger_ends_where_simulation_fails(tmp_path: Path) -> None:
+    """c's noise may grow until its quantile is the limit; accuracy would allow far more."""
+    requirements = [simulated(FACTOR[0.95] * 0.18), sums("accuracy", "3 m", "ACC")]
+    found = optimize(spec(tmp_path, requirements), OptimizeSettings())
+    assert found.hinges is not None
+    (row,) = [row for row in found.hinges.slack if row.term == "position sensor error"]
+    assert row.limited_by == "monte_carlo"
+    assert row.fails_at == pytest.approx(math.sqrt(3) * 0.18, rel=0.03)
+    assert row.payload_changes_at == pytest.approx(row.fails_at, rel=0.03)
+
+
 def test_a_waived_simulated_requirement_excludes_nothing(tmp_path: Path) -> None:
     waiver = {"reason": "the buoy is out", "expires": "2999-01-01"}
     loaded = spec(tmp_path, [simulated(0.001) | {"waiver": waiver}])

@@ -32,6 +32,7 @@ from syncline_design.units import Dimension, Quantity
 LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
 LARGEST_SHARE = 10.0  # nor a distance raised above this multiple
 MOST_RANGES = 400
+SIMULATED_CLOSE = 1e-2  # where simulation decides
 MOST_DIGITS = 6
 UNITS_OF: dict[PlatformFigure, str] = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}
 SHARES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.01, LEAST_SHARE)
@@ -140,7 +141,8 @@ class _Asked:
 
     def _edge(self, fails: float, works: float) -> float:
         """The value nearest to one that fails that holds, to 1e-4."""
-        while abs(works - fails) > CLOSE * abs(works):
+        close = CLOSE if self._problem(works).judge is None else SIMULATED_CLOSE
+        while abs(works - fails) > close * abs(works):
             middle = 0.5 * (works + fails)
             works, fails = (middle, fails) if self._holds(middle) else (works, middle)
         return works
