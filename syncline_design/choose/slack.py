@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from syncline_design.choose.acceptable import judgement
 from syncline_design.choose.decide import choose
 from syncline_design.choose.evaluate import broken, chosen_options, evaluate, pair_bound
 from syncline_design.choose.narrowed import narrowed
-from syncline_design.choose.outcome import Choice, NoVerdict, OutOfTime
+from syncline_design.choose.outcome import Choice, NoVerdict, OutOfTime, Unfinished
 from syncline_design.choose.partition import best_of
 from syncline_design.choose.variations import (
     PLATFORM_FIGURES,
@@ -36,6 +37,7 @@ GROWTHS = (1.0 + 1e-9, 1.0001, 1.01, 1.05, *(1.3**k for k in range(1, 53)), 1e6)
 COARSE = (1.0 + 1e-9, 1.1, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0)  # where each try is a simulation
 BISECTIONS = 60
 CLOSE = 1e-6
+SIMULATED_CLOSE = 1e-2  # simulation tells values apart no better at a bearable number of samples
 
 
 @dataclass(frozen=True, slots=True)
@@ -251,6 +253,7 @@ def _with_payload(
     Every value is solved again: a term that grows can lose a tie of price long before a limit, and
     a worse sensor can make a cheaper design keep its sync limit.
     """
+    row = _simulated(row, problem, design, changed)
     never = ("verdict",) if fails_never else ()
     if fails_never and _is_sole(problem):
         return replace(row, never=(*never, "payload"))
@@ -263,7 +266,7 @@ def _with_payload(
 
     values = _tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
     try:
-        at = _first(same, values, row.value)
+        at = _first(same, values, row.value, CLOSE if problem.judge is None else SIMULATED_CLOSE)
     except OutOfTime:
         raise
     except NoVerdict:  # what cannot be proven is not claimed
@@ -271,6 +274,28 @@ def _with_payload(
     if at is not None and row.fails_at is not None and abs(at - row.fails_at) <= 1e-6 * at:
         at = row.fails_at
     return replace(row, payload_changes_at=at, searched_to=values[-1], never=never)
+
+
+def _simulated(
+    row: Slack, problem: Problem, design: Design, changed: Callable[[float], Problem]
+) -> Slack:
+    """The row with the value at which the design fails in simulation, where that comes first."""
+    if problem.judge is None or not row.value > 0.0:
+        return row
+
+    def holds(at: float) -> bool:
+        other = changed(at)
+        same = same_design(problem, design, other)
+        return same is None or not judgement(other, same).failed
+
+    works, fails = row.value, row.fails_at or row.value * COARSE[-1]
+    try:
+        if fails <= works or holds(fails):
+            return row
+        at = _edge(holds, works, fails, SIMULATED_CLOSE)
+    except Unfinished:
+        return row
+    return replace(row, fails_at=at, limited_by="monte_carlo")
 
 
 def _chosen(problem: Problem) -> Design | None:
@@ -306,20 +331,23 @@ def _tried(value: float, growths: Sequence[float], fails_at: float | None = None
 
 
 def _first(
-    holds: Callable[[float], bool], values: Sequence[float], start: float | None = None
+    holds: Callable[[float], bool],
+    values: Sequence[float],
+    start: float | None = None,
+    close: float = CLOSE,
 ) -> float | None:
-    """Least of the values (and between them, to CLOSE) at which something no longer holds."""
+    """Least of the values (and between them, to `close`) at which something no longer holds."""
     last = values[0] if start is None else start
     for value in values:
         if not holds(value):
-            return _edge(holds, last, value)
+            return _edge(holds, last, value, close)
         last = value
     return None
 
 
-def _edge(holds: Callable[[float], bool], works: float, fails: float) -> float:
+def _edge(holds: Callable[[float], bool], works: float, fails: float, close: float) -> float:
     for _ in range(BISECTIONS):
-        if fails - works <= CLOSE * abs(fails):
+        if fails - works <= close * abs(fails):
             break
         middle = 0.5 * (works + fails)
         works, fails = (middle, fails) if holds(middle) else (works, middle)
