@@ -25,7 +25,7 @@ name: scanner
 requirements: [{{id: ACC-1, kind: accuracy, limit: 5 m}}]
 stages:
   - name: car
-    platform: {{v_max: 9 m/s, omega_max: 40 deg/s, distance: 60 m, baseline: 0.5 m}}
+    platform: {{v_max: 9 m/s, omega_max: 40 deg/s, distance: 250 m, baseline: 0.5 m}}
     position:
       sensor: {{modality: position, type: gnss, sigma_position: {SIGMA_M} m, primitives: [pps]}}
       primitive: pps
