@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from difflib import get_close_matches
+from typing import TYPE_CHECKING
 
 from syncline_design.estimates import figure
 from syncline_design.loading import BadInput, LoadedSpec
 from syncline_design.model.system import EffectEntry, RoleName, System
 from syncline_design.spec import EffectChoice
 from syncline_design.yaml_reader import KeyPath, Problem, show_path
+
+if TYPE_CHECKING:
+    from syncline_design.effects.base import Parameter
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,17 +80,19 @@ def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator
         place = (*at, "parameters")
         if parameter.name not in effect.parameters:
             yield _problem(loaded, place, f"missing parameter {parameter.name}", "", names)
-        elif misfit := _misfit(effect.parameters[parameter.name], parameter.choices):
-            wanted = list(parameter.choices) or ["a number"]
+        elif misfit := _misfit(effect.parameters[parameter.name], parameter):
+            wanted = list(parameter.choices) or [parameter.domain]
             found = str(effect.parameters[parameter.name])
             yield _problem(loaded, (*place, parameter.name), misfit, found, wanted)
 
 
-def _misfit(value: float | str, choices: tuple[str, ...]) -> str | None:
-    """What is wrong with a parameter's value; choices: the words it may be, none for a number."""
-    if isinstance(value, str) != bool(choices):
+def _misfit(value: float | str, parameter: Parameter) -> str | None:
+    """What is wrong with a parameter's value."""
+    if isinstance(value, str) != bool(parameter.choices):
         return "wrong kind of value"
-    return "not one of the choices" if choices and value not in choices else None
+    if isinstance(value, str):
+        return None if value in parameter.choices else "not one of the choices"
+    return None if parameter.holds(float(value)) else "out of range"
 
 
 def _problem(

@@ -7,6 +7,7 @@ errors; the linear sensitivity beside it is what the diagnosis screens with.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Literal
@@ -112,6 +113,9 @@ class Parameter:
 
     choices: what a discrete parameter may be; its value is then a text.
     located: the error depends on it only through where along the log something happens.
+    above, most: the values between which the effect exists at all, `above` left out (a factor of
+    noise is more than 0, a share at most 1); one that is not signed is at least 0.
+    whole: a whole number.
     """
 
     name: str
@@ -121,6 +125,25 @@ class Parameter:
     signed: bool = True
     choices: tuple[str, ...] = ()
     located: bool = False
+    above: float = -math.inf
+    most: float = math.inf
+    whole: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether the effect exists with this value."""
+        small = value <= self.above or (not self.signed and value < 0.0)
+        return not (small or value > self.most or (self.whole and not value.is_integer()))
+
+    @property
+    def domain(self) -> str:
+        """The values that `holds` takes, in words."""
+        kind = "a whole number" if self.whole else "a number"
+        least = (
+            "at least 0" if not self.signed and self.above < 0.0 else f"more than {self.above:g}"
+        )
+        bounds = [least] if not self.signed or self.above > -math.inf else []
+        bounds += [f"at most {self.most:g}"] if self.most < math.inf else []
+        return " ".join([kind, " and ".join(bounds)]).strip()
 
 
 @dataclass(frozen=True, slots=True)

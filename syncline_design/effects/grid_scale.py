@@ -44,7 +44,7 @@ EFFECT = Effect(
     name="grid_scale",
     sensors=("target",),
     kind="deterministic",
-    parameters=(Parameter("scale", 1e-7, 0.01),),
+    parameters=(Parameter("scale", 1e-7, 0.01, above=-1.0),),
     sentence="the survey's grid is too large by a share of {scale}",
     confused_with="datum_offset on a short baseline",
     separated_by="a long baseline",

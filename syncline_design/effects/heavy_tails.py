@@ -57,8 +57,8 @@ EFFECT = Effect(
     sensors=("position",),
     kind="stochastic",
     parameters=(
-        Parameter("degrees_of_freedom", 1.0, 30.0, signed=False),
-        Parameter("outlier_rate", 0.0, 0.3, signed=False),
+        Parameter("degrees_of_freedom", 1.0, 30.0, signed=False, above=0.0),
+        Parameter("outlier_rate", 0.0, 0.3, signed=False, most=1.0),
     ),
     sentence="positions have heavy tails: {degrees_of_freedom} degrees of freedom, a share of "
     "{outlier_rate} outliers",

@@ -31,7 +31,7 @@ EFFECT = Effect(
     name="integer_second_slip",
     sensors=("position",),
     kind="discrete",
-    parameters=(Parameter("seconds", 1.0, 18.0, "s"),),
+    parameters=(Parameter("seconds", 1.0, 18.0, "s", whole=True),),
     sentence="the position stamps are ahead by {seconds}, whole seconds",
     confused_with="a latency of the same size",
     separated_by="nothing needs to: a whole number of seconds is a matter of time scales",

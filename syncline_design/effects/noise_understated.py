@@ -54,7 +54,7 @@ EFFECT = Effect(
     name="noise_understated",
     sensors=("position", "attitude", "ranging"),
     kind="stochastic",
-    parameters=(Parameter("factor", 1.0, 100.0, signed=False),),
+    parameters=(Parameter("factor", 1.0, 100.0, signed=False, above=0.0),),
     sentence="{sensor} data scatter {factor} times as much as the spec says",
     confused_with="heavy_tails, correlated_noise, timestamp_jitter",
     separated_by="a longer log; standing still",

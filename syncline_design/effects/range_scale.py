@@ -37,7 +37,7 @@ EFFECT = Effect(
     name="range_scale",
     sensors=("ranging",),
     kind="deterministic",
-    parameters=(Parameter("scale", 1e-6, 0.2),),
+    parameters=(Parameter("scale", 1e-6, 0.2, above=-1.0),),
     sentence="ranges are too long by a share of {scale}",
     confused_with="range_bias; sound_speed, straight below the array",
     separated_by="a spread of ranges",

@@ -74,7 +74,7 @@ EFFECT = Effect(
     name="sound_speed",
     sensors=("ranging",),
     kind="deterministic",
-    parameters=(Parameter("relative_error", 1e-5, 0.1),),
+    parameters=(Parameter("relative_error", 1e-5, 0.1, above=-1.0),),
     sentence="the speed of sound in use is too high by a share of {relative_error}",
     confused_with="range_scale and turnaround_delay, straight below",
     separated_by="beams far off the array's normal, a spread of ranges",
