@@ -28,6 +28,7 @@ from syncline_design.effects.base import Array
 from syncline_design.simulate.chain import euler_to_rotation, rotation_to_euler
 
 Index = NDArray[np.intp]
+TURNING = ("yaw_rad", "azimuth_rad", "longitude_rad")  # where 180 deg and -180 deg are neighbours
 REACH = 2.5  # intervals of the other file across which its values are still interpolated
 
 
@@ -131,10 +132,19 @@ def interpolated(
     for name, values in taken.items():
         if name not in result:
             slope = taken.get(_slope_name(name))
-            result[name] = hermite(own, values, slope, stamps, right)
+            whole = _unwound(values) if name.endswith(TURNING) else values
+            result[name] = hermite(own, whole, slope, stamps, right)
     for values in result.values():
         values[~covered] = np.nan
     return result, covered
+
+
+def _unwound(angle: Array) -> Array:
+    """An angle [rad] without the jumps of a whole turn."""
+    known = np.isfinite(angle)
+    result = angle.copy()
+    result[known] = np.unwrap(angle[known])
+    return result
 
 
 def _slope_name(name: str) -> str:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from syncline_design.diagnose.columns import GEODETIC, POSITION, REFERENCE, TARGET, shown
+from syncline_design.diagnose.local_level import turned_to_origin
+from syncline_design.diagnose.log import Track
 from syncline_design.diagnose.refusals import refuse
 from syncline_design.effects.base import Array
 
@@ -16,18 +19,24 @@ HIGHEST_RAD = 0.5 * np.pi + 1e-12
 
 
 def made_local(
-    path: Path, columns: dict[str, Array], first: str, origin: Origin | None
-) -> list[str]:
-    """Add local columns for all places in WGS 84; what was done, for people.
+    path: Path,
+    columns: dict[str, Array],
+    tracks: Mapping[str, Track],
+    prefixes: Sequence[str],
+    origin: Origin | None,
+) -> tuple[dict[str, Track], list[str]]:
+    """Add local columns for all places in WGS 84 and turn the attitudes and velocities with them.
 
-    first: prefix of the first stage.  Without a stated origin it is the first complete row, which
-    suits only a log whose places are all in WGS 84.
+    Gives the tracks, turned alike, and what was done, for people.  Without a stated origin it is
+    the first complete row, which suits only a log whose places are all in WGS 84.
     """
+    first = prefixes[0]
     pairs = {first: tuple(first + n for n in POSITION), "reference_": REFERENCE, "target_": TARGET}
     notes: list[str] = []
     used = {p: tuple(p + g for g in GEODETIC) for p in pairs if _has_place(columns, p)}
     if not used:
-        return ["the origin that the spec states has no use: no place is in WGS 84"] * bool(origin)
+        idle = ["the origin that the spec states has no use: no place is in WGS 84"]
+        return dict(tracks), idle * bool(origin)
     level = _level(columns, used, origin)
     for names in used.values():
         if names[2] not in columns:
@@ -44,7 +53,13 @@ def made_local(
             del columns[pairs[prefix][2]]
     where = "at the first row" if origin is None else "at the spec's origin"
     at = f"{np.degrees(start[0]):.7f} deg, {np.degrees(start[1]):.7f} deg, {start[2]:.3f} m"
-    return [*notes, f"WGS 84 positions were made local (north, east, down) {where}, {at}"]
+    notes.append(f"WGS 84 positions were made local (north, east, down) {where}, {at}")
+    own = next((p for p in (first, "reference_") if p in used), None)
+    if own is None:  # only targets are in WGS 84: the vehicle's frame is that of its places
+        return dict(tracks), notes
+    went = np.stack([columns[n] for n in used[own][:2]], axis=1)
+    turned, said = turned_to_origin(columns, tracks, prefixes, went, start)
+    return turned, [*notes, *said]
 
 
 def _has_place(columns: dict[str, Array], prefix: str) -> bool:

@@ -75,7 +75,10 @@ def read_log(
     slip = (names, slip_s if len(paths) > 1 else 0.0)
     tables = read_tables([Path(p) for p in paths], mapping or {}, tuple(stages), slip)
     draft = _draft(tables, prefixes)
-    draft.notes += places.made_local(draft.path, draft.columns, prefixes[0], origin)
+    draft.tracks, said = places.made_local(
+        draft.path, draft.columns, draft.tracks, prefixes, origin
+    )
+    draft.notes += said
     kind = _kind(draft, prefixes, needs_ranging)
     draft.notes += planar.filled(draft.columns, prefixes, kind)
     _demand_columns(draft, prefixes, kind)
