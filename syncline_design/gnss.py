@@ -7,6 +7,7 @@ the vehicle's: one of the stages that share it has to have the time.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
@@ -14,7 +15,8 @@ from typing import Literal
 from syncline_design.catalog import Catalog, ClockEntry, SensorEntry, TimestampingEntry
 from syncline_design.spec import Spec, StageChoice
 
-GNSS_TYPE = "gnss"
+GENERIC = ("gnss", "gps")  # inside a word too: dgps, GnssCompass
+NAMES = {"glonass", "galileo", "beidou", "rtk", "ppp", "sbas"}
 Code = Literal["gnss"]
 
 
@@ -54,9 +56,18 @@ def _is_submerged(stage: StageChoice) -> bool:
     return stage.depth is not None and stage.depth > 0
 
 
+def is_receiver(kind: str) -> bool:
+    """Whether a sensor's free word for its type names a GNSS receiver: gnss, gps, gnss_rtk, DGPS.
+
+    gnss/ins counts: without its receiver it is an INS, and its type says so.
+    """
+    words = re.split(r"[^a-z0-9]+", kind.casefold())
+    return any(word in NAMES or any(part in word for part in GENERIC) for word in words)
+
+
 def barred_sensor(spec: Spec, stage: StageChoice, name: str, sensor: SensorEntry) -> Barred | None:
     """Why a sensor cannot work on a stage; None where it can."""
-    needs = "gnss" in sensor.needs or sensor.type.strip().lower() == GNSS_TYPE
+    needs = "gnss" in sensor.needs or is_receiver(sensor.type)
     if not needs or has_gnss(spec, stage):
         return None
     hint = "write gnss: yes in the stage where its antenna is above the water"

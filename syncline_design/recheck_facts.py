@@ -8,11 +8,15 @@ zero), and no other one.  Time also comes along `timing_from`, as many cables on
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
 from syncline_design.loading import LoadedSpec
 from syncline_design.selection import Selection
+
+# Types of sensors that receive GNSS: gnss or gps anywhere, systems and methods as whole words.
+RECEIVER = re.compile(r"gnss|gps|(?<![a-z0-9])(?:glonass|galileo|beidou|rtk|ppp|sbas)(?![a-z0-9])")
 
 
 def impossible(loaded: LoadedSpec, selection: Selection) -> list[str]:
@@ -27,7 +31,7 @@ def _sensors_and_methods(loaded: LoadedSpec, selection: Selection) -> Iterator[s
         choice = stages[one.stage].role(one.role)
         given: Any = getattr(choice, "sensor", None)
         sensor = given if hasattr(given, "modality") else loaded.catalog.sensors[one.sensor]
-        listens = _asks(sensor) or sensor.type.strip().casefold() == "gnss"
+        listens = _asks(sensor) or RECEIVER.search(sensor.type.casefold()) is not None
         if listens and one.stage not in received:
             yield f"{one.sensor} ({one.role} of {one.stage}) needs GNSS, {one.stage} has none"
         if hasattr(getattr(choice, "timestamping", None), "error"):

@@ -146,6 +146,24 @@ def test_a_sensor_of_type_gnss(keys: Stage, has: bool, tmp_path: Path) -> None:
         assert (gone["sensor"], gone["primitive"], gone["method"]) == ("ublox_f9p_rtk", None, None)
 
 
+RECEIVERS = ["gnss", " GNSS ", "gnss_rtk", "rtk gnss", "GNSS/INS", "gnss-compass", "GPS", "dgps",
+             "Galileo", "rtk", "ppp"]  # fmt: skip
+OTHERS = ["", "ins", "usbl", "total_station", "total station", "pingpong", "artkit", "lbl"]
+
+
+@pytest.mark.parametrize("kind", [*RECEIVERS, *OTHERS])
+def test_a_receiver_by_any_of_its_names(kind: str, tmp_path: Path) -> None:
+    """Oracle: the two lists, by what the words mean; solvers and recheck agree on each."""
+    antenna = single(depth="50 m")["position"]
+    antenna = antenna | {"sensor": antenna["sensor"] | {"type": kind}}
+    path = written(tmp_path, single(depth="50 m", position=antenna))
+    assert check_file(path, QUICK)["verdict"] == ("fails" if kind in RECEIVERS else "meets")
+    roles = [RoleSelection("fish", role, f"fish.{role}", "pps", "hardware")  # type: ignore[arg-type]
+             for role in ("position", "attitude", "ranging")]  # fmt: skip
+    named = impossible(load(path), Selection(tuple(roles), (ClockSelection("fish", None),)))
+    assert len(named) == (kind in RECEIVERS)
+
+
 ship = {"clock": "pps_gpio"}
 CHAINS: list[tuple[list[Stage], list[bool], list[bool]]] = [
     # keys of the stages; which have GNSS, which its time
