@@ -66,6 +66,18 @@ def proof_json(picked: Picked) -> Json:
     }
 
 
+def unproven_json(method: str) -> Json:
+    """The proof of a search that ended before it found any design."""
+    return {
+        "method": method,
+        "optimal": False,
+        "rechecked": False,
+        "gap": None,
+        "agrees_with": [],
+        "passed_over": 0,
+    }
+
+
 def front_json(
     loaded: LoadedSpec,
     problem: Problem,

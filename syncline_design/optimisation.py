@@ -15,6 +15,7 @@ from syncline_design.choice_data import (
     left_out,
     left_out_text,
     proof_json,
+    unproven_json,
 )
 from syncline_design.choose import presentation
 from syncline_design.choose.decide import best
@@ -38,9 +39,9 @@ from syncline_design.resolution import timestamping_of
 from syncline_design.selection import RoleSelection
 from syncline_design.spec import InlineTimestamping
 from syncline_design.spec_writer import PinnedRole, pinned_spec_text
-from syncline_design.time_limit import Deadline, Pieces, in_force, within
+from syncline_design.time_limit import Deadline, OutOfTime, Pieces, in_force, within
 from syncline_design.verdict import files_json
-from syncline_design.verify import CheckSettings, open_verdict, verify
+from syncline_design.verify import CheckSettings, open_verdict, unfinished_verdict, verify
 from syncline_design.yaml_reader import printable
 
 SCHEMA = "syncline-design/optimization/v1"
@@ -74,12 +75,15 @@ class Hinges:
 
 @dataclass(frozen=True, slots=True)
 class Optimisation:
-    """The best designs, or why there is none."""
+    """The best designs, or why there is none.
+
+    picked: None when the time limit came before any design; `unfinished` says so.
+    """
 
     loaded: LoadedSpec
     problem: Problem
     settings: OptimizeSettings
-    picked: Picked
+    picked: Picked | None
     designs: tuple[Design, ...]
     front: tuple[FrontPoint, ...]
     prices: tuple[Step, ...]
@@ -87,10 +91,13 @@ class Optimisation:
     explanation: Explanation | None
     cut_short: tuple[str, ...] = ()  # what the time limit left out or incomplete
     verdict: Json | None = None
+    unfinished: str = ""
 
     @property
     def exit_code(self) -> int:
-        """0: a design; 1: none; 3: the search for one that passes simulation was cut short."""
+        """0: a design; 1: none; 3: the search for one was cut short."""
+        if self.picked is None:
+            return 3
         found = self.picked.verified
         if found is None:
             return 1
@@ -105,19 +112,22 @@ def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
 
 
 def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
-    in_force().doing("choosing")
     build = Simulations(settings.seed).problem_of
     problem = build(loaded)
     simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
     checking = CheckSettings(
         settings.seed, settings.method, monte_carlo=simulated or settings.report
     )
-    picked = pick(
-        problem,
-        settings.method,
-        None,
-        lambda design: verify(loaded, problem, design, checking),
-    )
+    try:
+        in_force().doing("choosing")
+        picked = pick(
+            problem,
+            settings.method,
+            None,
+            lambda design: verify(loaded, problem, design, checking),
+        )
+    except OutOfTime as error:
+        return _unfinished(loaded, problem, settings, checking, str(error))
     pieces, nothing = Pieces(), _no_points()
     points = nothing
     if settings.pareto:
@@ -131,12 +141,28 @@ def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
         designs = _designs(problem, chosen, settings.count, pieces)
         if picked.verified.word == "meets":
             hinges = _hinges((loaded, problem, chosen, build), pieces)
+    if explanation is not None and explanation.cut_short:
+        pieces.cut_short.append("reasons and remedies")
     steps = staircase([point for point in points if not point.undecided])
     found = Optimisation(
         loaded, problem, settings, picked, designs, points, steps, hinges,
         explanation, tuple(pieces.cut_short),
     )  # fmt: skip
     return replace(found, verdict=_verdict(found, checking)) if settings.report else found
+
+
+def _unfinished(
+    loaded: LoadedSpec,
+    problem: Problem,
+    settings: OptimizeSettings,
+    checking: CheckSettings,
+    why: str,
+) -> Optimisation:
+    """What there is to say when the time limit came before any design."""
+    verdict = unfinished_verdict(loaded, problem, checking, why) if settings.report else None
+    return Optimisation(
+        loaded, problem, settings, None, (), (), (), None, None, ("choosing",), verdict, why
+    )
 
 
 def _no_points() -> tuple[FrontPoint, ...]:
@@ -164,6 +190,7 @@ def _hinges(given: tuple[LoadedSpec, Problem, Design, Build], pieces: Pieces) ->
 
 def _verdict(found: Optimisation, checking: CheckSettings) -> Json:
     """The verdict of the same design, for a page: nothing is chosen a second time."""
+    assert found.picked is not None
     points = found.front if found.settings.pareto and found.settings.resource == "cost" else None
     return open_verdict(found.loaded, found.problem, found.picked, checking, points=points)
 
@@ -175,7 +202,7 @@ def optimisation_json(found: Optimisation) -> Json:
         "schema": SCHEMA,
         "verdict": "infeasible" if found.exit_code == 1 else "meets",
         "spec": {"name": loaded.spec.name, "file": str(loaded.path)},
-        "proof": proof_json(found.picked),
+        "proof": _proof(found),
         "combinations": str(problem.combinations),
         "designs": designs_json(loaded, problem, found.designs),
         **excluded_json(problem),
@@ -190,6 +217,8 @@ def optimisation_json(found: Optimisation) -> Json:
     }
     if found.exit_code == 3:
         data["verdict"] = "indeterminate"
+    if found.unfinished:
+        data["message"] = _unfinished_line(found)
     if found.settings.pareto:
         data["front"] = front_json(loaded, problem, found.front, found.settings.resource)
         data["front_left_out"] = left_out(loaded, problem, found.settings.resource)
@@ -206,25 +235,37 @@ def optimisation_json(found: Optimisation) -> Json:
     return data
 
 
+def _proof(found: Optimisation) -> Json:
+    if found.picked is None:
+        return unproven_json(found.settings.method)
+    return proof_json(found.picked)
+
+
+def _unfinished_line(found: Optimisation) -> str:
+    return f"No verdict: {found.unfinished}; no design was found by then."
+
+
 def optimisation_text(found: Optimisation) -> str:
     """The same for a terminal."""
     problem, currency = found.problem, found.loaded.spec.currency
     blocks = [[f"{found.loaded.spec.name} ({found.loaded.path})"]]
     if found.explanation is not None:
         blocks.append(found.explanation.lines())
-    if found.designs:
-        blocks.append([_proof_line(found)])
+    if found.unfinished:
+        blocks.append([_unfinished_line(found)])
+    if found.picked is not None and found.designs:
+        blocks.append([_proof_line(found, found.picked)])
         blocks.append(presentation.designs_table(problem, found.designs, currency))
     if found.front:
         title = f"Exact front of {found.settings.resource} against error, all else met:"
         table = presentation.front_table(problem, found.front, found.settings.resource, currency)
         prices = presentation.staircase_lines(found.prices, currency, found.settings.resource)
         blocks += [[title, *table], ["What accuracy costs:", *(f"  {line}" for line in prices)]]
-    if found.settings.pareto:
+    if found.settings.pareto and found.picked is not None:
         missing = left_out(found.loaded, problem, found.settings.resource)
         blocks += [[left_out_text(missing, found.settings.resource)]] if missing else []
     blocks += _hinge_blocks(found.hinges)
-    if found.cut_short:
+    if found.cut_short and not found.unfinished:
         blocks.append([f"The time limit ended this too early: {', '.join(found.cut_short)}."])
     shown = ["\n".join(printable(line, len(line)) for line in block) for block in blocks]
     return "\n\n".join(shown) + "\n"
@@ -241,8 +282,8 @@ def _hinge_blocks(hinges: Hinges | None) -> list[list[str]]:
     return [*blocks, told] if told else blocks
 
 
-def _proof_line(found: Optimisation) -> str:
-    proof = found.picked.choice.proof
+def _proof_line(found: Optimisation, picked: Picked) -> str:
+    proof = picked.choice.proof
     if not proof.optimal:
         gap = "" if proof.gap is None else f": the optimum is at most {100 * proof.gap:.3g} % lower"
         return (
@@ -252,7 +293,7 @@ def _proof_line(found: Optimisation) -> str:
         )
     confirmed = " and ".join(ROADS.get(road, road) for road in proof.agrees_with)
     others = f", confirmed by {confirmed}" if confirmed else ""
-    passed = found.picked.passed_over
+    passed = picked.passed_over
     skipped = f"; {passed} better ones fail the Monte Carlo requirements" if passed else ""
     return (
         f"Best of {problem_size(found.problem)} combinations by {found.loaded.spec.objective}: "

@@ -126,7 +126,7 @@ def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
         try:
             return _check_open(loaded, problem, replace(settings, time_limit_s=None), build)
         except OutOfTime as error:
-            return _unfinished_json(loaded, problem, settings, str(error))
+            return unfinished_verdict(loaded, problem, settings, str(error))
 
 
 def _pinned_verdict(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
@@ -140,16 +140,19 @@ def _pinned_verdict(loaded: LoadedSpec, problem: DesignProblem, settings: CheckS
     return _verdict_json(loaded, everything, verified, settings, excluded_json(problem))
 
 
-def _unfinished_json(
+def unfinished_verdict(
     loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, why: str
 ) -> Json:
     """A verdict that the time limit left without a design."""
+    from syncline_design.choice_data import unproven_json
+
     data = frame(loaded, problem, "indeterminate", settings.seed)
     data["requirements"] = [
         _placed(loaded, index, one, _unmet(loaded, one, in_conflict=False), settings).to_json()
         for index, one in enumerate(loaded.spec.requirements)
     ]
     data["warnings"] = [{"code": "time-limit", "message": f"{why}; no design was found by then"}]
+    data["choice"] = {"proof": unproven_json(settings.method)}
     return data
 
 
@@ -245,19 +248,27 @@ def _infeasible_json(
     data["infeasibility"] = found.to_json() | {"text": found.lines()}
     conflict = {m.id for members in (found.conflict, *found.further) for m in members}
     data["requirements"] = [
-        _placed(loaded, index, one, _unmet(loaded, one, one.id in conflict), settings).to_json()
+        _placed(
+            loaded, index, one, _unmet(loaded, one, one.id in conflict, found.minimal), settings
+        ).to_json()
         for index, one in enumerate(loaded.spec.requirements)
     ]
     data["choice"] = excluded_json(problem)
+    if found.cut_short:
+        message = "the time limit ended the search for reasons and remedies"
+        data["warnings"] = [{"code": "time-limit", "message": message}]
     return data
 
 
-def _unmet(loaded: LoadedSpec, one: Requirement, in_conflict: bool) -> RequirementResult:
+def _unmet(
+    loaded: LoadedSpec, one: Requirement, in_conflict: bool, minimal: bool = True
+) -> RequirementResult:
     """A requirement of a spec without a design: part of the conflict, or not reached."""
     unit = UNITS.get(one.kind, loaded.spec.currency)
     quantile = None if one.quantile is None else float(one.quantile)
     status: Status = "fail" if in_conflict else "indeterminate"
-    note = "part of the conflict" if in_conflict else "no design to judge it by"
+    part = "part of the conflict" if minimal else "perhaps part of the conflict"
+    note = part if in_conflict else "no design to judge it by"
     limit = one.limit
     if one.kind == "cost" and isinstance(limit, Quantity):
         limit = float(loaded.spec.in_currency(limit))

@@ -22,6 +22,7 @@ from syncline_design.choose.variations import Build
 from syncline_design.design_space import Problem, RoleTable, VehicleTable
 from syncline_design.loading import LoadedSpec
 from syncline_design.problem import build_problem
+from syncline_design.time_limit import in_force
 
 Found = TypeVar("Found")
 
@@ -69,7 +70,8 @@ class Explanation:
 
     further: conflicts that remain once the first is lifted; where there are any, no requirement
     alone can be moved far enough.  joint: changes that help together.  each_suffices: whether the
-    spec has a design without any one requirement of the conflict.
+    spec has a design without any one requirement of the conflict.  cut_short: the time limit ended
+    the search for reasons and remedies, so what is not there may still exist.
     """
 
     gaps: tuple[RoleGap, ...]
@@ -79,6 +81,7 @@ class Explanation:
     further: tuple[tuple[ConflictMember, ...], ...] = ()
     joint: tuple[tuple[Fix, ...], ...] = ()
     each_suffices: bool = False
+    cut_short: bool = False
 
     def to_json(self) -> dict[str, Any]:
         """The value of `infeasibility`."""
@@ -88,6 +91,7 @@ class Explanation:
             "further_conflicts": [_members_json(one) for one in self.further],
             "fixes": [fix.to_json() for fix in self.fixes],
             "joint_fixes": [[fix.to_json() for fix in together] for together in self.joint],
+            "cut_short": self.cut_short,
         }
 
     def lines(self) -> list[str]:
@@ -100,11 +104,17 @@ class Explanation:
         if self.fixes:
             out.append("Any one of these changes makes it feasible (each solved again):")
             out += [f"  - {fix.text}" for fix in self.fixes]
-        else:
+        elif not self.cut_short:
             out.append("No single change of a requirement, platform or method was found to help.")
         if self.joint:
             out.append("Changes that do so together (solved again):")
             out += ["  - " + " and ".join(f.text for f in together) for together in self.joint]
+        if self.cut_short:
+            which = "further" if self.fixes or self.joint else "any"
+            out.append(
+                f"The time limit ended the search for reasons and remedies: whether {which} change "
+                "would help was not worked out."
+            )
         return out
 
 
@@ -151,6 +161,7 @@ def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) 
         tuple(tuple(_member(loaded, part) for part in parts) for parts in further),
         joint,
         _each_suffices(loaded, problem, build, conflict),
+        cut_short=in_force().is_over,  # once over, every search after it ended without an answer
     )
 
 

@@ -1,0 +1,78 @@
+"""What a time limit leaves unsaid is said to be unsaid, in every command and format."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from syncline_design.choose import explain as explaining
+from syncline_design.cli import app
+from syncline_design.time_limit import in_force
+
+SPECS = Path(__file__).parent.parent / "specs"
+OPEN = str(SPECS / "uav_corridor.yaml")
+
+
+def run(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, list(words))
+    return done.exit_code, done.output
+
+
+@pytest.mark.parametrize("extra", [[], ["--pareto", "--best", "3"], ["--method", "milp"]])
+def test_optimize_without_a_design_in_time_still_answers(extra: list[str], tmp_path: Path) -> None:
+    out = {name: tmp_path / f"out.{name}" for name in ("json", "html", "csv")}
+    targets = [word for name, path in out.items() for word in ("-o", f"{name}:{path}")]
+    code, text = run("optimize", OPEN, "--time-limit", "0", *extra, *targets)
+    assert code == 3
+    assert "time limit" in text
+    data = json.loads(out["json"].read_text("utf-8"))
+    assert (data["verdict"], data["designs"]) == ("indeterminate", [])
+    assert (data["proof"]["optimal"], data["proof"]["rechecked"]) == (False, False)
+    assert "time limit" in data["message"]
+    assert "time limit" in out["html"].read_text("utf-8")
+    assert len(out["csv"].read_text("utf-8").splitlines()) == 1
+
+
+def test_check_without_a_design_in_time_has_no_proof(tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    code, _ = run("check", OPEN, "--time-limit", "0", "-o", f"json:{out}")
+    data = json.loads(out.read_text("utf-8"))
+    assert (code, data["verdict"]) == (3, "indeterminate")
+    assert data["choice"]["proof"]["optimal"] is False
+
+
+@pytest.mark.parametrize("spec", ["infeasible_example", "infeasible_no_option"])
+@pytest.mark.parametrize("command", ["check", "optimize"])
+def test_remedies_cut_short_are_not_called_none(
+    command: str, spec: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both specs have fixes; a search that ended before them must not deny them."""
+    path, out = str(SPECS / f"{spec}.yaml"), tmp_path / "out.json"
+    code, whole = run(command, path, "-o", f"json:{out}")
+    told = json.loads(out.read_text("utf-8"))["infeasibility"]
+    assert code == 1
+    assert told["fixes"]
+    assert told["cut_short"] is False
+    assert "time limit" not in whole
+    real = explaining.parts_of
+
+    def at_the_end(problem: Any) -> Any:
+        in_force()._end = 0.0  # the time is over just when the reasons are looked for
+        return real(problem)
+
+    monkeypatch.setattr(explaining, "parts_of", at_the_end)
+    code, text = run(command, path, "--time-limit", "60", "-o", f"json:{out}")
+    data = json.loads(out.read_text("utf-8"))
+    assert (code, data["verdict"]) == (1, "infeasible")
+    assert data["infeasibility"]["cut_short"] is True
+    assert "No single change" not in text
+    assert "was not worked out" in text
+    if command == "check":
+        assert [w["code"] for w in data["warnings"]] == ["time-limit"]
+        assert not any(r["note"].startswith("part of") for r in data["requirements"])
+    else:
+        assert data["cut_short"] == ["reasons and remedies"]
