@@ -72,6 +72,27 @@ def test_no_warning_above_the_worst_case_nor_where_the_limit_is_missed() -> None
         assert not [w for w in found["warnings"] if w["code"] == WORST]
 
 
+def test_noise_that_is_known_to_be_larger_counts_in_the_worst_case() -> None:
+    """Positions that scatter three times as much add 2 sigma_p, all in one line, by hand."""
+    true = worst_by_hand_m() + 2.0 * 0.05 * math.sqrt(3.0)
+    known = "effects: [{effect: noise_understated, sensor: position, parameters: {factor: 3}}]"
+    for limit, warns in ((true - 0.03, True), (true + 0.03, False)):
+        found = verdict(f"{limit} m", known)
+        assert found["verdict"] == "meets"
+        assert limit > worst_by_hand_m()
+        assert [w["requirement"] for w in found["warnings"] if w["code"] == WORST] == (
+            ["NEAR"] if warns else []
+        )
+
+
+def test_a_waived_limit_does_not_hide_that_a_kept_one_is_exceeded() -> None:
+    kept = "  - {id: KEPT, kind: accuracy, limit: 1 m}"
+    found = verdict("0.2 m, waiver: {reason: trial, expires: 2999-01-01}", kept)
+    assert found["verdict"] == "meets"
+    assert 1.0 < worst_by_hand_m() < 2.0
+    assert [w["requirement"] for w in found["warnings"] if w["code"] == WORST] == ["KEPT"]
+
+
 def test_warnings_say_what_they_are_about() -> None:
     more = "  - {id: LOW, kind: sync, limit: 0.0001, waiver: {reason: trial, expires: 2999-01-01}}"
     for warned in verdict("0.80 m", more)["warnings"]:
