@@ -158,6 +158,14 @@ def _waivers(verified: Verified) -> Iterator[Caution]:
 def _simulation(verified: Verified) -> Iterator[Caution]:
     if verified.monte_carlo is None:
         yield Caution("no-monte-carlo", f"no Monte Carlo cross-check: {verified.trouble}")
+        return
+    ensemble = verified.monte_carlo.ensemble
+    if ensemble is not None and ensemble.outside:
+        yield Caution(
+            "trajectory-outside",
+            f"{ensemble.outside_text()}; beyond, their figures do not hold and the simulated "
+            "errors may exceed them",
+        )
 
 
 def _assumptions(assumed: Sequence[Mapping[str, Any]]) -> Iterator[Caution]:

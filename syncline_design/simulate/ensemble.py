@@ -20,12 +20,13 @@ class Ensemble:
 
     mission_constants: what is one value all through a mission, and drawn anew in each sample;
     per_sample: what else is drawn; horizon: over which time, place and tilt are drawn, None where
-    nothing depends on them.
+    nothing depends on them; outside: where a file leaves the platform's limits or the horizon.
     """
 
     mission_constants: tuple[str, ...]
     per_sample: tuple[str, ...]
     horizon: Horizon | None
+    outside: tuple[str, ...] = ()
 
     def text(self) -> str:
         """One sentence for every output."""
@@ -33,6 +34,14 @@ class Ensemble:
         return (
             "every sample is a mission of its own, so quantiles run over missions, not within one; "
             f"constants of a mission: {constants}; drawn besides: {', '.join(self.per_sample)}"
+            + (f"; {self.outside_text()}" if self.outside else "")
+        )
+
+    def outside_text(self) -> str:
+        """What a trajectory does that Syncline and worst case do not allow for."""
+        return (
+            f"the trajectory goes beyond what the Syncline and the worst case allow for: "
+            f"{'; '.join(self.outside)}"
         )
 
     def to_json(self) -> dict[str, object]:
@@ -41,12 +50,15 @@ class Ensemble:
             "over": OVER_MISSIONS,
             "mission_constants": list(self.mission_constants),
             "per_sample": list(self.per_sample),
+            "outside": list(self.outside),
             "text": self.text(),
         }
 
 
-def ensemble_of(system: System, envelope: str) -> Ensemble:
-    """What is drawn when the system is simulated in this envelope."""
+def ensemble_of(
+    system: System, envelope: str, of_a_file: bool = False, outside: tuple[str, ...] = ()
+) -> Ensemble:
+    """What is drawn in this envelope; of_a_file: its trajectory is a file's."""
     acting = [one for effects in by_stage(system).values() for one in effects]
     drawn = ["noise", "timestamp errors"]
     drawn.append(
@@ -54,10 +66,14 @@ def ensemble_of(system: System, envelope: str) -> Ensemble:
     )
     drawn.append("line of sight")
     if acting:
-        drawn += _over_the_horizon(system, envelope)
+        drawn += (
+            ["time and place of that moment, from the file"]
+            if of_a_file
+            else _over_the_horizon(system, envelope)
+        )
     if any(one.effect.name in SLOW for one in acting):
         drawn.append("slow noise, at its stationary size")
-    return Ensemble(_constants(system), tuple(drawn), system.horizon if acting else None)
+    return Ensemble(_constants(system), tuple(drawn), system.horizon if acting else None, outside)
 
 
 def _over_the_horizon(system: System, envelope: str) -> list[str]:

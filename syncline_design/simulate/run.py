@@ -12,6 +12,7 @@ from syncline_design.model.system import System
 from syncline_design.simulate import distribution
 from syncline_design.simulate.distribution import Binned, Values
 from syncline_design.simulate.ensemble import ensemble_of
+from syncline_design.simulate.excursions import excursions, follows_a_file
 from syncline_design.simulate.intervals import proportion_interval, quantile_ranks
 from syncline_design.simulate.results import (
     MonteCarlo,
@@ -56,7 +57,10 @@ def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS)
         found = conditioned_monte_carlo(system, settings, worst)
     else:
         found = _monte_carlo(settings, error_distribution(system, settings), worst)
-    return replace(found, ensemble=ensemble_of(system, settings.envelope))
+    drawn = ensemble_of(
+        system, settings.envelope, follows_a_file(settings), excursions(system, settings)
+    )
+    return replace(found, ensemble=drawn)
 
 
 def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> SimulationResult:

@@ -151,7 +151,7 @@ def trajectory_errors(
     repeated = settings.trajectory is None or str(settings.trajectory) in MANOEUVRES
     carried: known_effects.Carried | None = None
     for index, stage in enumerate(system.stages):
-        track = _stage_track(system, settings, index)
+        track = stage_track(system, settings, index)
         margin = time_margin_s(system)
         first, last = track.time_s[0] + margin, track.time_s[-1] - margin
         time_s = first + (last - first) * moment
@@ -229,7 +229,7 @@ def _noise(system: System, index: int, shifts: Shifts, source: RandomSource) -> 
     )
 
 
-def _stage_track(system: System, settings: SimulationSettings, index: int) -> Track:
+def stage_track(system: System, settings: SimulationSettings, index: int) -> Track:
     """The track of one stage, from its manoeuvre or from the file."""
     stage = system.stages[index]
     chosen = settings.trajectory or DEFAULT_MANOEUVRE

@@ -1,0 +1,110 @@
+"""A file that leaves the platform's limits or the horizon: said, since the Syncline stops there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from syncline_design.loading import load
+from syncline_design.report.checks import render_checks
+from syncline_design.report.console import verdict_text
+from syncline_design.verify import CheckSettings, check_loaded
+
+SPEC = """\
+syncline: 1
+name: long line
+requirements: [{{id: ACC, kind: accuracy, limit: 4 m}}]
+monte_carlo: {{samples: 3000, envelope: trajectory, trajectory: {trajectory}}}
+horizon: {{duration: 20 min, extent: 14 km, tilt: 12 deg}}
+effects: {effects}
+stages:
+  - name: boat
+    platform: {{v_max: 11 m/s, omega_max: 3 deg/s, distance: 1 m, baseline: 0 m}}
+    position:
+      sensor: {{modality: position, sigma_position: 1 cm, primitives: [pps]}}
+      timestamping: {{error: {{distribution: uniform, low: -1 ms, high: 1 ms}}}}
+      lever_arm: [0 m, 0 m, 0 m]
+    attitude:
+      sensor: {{modality: attitude, sigma_attitude: 0.01 deg, primitives: [pps]}}
+      timestamping: {{error: {{distribution: constant, value: 0 s}}}}
+    ranging:
+      sensor: {{modality: ranging, sigma_range: 1 cm, sigma_bearing: 0.01 deg, primitives: [pps]}}
+      timestamping: {{error: {{distribution: constant, value: 0 s}}}}
+"""
+GRID = "[{effect: grid_scale, sensor: target, parameters: {scale: 0.0002}}]"
+DRIFT = "[{effect: clock_drift, sensor: position, parameters: {rate: 0.0001}}]"
+CODE = "trajectory-outside"
+SIGHT = ",range_m,azimuth_deg,elevation_deg"
+
+
+def write(
+    folder: Path, last_s: float, speed: float, pitch: float, wobble: float, sight: str
+) -> None:
+    """North at `speed`; the yaw rises and falls by `wobble` deg every second row of 2 s."""
+    head = "time_s,position_north_m,position_east_m,position_down_m,roll_deg,pitch_deg,yaw_deg"
+    lines = [head + (SIGHT if sight else "")]
+    for number, t in enumerate(np.arange(0.0, last_s + 1.0, 2.0)):
+        yaw = wobble * (number % 2)
+        lines.append(f"{900 + t},{speed * t},0,0,0,{pitch},{yaw}{sight}")
+    (folder / "line.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def check(
+    folder: Path, effects: str = "[]", trajectory: str = "{file: line.csv}"
+) -> dict[str, Any]:
+    spec = folder / "line.yaml"
+    spec.write_text(SPEC.format(effects=effects, trajectory=trajectory), encoding="utf-8")
+    return check_loaded(load(spec), CheckSettings())
+
+
+def said(verdict: dict[str, Any]) -> str:
+    return " ".join(w["message"] for w in verdict["warnings"] if w["code"] == CODE)
+
+
+@pytest.mark.parametrize(
+    ("path", "effects", "words"),
+    [
+        ((1190.0, 10.0, 5.0, 4.0, ""), DRIFT, ()),
+        ((2400.0, 10.0, 5.0, 4.0, ""), "[]", ()),  # nothing depends on when or where
+        ((2400.0, 5.0, 5.0, 4.0, ""), DRIFT, ("lasts 40 min", "duration is 20 min")),
+        ((1190.0, 10.9, 5.0, 4.0, ",1,0,0"), GRID, ()),
+        ((1190.0, 12.0, 5.0, 4.0, ""), GRID, ("12 m/s, 11", "14281 m, 14000")),
+        ((1190.0, 10.0, 15.0, 4.0, ""), "[]", ("15 deg, 12",)),
+        ((1190.0, 10.0, 0.0, 7.0, ""), "[]", ("3.5 deg/s, 3",)),
+        ((1190.0, 10.0, 5.0, 4.0, ",2.5,0,0"), "[]", ("2.5 m, 1",)),
+    ],
+)
+def test_what_leaves_the_limits_is_said_and_nothing_else(
+    tmp_path: Path, path: tuple[Any, ...], effects: str, words: tuple[str, ...]
+) -> None:
+    write(tmp_path, *path)
+    found = said(check(tmp_path, effects))
+    assert bool(found) == bool(words)
+    assert found.count(" is allowed for") + found.count("lasts") == len(
+        [w for w in words if w != "duration is 20 min"]
+    )
+    for text in words:
+        assert text in found
+
+
+def test_a_long_file_exceeds_its_own_bound_and_every_format_says_why(tmp_path: Path) -> None:
+    """10 m/s for 2 h: grid errors of 2e-4 times 0 .. 72 km; median 7.2 m, the budget's 2.8 m."""
+    write(tmp_path, 7200.0, 10.0, 0.0, 0.0, "")
+    found = check(tmp_path, GRID)
+    assert found["verdict"] == "meets"
+    assert found["monte_carlo"]["quantiles"]["0.5"]["value_m"] == pytest.approx(7.2, rel=0.05)
+    assert found["monte_carlo"]["worst_case"]["bound_m"] < 4.0
+    for form in ("json", "html", "junit", "sarif", "github", "markdown"):
+        assert CODE in render_checks(form, [found])
+    shown = " ".join(verdict_text(found, colour=False).split())
+    assert CODE in shown
+    assert "place within" not in shown  # times and places are the file's
+    assert "from the file" in shown
+
+
+def test_named_manoeuvres_keep_the_limits(tmp_path: Path) -> None:
+    for name in ("straight", "circle", "lawnmower", "figure_eight"):
+        assert not said(check(tmp_path, DRIFT, f"{{manoeuvre: {name}}}"))
