@@ -37,18 +37,20 @@ def choice_json(
     pieces = pieces or Pieces()
     nothing: tuple[FrontPoint, ...] = ()
 
-    def others() -> Iterator[Design]:
-        return (d for d in best(problem, NEXT_BEST + 1) if d != chosen)
+    def others(every: bool) -> Iterator[Design]:
+        return (d for d in best(problem, NEXT_BEST + 1, every=every) if d != chosen)
 
     if points is None:
         points = pieces.made("front", lambda: front(problem), nothing)
-    following = pieces.listed("next best designs", others)
+    following = pieces.listed("next best designs", lambda: others(every=False))
+    ranked = pieces.listed("next best of every design", lambda: others(every=True))
     return {
         "proof": proof_json(picked),
         "front": front_json(loaded, problem, points),
         "front_left_out": left_out(loaded, problem, "cost"),
         "staircase": [step.to_json() for step in staircase([p for p in points if not p.undecided])],
         "next_best": designs_json(loaded, problem, following[:NEXT_BEST]),
+        "next_best_every": designs_json(loaded, problem, ranked[:NEXT_BEST]),
         **excluded_json(problem),
     }
 

@@ -50,7 +50,10 @@ Json = dict[str, Any]
 
 @dataclass(frozen=True, slots=True)
 class OptimizeSettings:
-    """count: how many designs; pareto: the front too, of `resource` against error."""
+    """count: how many designs; pareto: the front too, of `resource` against error.
+
+    every: rank every design, not only those that differ in a sensor.
+    """
 
     count: int = 1
     pareto: bool = False
@@ -58,6 +61,7 @@ class OptimizeSettings:
     method: Method = "auto"
     time_limit_s: float | None = None
     seed: int = 0
+    every: bool = False
     report: bool = False  # the whole verdict too, for a page
 
 
@@ -138,7 +142,7 @@ def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
         explanation = explain(loaded, problem, build)
     elif picked.exhausted:
         chosen = picked.verified.design
-        designs = _designs(problem, chosen, settings.count, pieces)
+        designs = _designs(problem, chosen, settings, pieces)
         if picked.verified.word == "meets":
             hinges = _hinges((loaded, problem, chosen, build), pieces)
     if explanation is not None and explanation.cut_short:
@@ -169,13 +173,16 @@ def _no_points() -> tuple[FrontPoint, ...]:
     return ()
 
 
-def _designs(problem: Problem, chosen: Design, count: int, pieces: Pieces) -> tuple[Design, ...]:
+def _designs(
+    problem: Problem, chosen: Design, settings: OptimizeSettings, pieces: Pieces
+) -> tuple[Design, ...]:
     """The chosen design, then the next best others."""
+    count = settings.count
     if count == 1:
         return (chosen,)
 
     def others() -> Iterator[Design]:
-        return (d for d in best(problem, count + 1) if d != chosen)
+        return (d for d in best(problem, count + 1, every=settings.every) if d != chosen)
 
     return (chosen, *pieces.listed("next best designs", others)[: count - 1])
 

@@ -79,6 +79,9 @@ def optimize(
     method: MethodOption = "auto",
     time_limit: TimeLimitOption = None,
     best: Annotated[int, typer.Option(min=1, help="How many designs that differ in a sensor.")] = 1,
+    every: Annotated[
+        bool, typer.Option("--every", help="Of --best: rank every design, whatever differs.")
+    ] = False,
     pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
     resource: Annotated[
         Literal["cost", "mass", "power"], typer.Option(help="What the front sets against error.")
@@ -103,6 +106,7 @@ def optimize(
             )
     settings = OptimizeSettings(
         best, pareto, resource, road(method), seed=seed,
+        every=every,
         report=any(target.format == "html" for target in targets),
     )  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
