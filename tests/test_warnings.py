@@ -119,3 +119,32 @@ def test_the_console_shows_warning_horizon_envelope_and_ensemble() -> None:
     assert f"[{WORST}]" in shown
     for text in ("horizon 1 h, extent 1 km, tilt 0 deg", "at tilts up to 0 deg", "over missions"):
         assert text in shown
+
+
+HEAD = "exceeds the limit of NEAR (worst-case-above-limit)"
+
+
+def headlines(found: dict[str, Any]) -> dict[str, str]:
+    """The line of each format that gives the verdict, alone and beside another spec's."""
+    shown = {form: render_checks(form, [found]) for form in ("markdown", "junit", "github")}
+    page = render_checks("html", [found])
+    overview = render_checks("html", [found, verdict("1.9 m")])
+    return {
+        "console": verdict_text(found, colour=False).splitlines()[0],
+        "markdown": shown["markdown"].splitlines()[0].replace("\\", ""),
+        "junit": shown["junit"].split("<system-out>")[1].splitlines()[0],
+        "github": next(x for x in shown["github"].splitlines() if x.startswith("::notice")),
+        "html": page.split("<h1")[1].split("<h2")[0],
+        "overview": overview.split("<h1")[1],
+    }
+
+
+def test_every_headline_of_a_qualified_meets_says_so() -> None:
+    for form, line in headlines(verdict("0.80 m")).items():
+        assert HEAD in line, form
+
+
+def test_no_other_headline_does() -> None:
+    for limit in ("1.9 m", "0.2 m"):
+        for form, line in headlines(verdict(limit)).items():
+            assert "exceeds the limit of" not in line, form

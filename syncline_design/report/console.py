@@ -11,6 +11,7 @@ from typing import Any
 
 from syncline_design.horizon import duration_words
 from syncline_design.report.text import visible
+from syncline_design.report.verdict_words import qualification
 from syncline_design.units import Dimension, format_quantity
 
 Data = Mapping[str, Any]
@@ -65,7 +66,7 @@ def _tone(verdict: str) -> str:
 
 def _headline(data: Data, paint: Any) -> list[str]:
     spec = data["spec"]
-    words = paint(WORDS[data["verdict"]], _tone(data["verdict"]))
+    words = paint(WORDS[data["verdict"]] + qualification(data), _tone(data["verdict"]))
     return [f"{visible(spec['name'])} ({visible(spec['file'])}): {words}"]
 
 

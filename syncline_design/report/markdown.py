@@ -18,7 +18,10 @@ def render_markdown(verdicts: Sequence[Json]) -> str:
 
 def _one(verdict: Json) -> str:
     result = outcome(verdict)
-    lines = [f"## {result.mark} {markdown_safe(spec_name(verdict))}: {result.word}", ""]
+    lines = [
+        f"## {result.mark} {markdown_safe(spec_name(verdict))}: {markdown_safe(result.word)}",
+        "",
+    ]
     if part(verdict, "design"):
         lines += [markdown_safe(design_sentence(verdict)), "", _price(verdict)]
     else:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from syncline_design.report import numbers
 from syncline_design.report.tables import Tone
-from syncline_design.report.text import sentence_list
+from syncline_design.report.text import sentence_list, visible
 
 Json = Mapping[str, Any]
 
@@ -28,6 +28,10 @@ OUTCOMES: Final[dict[str, Outcome]] = {
     "infeasible": Outcome("bad", "\u2298", "Infeasible: no design meets the requirements"),
     "indeterminate": Outcome("warn", "?", "No verdict"),
     "refused": Outcome("bad", "!", "Refused: the spec cannot be read"),
+}
+QUALIFYING: Final[dict[str, str]] = {
+    "worst-case-above-limit": "its worst case at one sigma",
+    "quantile-above-limit": "its 95 % quantile",
 }
 STATUSES: Final[dict[str, Outcome]] = {
     "pass": Outcome("good", "\u2713", "pass"),
@@ -83,8 +87,25 @@ def named(source: Json | None, key: str) -> list[tuple[str, Json]]:
 
 
 def outcome(verdict: Json) -> Outcome:
-    """The verdict's outcome; an unknown word counts as no verdict."""
-    return OUTCOMES.get(str(verdict.get("verdict")), OUTCOMES["indeterminate"])
+    """The verdict's outcome; an unknown word counts as no verdict.
+
+    A design that meets while a larger figure of its own does not says so in the same breath.
+    """
+    found = OUTCOMES.get(str(verdict.get("verdict")), OUTCOMES["indeterminate"])
+    return replace(found, word=found.word + qualification(verdict))
+
+
+def qualification(verdict: Json) -> str:
+    """What a headline adds to `meets`: warnings that a figure exceeds the limit; else nothing."""
+    if verdict.get("verdict") != "meets":
+        return ""
+    told = [
+        f"{figure} exceeds the limit of {visible(entry.get('requirement') or 'accuracy')} ({code})"
+        for code, figure in QUALIFYING.items()
+        for entry in items(verdict, "warnings")
+        if entry.get("code") == code
+    ]
+    return f", but {sentence_list(told)}" if told else ""
 
 
 def status_of(row: Json) -> Outcome:
