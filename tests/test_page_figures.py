@@ -17,6 +17,7 @@ from syncline_design.optimisation import (
     optimisation_text,
     optimize,
 )
+from syncline_design.report.axes import log_ticks
 from syncline_design.report.optimisations import render_optimize
 from syncline_design.report.pages import render_verdict
 from syncline_design.verify import CheckSettings, check_file
@@ -89,3 +90,46 @@ def test_a_figure_in_the_unit_of_another(written: str, value_si: float, shown: s
     from syncline_design.units import format_like
 
     assert format_like(written, value_si) == shown
+
+
+@pytest.fixture(scope="module")
+def simulated_page() -> str:
+    page = render_verdict(check_file(ROOT / "specs" / "usv_mapping.yaml", CheckSettings()))
+    return re.sub(r"[\u00a0\u202f\u2009]", " ", page)
+
+
+def test_intervals_of_one_quantile_that_differ_differ_in_name(simulated_page: str) -> None:
+    """The sequential decision's interval is wider (several looks) than the final sample's."""
+    cells = [re.sub(r"<[^>]+>", "", c) for c in re.findall(r"<td.*?</td>", simulated_page, re.S)]
+    [decided] = [cell for cell in cells if cell.startswith("95 % interval")]
+    [row] = re.findall(r"<tr>(?:(?!</tr>).)*?>95 %<.*?</tr>", simulated_page, re.S)
+    ends = [re.findall(r"([\d.]+)\smm", text) for text in (decided, re.sub(r"<[^>]+>", " ", row))]
+    (low, high), (_, final_low, final_high) = (list(map(float, found)) for found in ends)
+    assert low <= final_low < final_high <= high
+    assert (low, high) != (final_low, final_high)
+    assert "over all looks" in decided
+
+
+def test_facts_are_short_and_sentences_stand_below(simulated_page: str) -> None:
+    facts = re.findall(r"<dd>(.*?)</dd>", simulated_page, re.S)
+    assert max(len(re.sub(r"<[^>]+>", "", fact)) for fact in facts) <= 64  # a SHA-256
+    notes = " ".join(re.findall(r'<p class="note">(.*?)</p>', simulated_page, re.S))
+    assert "nothing exceeds the bound" in notes
+    assert "quantiles run over missions" in notes
+
+
+def test_pages_say_how_often_errors_exceed_the_sum(simulated_page: str) -> None:
+    """39 %: three standard normal components beyond the root of three, by their distribution."""
+    beyond = 1.0 - math.erf(math.sqrt(1.5)) + math.sqrt(6.0 / math.pi) * math.exp(-1.5)
+    assert f"{100 * beyond:.0f} % of them where position noise is all there is" in simulated_page
+    templates = ROOT / "reports" / "templates"
+    assert not [p.name for p in templates.glob("*.j2") if "now and then" in p.read_text("utf-8")]
+
+
+@pytest.mark.parametrize("span", [1.05, 1.3, 2.3, 2.6, 5.2, 40.0, 1e4])
+def test_an_axis_has_two_marks_or_more_wherever_it_begins(span: float) -> None:
+    for step in range(40):
+        low = 0.0123 * 10.0 ** (step / 20.0)
+        ticks = log_ticks(low, span * low)
+        assert len(ticks) >= 2
+        assert all(low <= tick <= span * low for tick in ticks)

@@ -38,9 +38,16 @@ def one_two_five(low: float, high: float) -> list[float]:
 
 
 def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
-    """Decades, or 1-2-5 steps where the span holds fewer than three decades."""
+    """Decades, 1-2-5 steps where there are fewer than three of them, else equal steps."""
+    from matplotlib.ticker import MaxNLocator
+
     whole = decades(low, high, most)
-    return whole if len(whole) >= 3 else one_two_five(low, high)
+    if len(whole) >= 3:
+        return whole
+    steps = one_two_five(low, high)
+    if len(steps) >= 2:
+        return steps
+    return [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]
 
 
 def set_ticks(

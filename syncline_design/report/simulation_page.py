@@ -8,7 +8,7 @@ from syncline_design.report import numbers, page, verdict_tables
 from syncline_design.report.tables import Cell, Table, table
 from syncline_design.report.text import harmless
 from syncline_design.report.verdict_figures import grid_points, simulation_figures
-from syncline_design.report.verdict_page import drawing, simulation_facts
+from syncline_design.report.verdict_page import drawing, simulation_facts, simulation_notes
 from syncline_design.report.verdict_words import Json, Outcome, items, part
 
 
@@ -35,6 +35,7 @@ def render_simulation(data: Json) -> str:
         tables=tables,
         trajectory=str(data.get("trajectory") or ""),
         certificate=_certificate(data),
+        notes=simulation_notes(data)[1:] if _certificate(data) else simulation_notes(data),
         provenance=_provenance(data),
     )  # fmt: skip
 

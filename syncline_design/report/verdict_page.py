@@ -63,6 +63,7 @@ def render_verdict(verdict: Json) -> str:
         explorer=_explorer(verdict),
         syncline_facts=_syncline_facts(verdict),
         simulation_facts=simulation_facts(verdict),
+        simulation_notes=simulation_notes(verdict),
         proof=_proof(verdict),
     )
 
@@ -198,14 +199,22 @@ def simulation_facts(verdict: Json) -> list[tuple[str, str]]:
         facts.append(
             ("Worst case found", f"{numbers.length(worst['value_m'])}, {ratio} of the Syncline")
         )
-    if text := part(worst, "certificate").get("text"):
-        facts.append(("Upper bound", f"{numbers.length(worst.get('bound_m'))}. {text}"))
-    if text := part(monte_carlo, "ensemble").get("text"):
-        facts.append(("Quantiles over", str(text)))
+    if part(worst, "certificate"):
+        facts.append(("Upper bound", numbers.length(worst.get("bound_m"))))
     horizon = part(verdict, "horizon")
     if horizon:
         facts.append(("Horizon", numbers.horizon(horizon)))
     return facts
+
+
+def simulation_notes(verdict: Json) -> list[str]:
+    """For what the upper bound holds, and over what the quantiles run, in sentences."""
+    monte_carlo = part(verdict, "monte_carlo")
+    told = (
+        part(part(monte_carlo, "worst_case"), "certificate").get("text"),
+        part(monte_carlo, "ensemble").get("text"),
+    )
+    return [f"{str(text)[0].upper()}{str(text)[1:].rstrip('.')}." for text in told if text]
 
 
 def _proof(verdict: Json) -> str:

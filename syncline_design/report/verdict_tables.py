@@ -59,7 +59,8 @@ def _interval(row: Json, verdict: Json) -> str:
         return ""
     unit = str(row.get("unit") or "")
     confidence = numbers.percent(part(verdict, "monte_carlo").get("confidence") or 0.95)
-    return f"{confidence} interval {numbers.in_unit(low, unit)} to {numbers.in_unit(high, unit)}"
+    ends = f"{numbers.in_unit(low, unit)} to {numbers.in_unit(high, unit)}"
+    return f"{confidence} interval, over all looks at the decision, {ends}"
 
 
 def payload(verdict: Json) -> Table:
