@@ -6,6 +6,7 @@ Truth and Cramer-Rao bounds are the hidden world's own.
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,17 @@ import pytest
 from scipy.stats import chi2
 
 from syncline_design.diagnose import DiagnosisSettings, diagnose
+from syncline_design.diagnose.candidates import candidates, directed_parts, signatures
+from syncline_design.diagnose.expected_noise import structure_of
+from syncline_design.diagnose.findings import AliasFigure
+from syncline_design.diagnose.fitting import data_of, fit
+from syncline_design.diagnose.identify import competed
+from syncline_design.diagnose.simulation import scene
+from syncline_design.diagnose.summary import lookalike_lines
+from syncline_design.diagnose.system import measured
+from syncline_design.diagnose.trials import with_effect
+from syncline_design.loading import load
+from syncline_design.report.diagnosis_page import finding_words
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario
 
 Document = dict[str, Any]
@@ -121,3 +133,50 @@ def test_evidence_is_what_leaving_an_effect_out_costs(
             assert finding["log10_p"] == pytest.approx(log10_p, rel=1e-6)
     ranked = [finding["gain_nat"] for finding in document["findings"]]
     assert ranked == sorted(ranked, reverse=True)
+
+
+WRONG = (
+    (hidden("latency", "attitude", latency_s=0.06), ("range_scale", "ranging")),
+    (hidden("heading_bias", "attitude", bias_rad=0.01), ("clock_drift", "position")),
+    (hidden("range_bias", "ranging", bias_m=0.2), ("heading_drift", "attitude")),
+)
+
+
+@pytest.mark.parametrize(("truth", "wrong"), WRONG)
+def test_a_better_name_of_another_signature_takes_the_place(
+    truth: Hidden, wrong: tuple[str, str], tmp_path: Path
+) -> None:
+    """A search that took a wrong turn: whatever fits better by far competes, alike or not."""
+    run = scenario("multirotor_lines", 12, 60.0, 5.0)
+    (tmp_path / "spec.yaml").write_text(make_log(run, (truth,)).spec_yaml(), encoding="utf-8")
+    log = make_log(run, (truth,)).to_csv(tmp_path / "log.csv")
+    inputs = measured(load(tmp_path / "spec.yaml"), [log])
+    view = scene(inputs.system, inputs.log, inputs.known)
+    data = data_of(view, structure_of(view, directed_parts(view, candidates(view))))
+    found = signatures(view, candidates(view))
+    start = next(s for s in found if s.candidate.label[:2] == wrong)
+    named = with_effect(data, fit(data, (), ()), start, fit(data, (), ()).level)
+    settled, compared = competed(data, named, start.candidate.label, found)
+    assert [label[:2] for label in settled.labels] == [(truth.effect, truth.sensor)]
+    assert settled.nll < named.nll - 20.0
+    for other in (*compared.aliases, *compared.lookalikes):
+        assert other.loss > -2.0 or not other.possible
+
+
+def test_words_follow_the_sign_of_the_comparison() -> None:
+    """What fits better is never said to fit worse, on the console or on the page."""
+    better = AliasFigure("packetised_timestamps", "attitude", "rig", 0.97, -157.4, possible=False)
+    as_well = AliasFigure("latency", "attitude", "rig", 0.6, -0.8)
+    worse = AliasFigure("filter_lag", "position", "rig", 0.999, 31.6)
+    lines = lookalike_lines((better, as_well, worse))
+    assert lines == [
+        "   looks alike, fits worse: filter_lag (position) by 31.6 nat",
+        "   fits better, but only with impossible values: packetised_timestamps (attitude)"
+        " by 157 nat",
+        "   fits as well in its place: latency (attitude)",
+    ]
+    entry = {"effect": "latency", "lookalikes": [asdict(a) for a in (better, as_well, worse)]}
+    page = finding_words(entry)
+    assert "-157" not in page["lookalikes"]
+    assert "31.6 nat worse" in page["lookalikes"]
+    assert "157 nat better, but only with impossible values" in page["lookalikes"]

@@ -41,13 +41,17 @@ def figure_text(shown: Figure) -> str:
 
 @dataclass(frozen=True, slots=True)
 class AliasFigure:
-    """Another effect beside the named one; nats_worse counts the freedom of both."""
+    """Another effect beside the named one; nats_worse counts the freedom of both.
+
+    possible: whether it fits with values that the effect can have.
+    """
 
     effect: str
     sensor: str
     stage: str
     cosine: float
     nats_worse: float
+    possible: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +135,8 @@ def _finding(
 
 def _alias(view: Scene, alias: Alias) -> AliasFigure:
     name, sensor, stage = alias.candidate.label
-    return AliasFigure(name, sensor, view.system.stages[stage].name, alias.cosine, alias.loss)
+    where = view.system.stages[stage].name
+    return AliasFigure(name, sensor, where, alias.cosine, alias.loss, alias.possible)
 
 
 def _gross(view: Scene, fault: Gross) -> Finding:

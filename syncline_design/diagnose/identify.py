@@ -21,7 +21,7 @@ Label = tuple[str, str, int]
 SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
 CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
 MOST_REFITTED = 8
-RIVAL_COSINE = 0.7  # ... if it also points roughly the same way
+RIVAL_COSINE = 0.7  # from which a rival that fits as well is said not to be told apart
 RIVAL_NATS = 3.0  # a rival that fits worse by less than this is not excluded by the data
 AS_GOOD_NATS = 2.0  # within which the commoner of two effects is named
 
@@ -32,12 +32,14 @@ class Alias:
 
     cosine: of the whitened angle between the named signature and the span of the other's.
     fit: how much worse the other fits [nat]; loss: the same with what each pays for its freedom.
+    possible: whether it fits with values that the effect can have.
     """
 
     candidate: Candidate
     cosine: float
     fit: float
     loss: float
+    possible: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,8 @@ class Comparison:
     """All other effects against a named one, nearest first.
 
     aliases: cannot be told apart.  lookalikes: the same signature to first order, but re-simulation
-    fits worse or only with impossible values.  excluded: another signature that does not fit.
+    fits worse, or one that fits as well only with impossible values or another signature.
+    excluded: another signature that does not fit.
     """
 
     aliases: tuple[Alias, ...] = ()
@@ -63,10 +66,15 @@ def without(model: Model, label: Label) -> Model:
 def competed(
     data: Data, model: Model, label: Label, others: Sequence[Signature], again: int = 2
 ) -> tuple[Model, Comparison]:
-    """The model with the best member of a named effect's class, and the rest against that one."""
+    """The model with the best effect in a named one's place, and the rest against that one.
+
+    Its class competes, and whatever fits as well to first order: with the other effects of the
+    model fitted again, an effect of quite another signature may be the better one by far.
+    """
     named = fit(data, model.acting, model.opened, start=model.level)
     screened, found = _screened(data, named, label, others)
-    near = [a for a in screened if a.cosine > SAME or _rivals(a)][:MOST_REFITTED]
+    near = [a for a in screened if a.cosine > SAME or a.fit < RIVAL_NATS]
+    near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]
     rest = without(named, label)
     fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)
             for a in near}  # fmt: skip
@@ -106,20 +114,19 @@ def _sorted_out(
     lists: tuple[list[Alias], list[Alias], list[Alias]] = ([], [], [])
     for one in screened:
         model = fits.get(one.candidate.label)
-        possible = True
         if model is not None:
             worse = model.nll - named.nll
             loss = worse + _price(data, one.candidate.effect) - own
-            one, possible = replace(one, fit=worse, loss=loss), plausible(model)
-        lists[_place(one, possible)].append(one)
+            one = replace(one, fit=worse, loss=loss, possible=plausible(model))
+        lists[_place(one)].append(one)
     aliases, lookalikes, excluded = lists
     return Comparison(tuple(aliases), tuple(lookalikes), tuple(excluded))
 
 
-def _place(one: Alias, possible: bool) -> int:
+def _place(one: Alias) -> int:
     """Which list an effect belongs to: 0 aliases, 1 lookalikes, 2 excluded."""
     same = one.cosine > SAME
-    if possible and (_rivals(one) or (same and one.fit < CLASS_NATS)):
+    if one.possible and (_rivals(one) or (same and one.fit < CLASS_NATS)):
         return 0
     return 1 if same or one.fit < RIVAL_NATS else 2
 

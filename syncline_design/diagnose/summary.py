@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from syncline_design.diagnose.findings import AliasFigure, Finding
 from syncline_design.diagnose.gap import Gap
 from syncline_design.diagnose.regimes import Cell
@@ -18,6 +20,7 @@ UNSOUND = (
     "UNEXPLAINED: the log contradicts itself or the limits of the spec's platform. "
     "Mend that first: every figure below rests on it."
 )
+NOWHERE = "  in no regime on average: it shows in how the errors vary, not in their mean"
 BEYOND = " CAUTION: the log goes beyond the limits of the spec's platform."
 
 
@@ -30,7 +33,8 @@ def summary_text(diagnosis: Diagnosis) -> str:
         lines += _finding_lines(number, finding, diagnosis)
     lines += _gap_lines(diagnosis)
     if diagnosis.unexplained:
-        lines += ["", "Where it remains:", *(_cell_line(c) for c in diagnosis.where_after)]
+        where = [_cell_line(c) for c in diagnosis.where_after] or [NOWHERE]
+        lines += ["", "Where it remains:", *where]
         lines.append(f"  chance that noise does this: {diagnosis.remaining.p:.1g}")
     elif diagnosis.findings and diagnosis.where_before:
         lines += ["", "Where it was seen:", *(_cell_line(c) for c in diagnosis.where_before[:4])]
@@ -62,9 +66,7 @@ def _finding_lines(number: int, finding: Finding, diagnosis: Diagnosis) -> list[
         names = "; ".join(_name(a) for a in finding.aliases)
         lines.append(f"   this log cannot tell it from: {names}")
         lines.append(f"   to separate them: {finding.effect.separated_by}")
-    if finding.lookalikes:
-        worse = ", ".join(f"{_name(a)} by {a.nats_worse:.3g} nat" for a in finding.lookalikes[:3])
-        lines.append(f"   looks alike, fits worse: {worse}")
+    lines += lookalike_lines(finding.lookalikes)
     if finding.excluded and not finding.aliases:
         names = ", ".join(_name(a) for a in finding.excluded[:3])
         varied = ", ".join(
@@ -72,6 +74,23 @@ def _finding_lines(number: int, finding: Finding, diagnosis: Diagnosis) -> list[
             for name, m in diagnosis.log["motion"].items()
         )
         lines.append(f"   excluded: {names}; {varied}")
+    return lines
+
+
+def lookalike_lines(found: Sequence[AliasFigure]) -> list[str]:
+    """Three at most of those that fit worse, only with impossible values, or as well."""
+    worse = [a for a in found if a.nats_worse >= 0.0][:3]
+    impossible = [a for a in found if a.nats_worse < 0.0 and not a.possible][:3]
+    as_well = [a for a in found if a.nats_worse < 0.0 and a.possible][:3]
+    lines = []
+    if worse:
+        named = ", ".join(f"{_name(a)} by {a.nats_worse:.3g} nat" for a in worse)
+        lines.append(f"   looks alike, fits worse: {named}")
+    if impossible:
+        named = ", ".join(f"{_name(a)} by {-a.nats_worse:.3g} nat" for a in impossible)
+        lines.append(f"   fits better, but only with impossible values: {named}")
+    if as_well:
+        lines.append(f"   fits as well in its place: {', '.join(map(_name, as_well))}")
     return lines
 
 

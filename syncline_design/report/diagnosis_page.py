@@ -123,8 +123,15 @@ def _effect_text(entry: object) -> str:
 
 
 def _excluded_text(entry: Json) -> str:
+    """Name and how much worse it fits; one that fits better says why it is not the name."""
     worse = numbers.finite(entry.get("nats_worse"))
-    return _effect_text(entry) + (f", {worse:.3g} nat worse" if worse is not None else "")
+    if worse is None:
+        return _effect_text(entry)
+    if worse >= 0.0:
+        return f"{_effect_text(entry)}, {worse:.3g} nat worse"
+    if entry.get("possible") is False:
+        return f"{_effect_text(entry)}, {-worse:.3g} nat better, but only with impossible values"
+    return f"{_effect_text(entry)}, as well in its place"
 
 
 def outcome_of(data: Json) -> Outcome:
