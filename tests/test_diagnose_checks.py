@@ -114,6 +114,62 @@ def test_columns_that_contradict_the_poses_are_said(
     assert check.value == pytest.approx(factor, rel=0.02)
 
 
+def still(*names: str) -> Change:
+    def change(columns: dict[str, Array]) -> None:
+        for name in names:
+            columns[name] = np.zeros_like(columns[name])
+
+    return change
+
+
+def offset(name: str, by: float) -> Change:
+    def change(columns: dict[str, Array]) -> None:
+        columns[name] = columns[name] + by
+
+    return change
+
+
+VELOCITY = ("velocity_north_mps", "velocity_east_mps", "velocity_down_mps")
+RATES = ("rate_x_degps", "rate_y_degps", "rate_z_degps")
+UNLIKE = (
+    ("velocity_columns", still(*VELOCITY), "0 % of the motion"),
+    ("velocity_columns", still("velocity_north_mps"), "motion along the first axis"),
+    ("velocity_columns", still("velocity_east_mps"), "motion along the second axis"),
+    ("velocity_columns", offset("velocity_east_mps", 4.0), "m/s along the second axis"),
+    ("velocity_columns", offset("velocity_down_mps", -1.5), "m/s along the third axis"),
+    ("rate_columns", still(*RATES), "0 % of the motion"),
+    ("rate_columns", still("rate_z_degps"), "motion along the third axis"),
+)
+
+
+@pytest.mark.parametrize(("code", "change", "words"), UNLIKE)
+@pytest.mark.parametrize("platform", ["fixed_wing_circuits", "constant_speed_eights"])
+def test_columns_without_part_in_the_motion_are_said(
+    platform: str, code: str, change: Change, words: str, tmp_path: Path
+) -> None:
+    """Columns of zeros, and a constant that the places do not follow, have no wrong factor."""
+    found = checked(written(run_of(platform, DELAY), tmp_path, change))
+    (check,) = [c for c in found if c.code == code]
+    assert check.severity == "contradiction"
+    assert words in check.message
+
+
+@pytest.mark.parametrize("platform", ["multirotor_lines", "car_stops", "vessel_figure_eights",
+                                      "fixed_wing_circuits"])  # fmt: skip
+@pytest.mark.parametrize("effect", [
+    hidden("lever_arm", "position", x_m=1.5, y_m=-1.0, z_m=0.8),
+    hidden("noise_understated", "position", factor=8.0),
+    hidden("timestamp_step", "position", step_s=1.0, time_s=40.0),
+    hidden("heading_hard_iron", "attitude", sin_rad=0.2, cos_rad=-0.15),
+])  # fmt: skip
+def test_faults_of_the_dictionary_are_no_contradiction(
+    platform: str, effect: Hidden, tmp_path: Path
+) -> None:
+    """What has a name is to be named: large faults leave places and columns in agreement."""
+    found = checked(written(run_of(platform, effect), tmp_path))
+    assert "velocity_columns" not in [c.code for c in found]
+
+
 @pytest.mark.parametrize(("limits", "code", "column"), [
     ("v_max: 1 m/s", "speed", "velocity_"), ("omega_max: 2 deg/s", "turn_rate", "rate_"),
     ("distance: 12 m", "range", "range_m"),

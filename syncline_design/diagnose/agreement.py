@@ -3,7 +3,9 @@
 Over windows the integral D of a column (velocity, body rate) and the change P of the pose (place,
 attitude) must be the same vector.  The column's principal directions v_k are mapped by P to
 w_k = P' u_k / s_k (D = U S V'), with a standard error from what is left; v_k itself is wanted.
-A delay between the two is allowed for, it is an effect of its own.
+A delay between the two is allowed for, it is an effect of its own.  What a regression of P on D
+cannot see is asked for on its own: motion of the pose in which the column has no part (a column of
+zeros), and a constant part of a velocity that the places do not follow.
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnose.trajectory import GAP_FACTOR
 from syncline_design.effects.base import Array
 from syncline_design.effects.kinematics import rotate
+from syncline_design.estimates import figure
 
 LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 LEAST_STEPS = 4  # rows in a window
@@ -26,7 +29,11 @@ MOST_TURN_RAD = 0.7  # in one window: rotation vectors add up only while they ar
 LAGS_S = np.linspace(-1.0, 1.0, 41)
 MOVES = 10.0  # times its own noise: a direction that moves less is nothing but that noise
 ERRORS = 4.0  # standard errors that a disagreement must have on top of the tolerance
+LEAST_PART = 0.5  # of a clear motion of the pose that a column must show
+ARM_M = 1.0  # by which places may be off in a turn: a wrong lever arm
+SHIFT_S = 1.0  # by which stamps may step within a log
 FITS = 0.1  # share of the motion that a named relation may leave
+AXES = ("first", "second", "third")
 UNITS = {3.6: "km/h", 1.943844: "knots", 3.28084: "ft/s", 1e3: "mm/s", 100.0: "cm/s"}
 TURNS = {180.0 / np.pi: "degrees for radians", np.pi / 180.0: "radians for degrees"}
 WORDS = {
@@ -102,18 +109,27 @@ def disagreement(
     place_m: Array | None,
     column: Array,
     rotation: Array,
-    sigma_m: float,
+    sigma: float,
     tolerance: float,
 ) -> Disagreement | None:
-    """How a motion column contradicts places, or attitudes where no place is given."""
-    found = _chosen(time_s, place_m, column, rotation, sigma_m)
+    """How a motion column contradicts places, or attitudes where no place is given.
+
+    sigma: of a place [m], or of an attitude [rad].
+    """
+    found = _chosen(time_s, place_m, column, rotation, sigma)
     if found is None:
         return None
     spans, moved = found
     lag = max(LAGS_S, key=lambda at: (_likeness(moved, spans.integral(column, at)), -abs(at)))
     own = spans.integral(column, float(lag))
+    places, words = place_m is not None, ""
     if not _differs(moved, own, spans.noise(column), tolerance):
-        return None
+        words = _missing(moved, own, sigma)
+        if not words and places and _drifts(spans, moved, own, sigma, tolerance):
+            words = _offset_words(spans, moved, own)
+        return Disagreement(_ratio(moved, own), words) if words else None
+    if places and _is_offset(spans, moved, own):
+        return Disagreement(_ratio(moved, own), _offset_words(spans, moved, own))
     body = None
     if place_m is not None:
         body = spans.integral(rotate(rotation, column), float(lag))
@@ -171,6 +187,66 @@ def _differs(moved: Array, own: Array, noise: float, tolerance: float) -> bool:
     return bool(np.any(off > tolerance + ERRORS * np.sqrt(3.0) * error))
 
 
+def _size(series: Array) -> float:
+    """Root mean square length."""
+    return float(np.sqrt(np.mean(np.sum(series**2, axis=1))))
+
+
+def _ratio(moved: Array, own: Array) -> float:
+    return _size(own) / max(_size(moved), 1e-300)
+
+
+def _is_offset(spans: Spans, moved: Array, own: Array) -> bool:
+    """Whether a constant accounts for the disagreement, and better than a factor does."""
+    left = float(
+        np.sum((own - _constant(spans, moved, own) * spans.length_s[:, None] - moved) ** 2)
+    )
+    scale = float(np.sum(moved * own)) / max(float(np.sum(own**2)), 1e-300)
+    scaled = float(np.sum((moved - scale * own) ** 2))
+    return left < min(scaled, FITS * float(np.sum(moved**2)))
+
+
+def _missing(moved: Array, own: Array, sigma: float) -> str:
+    """Says in which direction the pose clearly moves while the column shows less than half of it.
+
+    The median decides what is clear, so that a jump of the pose is not taken for motion.
+    """
+    right = np.linalg.svd(moved, full_matrices=False)[2]
+    along = moved @ right.T
+    for k in range(right.shape[0]):
+        if float(np.median(np.abs(along[:, k]))) <= max(CLEAR * np.sqrt(2.0) * sigma, 1e-9):
+            continue
+        part = float(np.sum(along[:, k] * (own @ right[k]))) / float(np.sum(along[:, k] ** 2))
+        if abs(part) < LEAST_PART:
+            axis = AXES[int(np.argmax(np.abs(right[k])))]
+            return f"they show {100.0 * max(part, 0.0):.0f} % of the motion along the {axis} axis"
+    return ""
+
+
+def _constant(spans: Spans, moved: Array, own: Array) -> Array:
+    """Constant part of the column that the pose does not follow, over the whole log."""
+    return np.asarray(np.sum(own - moved, axis=0) / float(np.sum(spans.length_s)))
+
+
+def _offset_words(spans: Spans, moved: Array, own: Array) -> str:
+    mean = _constant(spans, moved, own)
+    k = int(np.argmax(np.abs(mean)))
+    return f"they hold a constant {figure(float(mean[k]), None, 'm/s')} along the {AXES[k]} axis"
+
+
+def _drifts(spans: Spans, moved: Array, own: Array, sigma_m: float, tolerance: float) -> bool:
+    """Whether a constant part is larger than the places may be off by.
+
+    They may at both ends of every unbroken stretch: by noise, by a wrong lever arm, and by what the
+    vehicle moves while its stamps step.
+    """
+    speed = _size(moved / spans.length_s[:, None])
+    stretches = 1 + int(np.sum(spans.first[1:] != spans.last[:-1]))
+    ends_m = 2.0 * ARM_M + ERRORS * np.sqrt(2.0) * sigma_m + SHIFT_S * speed
+    allowed = tolerance * speed + stretches * ends_m / float(np.sum(spans.length_s))
+    return bool(np.linalg.norm(_constant(spans, moved, own)) > allowed)
+
+
 def _described(
     moved: Array, own: Array, body: Array | None, units: dict[float, str]
 ) -> Disagreement:
@@ -200,9 +276,8 @@ def _factor_words(factor: float, units: dict[float, str]) -> str:
 
 def _axes_words(order: tuple[int, ...], signs: Array) -> str:
     """`first from -second`: which column, with which sign, is the motion along each axis."""
-    names = ("first", "second", "third")
     parts = [
-        f"{names[k]} is {'-' if signs[k] < 0 else ''}{names[source]}"
+        f"{AXES[k]} is {'-' if signs[k] < 0 else ''}{AXES[source]}"
         for k, source in enumerate(order)
         if source != k or signs[k] < 0
     ]

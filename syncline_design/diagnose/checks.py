@@ -108,11 +108,14 @@ def _columns(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterato
     if view.log.kind == "position" and bool(np.all(np.isfinite(view.log.truth_m))):
         place = view.log.truth_m  # the velocity is that of the better system
     sigma_m = 0.0 if stage.position is None else float(np.max(stage.position.sigma))
+    angle_rad = 0.0 if stage.attitude is None else float(np.max(stage.attitude.sigma))
     time_s = view.log.time_s
     moved = disagreement(
         time_s, place, logged.velocity_mps, rows.rotation, sigma_m, TOLERANCE["velocity"]
     )
-    turned = disagreement(time_s, None, logged.rate_radps, rows.rotation, 0.0, TOLERANCE["rate"])
+    turned = disagreement(
+        time_s, None, logged.rate_radps, rows.rotation, angle_rad, TOLERANCE["rate"]
+    )
     for code, found in (("velocity_columns", moved), ("rate_columns", turned)):
         if found is not None:
             subject, own = WORDS[code]
