@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from syncline_design.diagnose import Diagnosis, DiagnosisSettings, diagnose, summary_text
 from syncline_design.diagnose.checks import Check, log_checks
 from syncline_design.diagnose.covariance import inverse_3x3
+from syncline_design.diagnose.gap import Fit, Gap, closed_share
 from syncline_design.diagnose.simulation import scene
+from syncline_design.diagnose.summary import gap_text
 from syncline_design.diagnose.system import measured
 from syncline_design.loading import BadInput, load
 from syncline_design.report.diagnoses import render_diagnose
@@ -239,7 +241,7 @@ def test_unlike_sizes_are_inverted(tmp_path: Path) -> None:
 def test_noise_alone_closes_no_gap(tmp_path: Path) -> None:
     """Nothing is held out when only the noise's size is fitted."""
     louder = hidden("noise_understated", "position", factor=3.0)
-    found = asked(written(run_of("car_stops", louder), tmp_path))
+    found = asked(written(run_of("car_stops", louder), tmp_path), max_effects=2)
     assert {f.effect.name for f in found.findings} <= {"noise_understated", "heavy_tails"}
     assert found.gap is not None
     assert found.gap.closed_fraction is None
@@ -267,16 +269,41 @@ def test_closed_is_never_more_than_the_rms_shows(exclude: tuple[str, ...], tmp_p
         assert bars[-1] == pytest.approx(after)
 
 
+CLOSED = (  # RMS [m] and NLL before, after, floor; the share by hand
+    ((0.03633, 0.03623, 0.03621), (2.1, 1.9, 1.88), None),  # 0.3 % of the RMS
+    ((1.746, 1.858, 1.838), (3.0, 2.9, 2.8), None),  # it rose
+    ((0.4, 0.1, 0.05), (9.0, 1.0, 1.0), 6 / 7),
+    ((0.4, 0.05, 0.05), (9.0, 3.0, 1.0), 3 / 4),
+    ((0.4, 0.5, 0.05), (9.0, 3.0, 1.0), -2 / 7),
+)
+
+
+@pytest.mark.parametrize(("rms_m", "nll", "share"), CLOSED)
+def test_a_share_of_next_to_nothing_is_not_given(
+    rms_m: tuple[float, ...], nll: tuple[float, ...], share: float | None
+) -> None:
+    before, after, floor = (Fit(r, 1.0, n, 0.95) for r, n in zip(rms_m, nll, strict=True))
+    closed = closed_share(before, after, floor)
+    assert closed == (None if share is None else pytest.approx(share))
+    text = gap_text(Gap(before, after, floor, closed, 0.0, 0.0, 0.05))
+    assert ("too little for a share" in text) == (share is None)
+    assert ("% of the gap is closed" in text) == (share is not None and share > 0.0)
+
+
 SCRIPT = """
 import sys
-from syncline_design.diagnose import diagnose
+from syncline_design.diagnose import DiagnosisSettings, diagnose
 from syncline_design.report.json_out import json_text
-print(json_text(diagnose(sys.argv[1], [sys.argv[2]]).to_json()))
+settings = DiagnosisSettings(max_effects=1)
+print(json_text(diagnose(sys.argv[1], [sys.argv[2]], settings).to_json()))
 """
 
 
 def test_threads_change_no_digit(tmp_path: Path) -> None:
-    """Used as a library, where nothing has set the environment."""
+    """Used as a library, where nothing has set the environment.
+
+    One effect is enough: without the guard its digits differ for one thread and two.
+    """
     folder = written(run_of("constant_speed_eights", DELAY, LEVER), tmp_path)
     printed = []
     for threads in ("1", "2"):

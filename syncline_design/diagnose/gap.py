@@ -27,7 +27,7 @@ PURGE_S = 5.0  # left out on both sides of a held-out block
 PURGE_SHARE = 0.1  # of a block, at most
 REGIME_SHARE = 0.3  # fastest share of the rows, held out as a regime
 LEAST_GAP = 1e-9  # nat per sample
-LEAST_SHARE = 1e-3  # of the RMS: less is no gap
+LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
 LEAST_TRAINING = 30  # rows
 NORMAL_95 = 1.959963984540054
 
@@ -51,7 +51,8 @@ class Gap:
     floor: the same effects fitted to all rows, the held-out ones too, or what the spec's own noise
     would give, whichever is lower, in RMS and in NLL.  expected_rms_m: what the spec's noise gives.
     closed_fraction: (before - after) / (before - floor), in NLL or in RMS, whichever is less; None
-    where nothing was held out (findings that only change the noise) or there was no gap.
+    where nothing was held out (findings that only change the noise), and where there was no gap to
+    speak of (`slight`: 2 % of the RMS at most, which is what an effect of a fifth of it makes).
     difference: NLL per sample saved, with its standard error over the blocks.
     """
 
@@ -62,6 +63,11 @@ class Gap:
     difference: float
     difference_error: float
     expected_rms_m: float
+
+    @property
+    def slight(self) -> bool:
+        """Whether what could be closed is next to nothing."""
+        return _slight(self.before, self.floor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,12 +170,12 @@ def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> G
         nll_per_sample=min(fitted.nll_per_sample, expected.nll_per_sample),
     )
     spread = float(np.std(saved, ddof=1) / np.sqrt(len(saved))) if len(saved) > 1 else 0.0
-    closed = _closed(before, after, floor) if held_out else None
+    closed = closed_share(before, after, floor) if held_out else None
     gained = before.nll_per_sample - after.nll_per_sample
     return Gap(before, after, floor, closed, gained, spread, expected.rms_m)
 
 
-def _closed(before: Fit, after: Fit, floor: Fit) -> float | None:
+def closed_share(before: Fit, after: Fit, floor: Fit) -> float | None:
     """Share of the gap that is closed, the lesser of NLL and RMS; 1 at most.
 
     Better by the likelihood alone may be a larger noise, better by the RMS alone a lucky fit.
@@ -178,11 +184,14 @@ def _closed(before: Fit, after: Fit, floor: Fit) -> float | None:
     if before.nll_per_sample - floor.nll_per_sample > LEAST_GAP:
         gained = before.nll_per_sample - after.nll_per_sample
         shares.append(gained / (before.nll_per_sample - floor.nll_per_sample))
-    if before.rms_m - floor.rms_m > LEAST_SHARE * before.rms_m:
-        shares.append((before.rms_m - after.rms_m) / (before.rms_m - floor.rms_m))
-    elif after.rms_m > (1.0 + LEAST_SHARE) * before.rms_m:
+    if _slight(before, floor):
         return None
-    return min(1.0, *shares) if shares else None
+    shares.append((before.rms_m - after.rms_m) / (before.rms_m - floor.rms_m))
+    return min(1.0, *shares)
+
+
+def _slight(before: Fit, floor: Fit) -> bool:
+    return before.rms_m - floor.rms_m <= LEAST_SHARE * before.rms_m
 
 
 def _step(known: Precision, columns: Array, error: Array) -> Array:

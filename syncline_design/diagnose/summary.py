@@ -102,10 +102,10 @@ def _gap_lines(diagnosis: Diagnosis) -> list[str]:
     gap = diagnosis.gap
     if gap is None or not diagnosis.findings:
         return []
-    lines = ["", f"On rows that the fit has not seen: {_gap_text(gap)}"]
+    lines = ["", f"On rows that the fit has not seen: {gap_text(gap)}"]
     name, regime = diagnosis.regime
     if regime is not None:
-        lines.append(f"On a regime that the fit has not seen ({name}): {_gap_text(regime)}")
+        lines.append(f"On a regime that the fit has not seen ({name}): {gap_text(regime)}")
     label, placebo = diagnosis.placebo
     if placebo is not None:
         change = placebo.difference - gap.difference
@@ -113,12 +113,14 @@ def _gap_lines(diagnosis: Diagnosis) -> list[str]:
     return lines
 
 
-def _gap_text(gap: Gap) -> str:
+def gap_text(gap: Gap) -> str:
     closed = f"; the spec's noise expects {figure(gap.expected_rms_m, None, 'm')}"
     if gap.closed_fraction is not None and gap.closed_fraction > 0.0:
         closed += f"; {100.0 * gap.closed_fraction:.0f} % of the gap is closed"
     elif gap.closed_fraction is not None:
         closed += "; nothing of the gap is closed"
+    elif gap.slight:
+        closed += "; less than 2 % of it could be closed, too little for a share"
     return (
         f"RMS {figure(gap.before.rms_m, None, 'm')} before, {figure(gap.after.rms_m, None, 'm')} "
         f"after, {figure(gap.floor.rms_m, None, 'm')} at best{closed}"
