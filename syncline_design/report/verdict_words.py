@@ -30,7 +30,7 @@ OUTCOMES: Final[dict[str, Outcome]] = {
     "refused": Outcome("bad", "!", "Refused: the spec cannot be read"),
 }
 QUALIFYING: Final[dict[str, str]] = {
-    "worst-case-above-limit": "its worst case at one sigma",
+    "worst-case-above-limit": "its certified worst case at one sigma",
     "quantile-above-limit": "its 95 % quantile",
 }
 STATUSES: Final[dict[str, Outcome]] = {
