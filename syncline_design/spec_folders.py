@@ -14,6 +14,7 @@ from syncline_design.loading import BadInput
 from syncline_design.yaml_reader import Document, Problem, read
 
 SUFFIXES: Final = (".yaml", ".yml")
+NOT_ENTERED: Final = "a folder with specs that are not checked; name it too"
 # Keys that only a spec has: a file with one of them is a spec, even if its first line is missing.
 _OF_SPECS: Final = ("syncline", "stages", "requirements")
 _CONTENT: Final = re.compile(r"^[ \t]*[^#\s]", re.MULTILINE)
@@ -59,17 +60,34 @@ def spec_files(paths: Sequence[Path], *, skip_others: bool = False) -> SpecFiles
 
 def _in_folder(folder: Path) -> tuple[list[Path], list[Skipped]]:
     try:
-        found = sorted(p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES)
+        inside = sorted(folder.iterdir())
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         message = f"cannot read the folder: {reason}"
         raise BadInput((Problem(str(folder), 0, 0, "", message),)) from None
-    judged = [(path, "a folder" if path.is_dir() else other_kind(path)) for path in found]
+    found = [path for path in inside if path.suffix.lower() in SUFFIXES]
+    judged = [(path, _folder_kind(path) if path.is_dir() else other_kind(path)) for path in found]
     others = [Skipped(str(path), what) for path, what in judged if what is not None]
+    others += [Skipped(str(p), NOT_ENTERED) for p in inside if p not in found and _holds_spec(p)]
     specs = [path for path, what in judged if what is None]
     if not specs:
         raise BadInput((Problem(str(folder), 0, 0, "", _no_spec_text(others)),))
     return specs, others
+
+
+def _folder_kind(folder: Path) -> str:
+    return NOT_ENTERED if _holds_spec(folder) else "a folder"
+
+
+def _holds_spec(folder: Path) -> bool:
+    """Whether a folder inside has specs that nobody asked to check; hidden ones are no business."""
+    if folder.name.startswith(".") or not folder.is_dir():
+        return False
+    try:
+        inside = [p for p in folder.iterdir() if p.suffix.lower() in SUFFIXES and p.is_file()]
+    except OSError:
+        return True  # what cannot be looked at is named
+    return any(other_kind(path) is None for path in inside)
 
 
 def _no_spec_text(others: Sequence[Skipped]) -> str:

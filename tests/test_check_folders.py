@@ -49,6 +49,25 @@ def test_a_folder_with_a_catalog_and_a_study_of_its_own(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
+def test_specs_in_a_folder_inside_are_named_where_they_are_not_checked(tmp_path: Path) -> None:
+    """A job must not look green because its specs moved one folder down."""
+    (tmp_path / "good.yaml").write_text(TRACK, "utf-8")
+    for folder in ("boats", "cars.yaml", ".cache", "studies", "empty"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "boats" / "b.yml").write_text(TRACK, "utf-8")
+    (tmp_path / "cars.yaml" / "broken.yaml").write_text("syncline: 1\nname: [\n", "utf-8")
+    (tmp_path / ".cache" / "c.yaml").write_text(TRACK, "utf-8")
+    (tmp_path / "studies" / "vary.yaml").write_text(STUDY, "utf-8")
+    (tmp_path / "boats" / "deeper").mkdir()
+    found = spec_files([tmp_path])
+    assert found.files == (tmp_path / "good.yaml",)
+    named = {Path(one.file).name: one.what for one in found.skipped}
+    assert set(named) == {"boats", "cars.yaml"}
+    assert all("not checked" in what for what in named.values())
+    done = check(str(tmp_path))
+    assert (done.returncode, done.stderr.count("not checked")) == (0, 2)
+
+
 def test_a_broken_spec_is_not_passed_over(tmp_path: Path) -> None:
     """A job must not turn green because a spec lost its first line or does not parse."""
     (tmp_path / "good.yaml").write_text(TRACK, "utf-8")
