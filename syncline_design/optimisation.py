@@ -31,7 +31,7 @@ from syncline_design.choose.tolerance import (
     tolerance_verdict,
 )
 from syncline_design.choose.variations import Build
-from syncline_design.design_space import Design, Problem, ResourceName
+from syncline_design.design_space import Design, Limits, Problem, ResourceName
 from syncline_design.loading import LoadedSpec
 from syncline_design.open_choice import Picked, pick
 from syncline_design.problem import selection_of
@@ -46,6 +46,8 @@ from syncline_design.yaml_reader import printable
 
 SCHEMA = "syncline-design/optimization/v1"
 Json = dict[str, Any]
+# What stands for the tables where time ended before they were made.
+NO_TABLES = Problem((), (), (), (), 0.0, 0.0, Limits(None, 1.0), "syncline", "cost")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,12 +119,13 @@ def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
 
 def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     build = Simulations(settings.seed).problem_of
-    problem = build(loaded)
     simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
     checking = CheckSettings(
         settings.seed, settings.method, monte_carlo=simulated or settings.report
     )
+    problem = NO_TABLES
     try:
+        problem = build(loaded)
         in_force().doing("choosing")
         picked = pick(
             problem,
@@ -163,7 +166,8 @@ def _unfinished(
     why: str,
 ) -> Optimisation:
     """What there is to say when the time limit came before any design."""
-    verdict = unfinished_verdict(loaded, problem, checking, why) if settings.report else None
+    known = None if problem is NO_TABLES else problem
+    verdict = unfinished_verdict(loaded, known, checking, why) if settings.report else None
     return Optimisation(
         loaded, problem, settings, None, (), (), (), None, None, ("choosing",), verdict, why
     )
@@ -210,7 +214,7 @@ def optimisation_json(found: Optimisation) -> Json:
         "verdict": "infeasible" if found.exit_code == 1 else "meets",
         "spec": {"name": loaded.spec.name, "file": str(loaded.path)},
         "proof": _proof(found),
-        "combinations": str(problem.combinations),
+        "combinations": None if problem is NO_TABLES else str(problem.combinations),
         "designs": designs_json(loaded, problem, found.designs),
         **excluded_json(problem),
         "cut_short": list(found.cut_short),

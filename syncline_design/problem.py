@@ -59,6 +59,7 @@ from syncline_design.resolution import (
 )
 from syncline_design.selection import ClockSelection, RoleSelection, Selection
 from syncline_design.spec import InlineTimestamping, Role, RoleChoice, StageChoice
+from syncline_design.time_limit import unhurried
 from syncline_design.units import Quantity
 
 __all__ = [
@@ -249,7 +250,7 @@ def _role_table(
     effects = _EffectsOf(stage.name, role, usual, by_sensor)
     options: list[Option] = []
     excluded: list[Excluded] = []
-    for one in _candidates(loaded, stage, role, motion, effects):
+    for one in unhurried(_candidates(loaded, stage, role, motion, effects)):
         ratio = sync_ratio(one) if isinstance(one, Option) else 0.0
         if isinstance(one, Excluded):
             excluded.append(one)

@@ -170,6 +170,8 @@ def _edited_block(
     lines = [_block_entry(key, value, indent) for key, value in put.items()]
     new = f"\n{indent}".join(lines)
     old = [(start, end) for key, start, end in entries if key in gone]
+    if not old and not new:
+        return text
     if not old:
         end = entries[-1][2]
         line_end = text.find("\n", end)

@@ -176,8 +176,8 @@ def _lever_arm_json(lever_arm: LeverArm, per_sensor: bool) -> Json:
     }
 
 
-def frame(loaded: LoadedSpec, problem: DesignProblem, word: str, seed: int) -> Json:
-    """What every verdict holds, with or without a design."""
+def frame(loaded: LoadedSpec, problem: DesignProblem | None, word: str, seed: int) -> Json:
+    """What every verdict holds, with or without a design; problem: None where time ended first."""
     spec = loaded.spec
     stages = []
     for stage in spec.stages:
@@ -209,10 +209,10 @@ def frame(loaded: LoadedSpec, problem: DesignProblem, word: str, seed: int) -> J
             "coverage_factor": float(spec.coverage_factor),
             "open_roles": [
                 f"{table.stage_name}.{table.role}"
-                for table in problem.roles
+                for table in (problem.roles if problem is not None else ())
                 if len(table.options) + len(table.excluded) > 1
             ],
-            "combinations": str(problem.combinations),
+            "combinations": None if problem is None else str(problem.combinations),
             "stages": stages,
         },
         "horizon": horizon_json(spec.horizon.horizon()),

@@ -119,11 +119,12 @@ def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Json:
 def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
     """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
     build = _build(settings)
-    problem = build(loaded)
-    if sole_design(problem) is not None:
-        return _pinned_verdict(loaded, problem, settings)
+    problem: DesignProblem | None = None
     with within(_deadline(settings)):
         try:
+            problem = build(loaded)
+            if sole_design(problem) is not None:
+                return _pinned_verdict(loaded, problem, settings)
             return _check_open(loaded, problem, replace(settings, time_limit_s=None), build)
         except OutOfTime as error:
             return unfinished_verdict(loaded, problem, settings, str(error))
@@ -141,7 +142,7 @@ def _pinned_verdict(loaded: LoadedSpec, problem: DesignProblem, settings: CheckS
 
 
 def unfinished_verdict(
-    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, why: str
+    loaded: LoadedSpec, problem: DesignProblem | None, settings: CheckSettings, why: str
 ) -> Json:
     """A verdict that the time limit left without a design."""
     from syncline_design.choice_data import unproven_json

@@ -76,3 +76,75 @@ def test_remedies_cut_short_are_not_called_none(
         assert not any(r["note"].startswith("part of") for r in data["requirements"])
     else:
         assert data["cut_short"] == ["reasons and remedies"]
+
+
+def large_spec(folder: Path, sensors: int = 150) -> Path:
+    """One stage; per role many sensors, each with four primitives under six methods of all."""
+    kinds = {
+        "position": "sigma_position: 1 cm",
+        "attitude": "sigma_attitude: 0.1 deg",
+        "ranging": "sigma_range: 1 cm, sigma_bearing: 0.1 deg",
+    }
+    signals = "primitives: [pps, tov, trigger, network]"
+    own = ["sensors:"]
+    for role, sigma in kinds.items():
+        own += [
+            f"  {role}{i}: {{modality: {role}, {sigma}, {signals}, cost: {i} EUR, source: own}}"
+            for i in range(sensors)
+        ]
+    own.append("timestamping:")
+    own += [
+        f"  m{i}: {{{signals}, timeline: host, error: {{distribution: constant, value: 1 us}}, "
+        "cost: 1 EUR, source: own}"
+        for i in range(6)
+    ]
+    spec = [
+        "syncline: 1", "name: large", "catalogs: [own.yaml]", "requirements:",
+        "  - {id: A, kind: accuracy, limit: 9 m}", "stages:", "  - name: v",
+        "    platform: usv",
+        *(
+            f"    {role}: {{candidates: [{', '.join(f'{role}{i}' for i in range(sensors))}]}}"
+            for role in kinds
+        ),
+        f"timestamping: {{candidates: [{', '.join(f'm{i}' for i in range(6))}]}}",
+    ]  # fmt: skip
+    (folder / "own.yaml").write_text("\n".join(own) + "\n", "utf-8")
+    path = folder / "large.yaml"
+    path.write_text("\n".join(spec) + "\n", "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("command", ["check", "optimize"])
+def test_making_the_tables_ends_with_the_time(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """3 x 150 sensors x 24 ways of stamping are 10 800 options; only some are made."""
+    from syncline_design import problem
+
+    made = 0
+    real = problem._Figures.option
+
+    def counted(self: Any, *given: Any) -> Any:
+        nonlocal made
+        made += 1
+        return real(self, *given)
+
+    monkeypatch.setattr(problem._Figures, "option", counted)
+    path, out, page = large_spec(tmp_path), tmp_path / "out.json", tmp_path / "out.html"
+    targets = ("-o", f"json:{out}", "-o", f"html:{page}")
+    code, _ = run(command, str(path), "--time-limit", "0", *targets)
+    data = json.loads(out.read_text("utf-8"))
+    assert (code, data["verdict"]) == (3, "indeterminate")
+    assert 0 < made < 8000
+    told = data if command == "optimize" else data["spec"]
+    assert told["combinations"] is None
+    assert "time limit" in page.read_text("utf-8")
+
+
+def test_pinned_spec_is_judged_however_little_time(tmp_path: Path) -> None:
+    """Its sums need no search; what is not a matter of simulation passes or fails."""
+    out = tmp_path / "out.json"
+    run("check", str(SPECS / "usv_wire_missing.yaml"), "--time-limit", "0", "-o", f"json:{out}")
+    data = json.loads(out.read_text("utf-8"))
+    kinds = {r["kind"]: r["status"] for r in data["requirements"]}
+    assert kinds["accuracy"] in ("pass", "fail")

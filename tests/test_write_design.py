@@ -219,3 +219,31 @@ def test_primitive_that_no_candidate_has_is_refused(tmp_path: Path) -> None:
     assert done.exit_code == 2
     assert "pps" in done.output
     assert "Traceback" not in done.output
+
+
+INLINE_BLOCK = """\
+syncline: 1
+name: all given in place
+requirements:
+  - {id: A, kind: accuracy, limit: 9 m}
+stages:
+  - name: v
+    platform: usv
+    position: {candidates: [ublox_f9p_rtk, ublox_f9p_pvt]}
+    attitude:
+      sensor: {modality: attitude, sigma_attitude: 0.1 deg, primitives: [pps], cost: 9 EUR}
+      timestamping: {error: {distribution: constant, value: 2 us}}
+    ranging: {sensor: velodyne_hdl32e, timestamping: gpio}
+timestamping: {candidates: [gpio]}
+"""
+
+
+def test_a_written_design_is_written_again_as_it_stands(tmp_path: Path) -> None:
+    """Nothing is left to pin, so not a byte changes, blanks and line ends included."""
+    given, first, second = (tmp_path / f"{name}.yaml" for name in ("given", "first", "second"))
+    given.write_text(INLINE_BLOCK, "utf-8")
+    for source, target in ((given, first), (first, second)):
+        done = CliRunner().invoke(app, ["optimize", str(source), "--write-design", str(target)])
+        assert done.exit_code == 0, done.output
+    assert second.read_text("utf-8") == first.read_text("utf-8")
+    assert not any(line != line.rstrip() for line in first.read_text("utf-8").splitlines())
