@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from syncline_design.diagnose.log import Log
 from syncline_design.diagnose.reading import read_log
-from tests.test_diagnose_log import write
+from tests.test_diagnose_log import columns, refusal, write
 from tests.world.geodesy import to_geodetic
 
 Columns = dict[str, np.ndarray]
@@ -168,3 +168,10 @@ def test_positions_of_a_file_apart_pass_the_date_line(tmp_path: Path) -> None:
     ]
     log = read_log(paths, ["uav"], {})
     assert missed_m(log) < 0.01
+
+
+@pytest.mark.parametrize(("rows", "said"), [(0, "empty column"), (1, "one time stamp only")])
+def test_a_log_of_one_row_is_not_called_empty(tmp_path: Path, rows: int, said: str) -> None:
+    made = {name: values[:3].copy() for name, values in columns().items()}
+    made["time_s"][rows:] = np.nan
+    assert said in refusal(write(tmp_path / "a.csv", made))

@@ -73,7 +73,9 @@ def arranged(path: Path, stamps: Array) -> Arranged:
 
 def _demand_sense(path: Path, finite: Array) -> None:
     if finite.shape[0] < 2:
-        raise refuse(path, "no time stamps", field=TIME, found="empty column")
+        if not finite.shape[0]:
+            raise refuse(path, "no time stamps", field=TIME, found="empty column")
+        raise refuse(path, "one time stamp only", field=TIME, expected="two or more")
     back = int(np.count_nonzero(finite[1:] < finite[:-1]))
     if back > 0.5 * (finite.shape[0] - 1):
         raise refuse(path, "time runs backwards", field=TIME, hint="reverse the rows")
