@@ -45,6 +45,8 @@ from syncline_design.values import (
 Role = Literal["position", "attitude", "ranging"]
 ROLE_NAMES: tuple[Role, ...] = ("position", "attitude", "ranging")
 
+MOST_EFFECTS = 1_000  # each acts on every simulated sample; a system is known by a few
+
 LIMIT_DIMENSIONS: dict[str, Dimension] = {
     "accuracy": Dimension.LENGTH,
     "sync": Dimension.DIMENSIONLESS,
@@ -366,7 +368,7 @@ class Spec(Record):
     horizon: HorizonChoice = Field(default_factory=HorizonChoice)
     objective: Literal["cost", "mass", "power", "error"] = "cost"
     monte_carlo: MonteCarloChoice = Field(default_factory=MonteCarloChoice)
-    effects: tuple[EffectChoice, ...] = ()
+    effects: Annotated[tuple[EffectChoice, ...], Field(max_length=MOST_EFFECTS)] = ()
     log: LogChoice | None = None
 
     @model_validator(mode="after")

@@ -106,6 +106,9 @@ def _standard(
         return "out of range", f"{words} {context[key]}", kind_of(value), ""
     if kind in ("too_short", "string_too_short"):
         return "empty", "at least one entry" if kind == "too_short" else "some text", "", ""
+    if kind == "too_long":
+        most, found = context["max_length"], context.get("actual_length")
+        return "too many entries", f"at most {most}", str(found) if found else "more", ""
     if kind in _WANTED:
         number_as_text = kind == "string_type" and isinstance(value, int | float)
         hint = "put it in quotes" if number_as_text else ""

@@ -83,3 +83,16 @@ def test_nor_does_a_case_whose_file_the_grid_names(tmp_path: Path) -> None:
     problems = [p for c in result.cases() for p in c.record.get("problems", ())]
     assert problems
     assert all("not a regular file" in problem["message"] for problem in problems)
+
+
+def test_thousands_of_effects_are_refused() -> None:
+    """Each acts on every simulated sample: 15 000 of them in 1 MB kept `check` busy for minutes."""
+    spec = (ROOT / "specs" / "position_track.yaml").read_text()
+    one = "  - {effect: latency, sensor: position, parameters: {latency_s: 1 us}}\n"
+    for count, taken in ((1_000, True), (1_001, False), (15_000, False)):
+        text = f"{spec}\neffects:\n{one * count}"
+        if taken:
+            assert load_text(text, ROOT / "specs" / "flooded.yaml")
+            continue
+        with pytest.raises(BadInput, match=f"too many entries; expected at most 1000, .*{count}"):
+            load_text(text, ROOT / "specs" / "flooded.yaml")

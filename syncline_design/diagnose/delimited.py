@@ -30,6 +30,7 @@ MOST_COLUMNS = 5_000
 SEPARATORS = {",": "commas", ";": "semicolons", "\t": "tabs", "|": "bars"}
 COMMENT, QUOTE, NEWLINE, BLANK = b"#"[0], b'"'[0], b"\n"[0], b" "[0]
 BOM = b"\xef\xbb\xbf"
+LINE_END = re.compile(rb"\r\n|\n|\r")  # one pass: looking for each mark is quadratic
 
 Index = NDArray[np.int64]
 
@@ -98,11 +99,13 @@ def _dialect(
     """From the first line that is no comment: the header, or the first row below a `#` header."""
     names, mark = split_names(text, separator)
     body, body_line = ends[0], line + 1
-    if any(_is_row(split_line(text, m)) for m in ([separator] if separator else SEPARATORS)):
+    rows = {m: split_line(text, m) for m in ([separator] if separator else SEPARATORS)}
+    checked = {m: _is_row(row) for m, row in rows.items()}
+    if any(checked.values()):
         for at, comment in reversed(comments):
             above, mark = split_names(comment, separator)
-            row = split_line(text, mark)
-            if len(above) == len(row) and _is_row(row) and not _is_row(above):
+            row = rows[mark]
+            if len(above) == len(row) and checked[mark] and not _is_row(above):
                 start = ends[1] - len(text.encode())
                 return Dialect(mark, _checked(path, above, at), at, start, line)
         _no_names(path, line, text)
@@ -132,9 +135,8 @@ def _no_names(path: Path, line: int, text: str) -> NoReturn:
 
 def _line_end(raw: bytes, offset: int) -> tuple[int, int]:
     """End of a line and start of the next one; lines end with LF, CRLF or CR."""
-    ends = [at for mark in (b"\n", b"\r") if (at := raw.find(mark, offset)) >= 0]
-    end = min(ends, default=len(raw))
-    return end, end + (2 if raw[end : end + 2] == b"\r\n" else 1)
+    found = LINE_END.search(raw, offset)
+    return (found.start(), found.end()) if found else (len(raw), len(raw) + 1)
 
 
 def _decoded(path: Path, raw: bytes, line: int) -> str:

@@ -24,6 +24,7 @@ from syncline_design.diagnose.columns import (
 )
 from syncline_design.diagnose.derivatives import derived_rate, derived_velocity
 from syncline_design.diagnose.log import Kind, Log, StageLog, Track
+from syncline_design.diagnose.magnitudes import demand_possible
 from syncline_design.diagnose.merging import merged
 from syncline_design.diagnose.refusals import refuse
 from syncline_design.diagnose.tables import Table, read_tables
@@ -31,8 +32,6 @@ from syncline_design.diagnose.twins import without_twins
 from syncline_design.effects.base import Array
 
 LEAST_ROWS = 10
-MOST_SPEED_MPS = 2000.0
-MOST_RANGE_M = 1e8  # a quarter of the way to the Moon
 
 
 @dataclass(slots=True)
@@ -94,6 +93,7 @@ def read_log(
             expected=f"at least {LEAST_ROWS}, at several stamps",
             found=f"{left.shape[0]} of {draft.table.rows}",
         )
+    demand_possible(draft.path, draft.columns, prefixes)
     return _log(draft, stages, prefixes, kind, rejected)
 
 
@@ -212,8 +212,6 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
     else:
         rate = derived_rate(time_s, euler)
         draft.notes.append(f"rates of {name} were derived from its attitude")
-    if kind == "georeference":
-        _demand_reach(draft, prefix)
     distance, azimuth, elevation = (
         draft.columns[prefix + n] if kind == "georeference" else None for n in RANGING
     )
@@ -232,36 +230,13 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
     )
 
 
-def _demand_reach(draft: _Draft, prefix: str) -> None:
-    farthest = float(np.max(np.abs(draft.columns[prefix + RANGING[0]])))
-    if farthest > MOST_RANGE_M:
-        raise refuse(
-            draft.path,
-            "farther than any sensor sees",
-            field=prefix + RANGING[0],
-            expected=f"at most {MOST_RANGE_M:.0e} m",
-            found=f"{farthest:.4g} m",
-            hint="is the unit in the column's name right?",
-        )
-
-
 def _velocity(
     draft: _Draft, prefix: str, antenna: Array | None, kind: Kind, name: str
 ) -> tuple[Array, bool]:
     """Velocity columns, or the slope of the reference or antenna positions, smoothed."""
     time_s = draft.columns[TIME]
     if draft.has([prefix + n for n in VELOCITY]):
-        velocity = draft.vectors([prefix + n for n in VELOCITY])
-        fastest = float(np.max(np.abs(velocity)))
-        if fastest > MOST_SPEED_MPS:
-            raise refuse(
-                draft.path,
-                "faster than any vehicle",
-                field=prefix + VELOCITY[0],
-                found=f"{fastest:.4g} m/s",
-                hint="is the unit in the column's name right?",
-            )
-        return velocity, draft.follows_position
+        return draft.vectors([prefix + n for n in VELOCITY]), draft.follows_position
     reference = draft.vectors(REFERENCE) if kind == "position" else None
     if reference is not None and np.all(np.isfinite(reference)):
         draft.notes.append(f"velocity of {name} was derived from the reference positions")
