@@ -9,9 +9,8 @@ from typing import Any
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.budget import differs
 from syncline_design.model.system import UTC
-from syncline_design.simulate.worst_case import WorstCase
 from syncline_design.units import Dimension, format_quantity
-from syncline_design.verdict import RequirementResult, Verified
+from syncline_design.verdict import Verified
 
 Json = dict[str, Any]
 
@@ -64,29 +63,18 @@ def _worst_case(verified: Verified) -> Iterator[Caution]:
     Of several limits the tightest one that is kept: a failed one says enough itself.
     """
     kept = [r for r in verified.requirements if r.kind == "accuracy" and r.status == "pass"]
-    if verified.monte_carlo is None or not kept:
+    worst = verified.worst_case_1sigma_m
+    if worst is None or not kept:
         return
     tightest = min(kept, key=lambda row: row.limit)
-    worst = verified.monte_carlo.worst_case
-    if worst.bound_m > tightest.limit:
+    if not worst <= tightest.limit:
         yield Caution(
             "worst-case-above-limit",
             f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet with every sensor "
-            f"at one sigma and relative shifts up to {_time(worst.tau_s)} "
-            f"{_above(worst, tightest)}",
+            "at one sigma and every timestamp within its own bound the certified worst case is "
+            f"{_length(worst)}: the Syncline leaves out what lever arms, tilt and scatter add",
             requirement=tightest.id,
         )
-
-
-def _above(worst: WorstCase, kept: RequirementResult) -> str:
-    """What stands above a limit: what the search found, or only what its certificate leaves."""
-    if worst.value_m > kept.limit:
-        found = f"the worst case found is {_length(worst.value_m)}"
-        return f"{found}: the Syncline leaves out what lever arms and tilt add"
-    return (
-        f"nothing is certified below {_length(worst.bound_m)} (found: {_length(worst.value_m)}; "
-        f"stochastic effects act in the certificate only)"
-    )
 
 
 def _lever_arm(verified: Verified) -> Iterator[Caution]:

@@ -102,3 +102,25 @@ def bound(error: TimingError, coverage_factor: float = DEFAULT_COVERAGE_FACTOR) 
         case Empirical(values):
             spread = max(abs(value - shift) for value in values)
     return spread + remains + error.drifted_s
+
+
+def support(
+    error: TimingError, coverage_factor: float = DEFAULT_COVERAGE_FACTOR
+) -> tuple[float, float]:
+    """(smallest, largest) mu [s]; of a normal error mean - k std and mean + k std.
+
+    As `bound`, but each end by itself: data that are late by 0 to 50 ms span -50 ms to 0.
+    """
+    match error.distribution:
+        case Uniform(low, high):
+            ends = (low, high)
+        case Normal(mu, std):
+            ends = (mu - coverage_factor * std, mu + coverage_factor * std)
+        case Constant(value):
+            ends = (value, value)
+        case Empirical(values):
+            ends = (min(values), max(values))
+    calibrated = error.calibrated_s is not None
+    shift = mean(error.distribution) if calibrated else 0.0
+    wider = (error.calibrated_s or 0.0) + error.drifted_s
+    return ends[0] - shift - wider, ends[1] - shift + wider

@@ -17,7 +17,8 @@ from syncline_design.model.budget import Budget, LeverArm
 from syncline_design.model.system import System
 from syncline_design.recheck import Recheck
 from syncline_design.resolution import platform_of
-from syncline_design.simulate import MonteCarlo
+from syncline_design.simulate import MonteCarlo, SimulationError
+from syncline_design.simulate.certified import certified_worst_case_m
 
 Json = dict[str, Any]
 SCHEMA = "syncline-design/verdict/v1"
@@ -118,6 +119,14 @@ class Verified:
     trouble: str = ""  # why the Monte Carlo part is missing
 
     @property
+    def worst_case_1sigma_m(self) -> float | None:
+        """Certified worst case [m], sensors at one sigma; None of a system without sense."""
+        try:
+            return certified_worst_case_m(self.system)
+        except SimulationError:
+            return None
+
+    @property
     def word(self) -> Word:
         """meets, fails or indeterminate."""
         return word_of(self.requirements)
@@ -165,6 +174,13 @@ def syncline_json(budget: Budget, model: str, total_m: float) -> Json:
             for term in ledger
         ],
     }
+
+
+def figures_json(verified: Verified) -> Json:
+    """The `figures` key: the errors of a design by their convention, those that are computed."""
+    worst = verified.worst_case_1sigma_m
+    figures: Json = {"syncline_m": finite(float(verified.exact.total_m))}
+    return figures if worst is None else figures | {"worst_case_1sigma_m": finite(worst)}
 
 
 def _lever_arm_json(lever_arm: LeverArm, per_sensor: bool) -> Json:

@@ -44,6 +44,7 @@ from syncline_design.verdict import (
     Status,
     Verified,
     effects_json,
+    figures_json,
     frame,
     problem_json,
     syncline_json,
@@ -427,6 +428,7 @@ def _verdict_json(
     data["requirements"] = [r.to_json() for r in verified.requirements]
     data["design"] = design_json(loaded, problem, verified.design, verified.figures)
     data["syncline"] = syncline_json(verified.figures, model, float(verified.exact.total_m))
+    data["figures"] = figures_json(verified)
     data["monte_carlo"] = None if verified.monte_carlo is None else verified.monte_carlo.to_json()
     data["assumptions"] = assumptions(entries)
     data["sources"] = sources(entries)

@@ -9,7 +9,7 @@ what the budget charges for them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from syncline_design.model.budget import budget
@@ -64,9 +64,9 @@ def chord(angle_rad: float) -> float:
 
 
 def stage_bound(
-    stage: Stage, first: bool, tau_s: float, tilt_rad: float, added: Added
+    stage: Stage, first: bool, shifts_s: tuple[float, float], tilt_rad: float, added: Added
 ) -> StageBound:
-    """Largest |e| [m] of one stage for relative shifts up to tau_s plus what effects add.
+    """Largest |e| [m] of one stage for relative shifts up to (tau_p, tau_a) plus what effects add.
 
     |dp| <= v tau_p + sigma_p; the antenna's arm l_G turns by at most w tau_p, in two parts where
     an effect displaces by its own; the measured attitude is off by at most
@@ -78,9 +78,10 @@ def stage_bound(
     v, omega = float(stage.platform.v_max_mps), float(stage.platform.omega_max_radps)
     sigma_p = 0.0 if stage.position is None else math.hypot(*stage.position.sigma)
     antenna, difference = arm_lengths(stage, first)
-    turn_p = omega * (tau_s + added.position_s)
-    position = v * (tau_s + added.position_s) + sigma_p + added.offset_m
-    arms = (chord(omega * tau_s) + chord(omega * added.position_s)) * antenna
+    position_s, attitude_s = shifts_s
+    turn_p = omega * (position_s + added.position_s)
+    position = v * (position_s + added.position_s) + sigma_p + added.offset_m
+    arms = (chord(omega * position_s) + chord(omega * added.position_s)) * antenna
     if stage.ranging is None or stage.attitude is None:
         arc = position + turn_p * antenna
         return StageBound(position + arms, arc, turn_p * antenna, 0.0, 0.0, 0.0, 0.0, 0.0)
@@ -88,12 +89,12 @@ def stage_bound(
     sigma_a = math.hypot(*stage.attitude.sigma) + added.euler_rad
     sigma_u = math.hypot(*stage.ranging.sigma[1:]) + added.sight_rad
     sigma_r = float(stage.ranging.sigma[0])
-    turn_a = omega * (tau_s + added.attitude_s) + added.turn_rad
+    turn_a = omega * (attitude_s + added.attitude_s) + added.turn_rad
     pitch = min(tilt_rad + turn_a + sigma_a, 0.5 * math.pi)
     off = turn_a + sigma_a * math.sqrt(1.0 + math.sin(pitch))
     lever = turn_p * antenna + (turn_a + sigma_a) * difference
     across = d * (turn_a + sigma_a + sigma_u)
-    swing = omega * (tau_s + added.attitude_s)
+    swing = omega * (attitude_s + added.attitude_s)
     return StageBound(
         bound_m=position
         + arms
@@ -118,11 +119,18 @@ def _vector_distance(length: float, longer_by: float, angle_rad: float) -> float
 
 def chain_bounds(system: System, tau_s: float) -> tuple[StageBound, ...]:
     """Each stage's bound with every pair's relative shift at most tau plus what effects add."""
+    return pairwise_bounds(system, tuple((tau_s, tau_s) for _ in system.stages))
+
+
+def pairwise_bounds(
+    system: System, shifts_s: Sequence[tuple[float, float]]
+) -> tuple[StageBound, ...]:
+    """Each stage's bound at its largest shifts (of position, of attitude) plus what effects add."""
     extra, _ = known_effects.contributions(system)
     tilt = system.horizon.tilt_rad
     return tuple(
-        stage_bound(stage, index == 0, tau_s, tilt, _added(system, index, extra))
-        for index, stage in enumerate(system.stages)
+        stage_bound(stage, index == 0, shifts, tilt, _added(system, index, extra))
+        for index, (stage, shifts) in enumerate(zip(system.stages, shifts_s, strict=True))
     )
 
 
