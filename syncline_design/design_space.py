@@ -52,6 +52,7 @@ class Option:
     exact_tau_s: Fraction | None = None
     systematic_m: float = 0.0  # known effects whose size hangs on this sensor
     exact_systematic_m: Fraction | None = None
+    noise_systematic_m: Fraction = Fraction(0)  # the share of it that is in proportion to the noise
     own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
 
     @property

@@ -10,13 +10,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from typing import Any
 
 from syncline_design.chosen_system import system_of
 from syncline_design.design_space import Design, Problem, is_empty
+from syncline_design.effects import registry
 from syncline_design.known_effects import effect_entries, known_of
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.budget import Budget, budget
-from syncline_design.model.system import EffectEntry, RoleName, System
+from syncline_design.model.system import EffectEntry, RoleName, Sensor, System
 from syncline_design.problem import SensorEffects, build_problem, with_everything
 
 Key = tuple[str, RoleName, str]  # stage, role, sensor
@@ -39,7 +41,9 @@ def problem_of(loaded: LoadedSpec) -> Problem:
     taus = {key: known_of(systems.of(key)).extra_tau_s for key in systems}
     by_sensor = {
         key: SensorEffects(
-            taus[key].get((key[0], key[1]), 0.0), charges.by_sensor.get(key, Fraction(0))
+            taus[key].get((key[0], key[1]), 0.0),
+            charges.by_sensor.get(key, Fraction(0)),
+            charges.by_noise.get(key, Fraction(0)),
         )
         for key in systems
     }
@@ -99,6 +103,7 @@ class _Charges:
 
     fixed: list[Term] = field(default_factory=list)
     by_sensor: dict[Key, Fraction] = field(default_factory=dict)
+    by_noise: dict[Key, Fraction] = field(default_factory=dict)  # in proportion to its noise
 
     def add(self, systems: _Systems, entry: EffectEntry) -> None:
         """Charge one effect.
@@ -118,6 +123,26 @@ class _Charges:
             if key[:2] in moving:
                 share = value if key[:2] == moving[0] else value - whole
                 self.by_sensor[key] = self.by_sensor.get(key, Fraction(0)) + share
+            if registry()[entry.effect].kind == "stochastic":
+                twice = _sum(_terms(_noisier(systems.of(key), key), entry))
+                self.by_noise[key] = self.by_noise.get(key, Fraction(0)) + twice - value
+
+
+def _noisier(system: System, key: Key) -> System:
+    """A system with the noise of one sensor doubled."""
+    name, role, _ = key
+    stages = []
+    for stage in system.stages:
+        louder: dict[str, Any] = (
+            {role: _doubled(getattr(stage, role))} if stage.name == name else {}
+        )
+        stages.append(replace(stage, **louder))
+    return replace(system, stages=tuple(stages))
+
+
+def _doubled(sensor: Sensor) -> Sensor:
+    first, second, third = sensor.sigma
+    return replace(sensor, sigma=(2.0 * first, 2.0 * second, 2.0 * third))
 
 
 def _terms(system: System, entry: EffectEntry) -> tuple[Term, ...]:

@@ -96,10 +96,11 @@ NO_EXTRA: Mapping[tuple[str, RoleName], float] = {}
 @dataclass(frozen=True, slots=True)
 class SensorEffects:
     """What known effects add where one sensor takes a role: its whole extra tau, exactly the
-    systematic errors that hang on it."""
+    systematic errors that hang on it, and their share in proportion to its noise."""
 
     tau_s: float = 0.0
     systematic_m: Fraction = Fraction(0)
+    noise_m: Fraction = Fraction(0)
 
 
 BySensor = Mapping[tuple[str, RoleName, str], SensorEffects]  # stage name, role, sensor
@@ -391,6 +392,7 @@ class _Figures:
             exact_tau_s=tau,
             systematic_m=float(systematic),
             exact_systematic_m=systematic if systematic else None,
+            noise_systematic_m=self.effects.noise_m,
             own_rate_mps=rate if matters else None,
         )
 

@@ -275,6 +275,18 @@ def _amounts(spec: Spec, catalog: Catalog) -> Iterable[tuple[KeyPath, str, Quant
             yield path, f"the cost of {label} is", entry.cost
 
 
+def names_candidates(spec: Spec) -> bool:
+    """Whether a spec lists sensors or clocks to choose from, however many of them can be used."""
+    return any(
+        (stage.clock is not None and len(stage.clock.candidates) > 1)
+        or any(
+            (role := stage.role(name)) is not None and role.candidates is not None
+            for name in ROLE_NAMES
+        )
+        for stage in spec.stages
+    )
+
+
 def is_open(spec: Spec, catalog: Catalog) -> bool:
     """Whether anything is left to choose."""
     for stage in spec.stages:

@@ -26,6 +26,7 @@ from syncline_design.model.budget import budget
 from syncline_design.model.system import System
 from syncline_design.problem import selection_of, sole_design
 from syncline_design.recheck import Recheck, recheck
+from syncline_design.references import names_candidates
 from syncline_design.simulate import (
     Decision,
     MonteCarlo,
@@ -125,20 +126,27 @@ def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
         try:
             problem = build(loaded)
             if sole_design(problem) is not None:
-                return _pinned_verdict(loaded, problem, settings)
+                return _sole_verdict(loaded, problem, settings, build)
             return _check_open(loaded, problem, replace(settings, time_limit_s=None), build)
         except OutOfTime as error:
             return unfinished_verdict(loaded, problem, settings, str(error))
 
 
-def _pinned_verdict(loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings) -> Json:
-    """The verdict on the only design that a spec leaves."""
+def _sole_verdict(
+    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+) -> Json:
+    """The verdict on the only design that a spec leaves.
+
+    Where the spec names candidates, that no design meets it is said as for any number of designs.
+    """
     sole = sole_design(problem)
     assert sole is not None
     from syncline_design.choice_data import excluded_json
 
     everything, design = sole
     verified = verify(loaded, everything, design, settings)
+    if verified.word == "fails" and names_candidates(loaded.spec):
+        return _infeasible_json(loaded, problem, settings, build)
     return _verdict_json(loaded, everything, verified, settings, excluded_json(problem))
 
 
@@ -210,10 +218,11 @@ def open_verdict(
     """The verdict on what was picked for a spec; points: its front of cost, where known."""
     from syncline_design.choice_data import choice_json, left_out_text
 
+    build = build or _build(settings)
     if sole_design(problem) is not None:
-        return _pinned_verdict(loaded, problem, settings)
+        return _sole_verdict(loaded, problem, settings, build)
     if picked.verified is None:
-        return _infeasible_json(loaded, problem, settings, build or _build(settings))
+        return _infeasible_json(loaded, problem, settings, build)
     pieces = Pieces()
     choice = choice_json(loaded, problem, picked, pieces, points)
     data = _verdict_json(loaded, problem, picked.verified, settings, choice)

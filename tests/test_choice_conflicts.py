@@ -17,6 +17,7 @@ import pytest
 import yaml
 
 from syncline_design.loading import load_text
+from syncline_design.optimisation import OptimizeSettings, optimisation_json, optimize
 from syncline_design.verify import CheckSettings, check_loaded
 
 SPEED, TURN_DEG, DISTANCE = 4.0, 6.0, 30.0
@@ -301,3 +302,49 @@ def test_a_conflict_that_contains_sync_is_resolved_by_two_limits(tmp_path: Path)
     assert {f["requirement"] for f in together} == {"C", "S"}
     assert {f["to"] for f in together if f["kind"] == "cost"} == {330.0}
     assert check(tmp_path, world, moved(requirements, together))["verdict"] == "meets"
+
+
+ALONE = """\
+syncline: 1
+name: one candidate, one way to stamp it
+catalogs: [alone.yaml]
+requirements:
+  - {id: A, kind: accuracy, limit: LIMIT}
+stages:
+  - name: boat
+    platform: {v_max: 1 m/s, omega_max: 1 deg/s, distance: 1 m, baseline: 1 m}
+    position: {WRITTEN, timestamping: bench}
+"""
+ALONE_CATALOG = """\
+sensors:
+  only: {modality: position, sigma_position: [2 cm, 3 cm, 6 cm], primitives: [pps], cost: 1 EUR}
+timestamping:
+  bench:
+    primitives: [pps]
+    timeline: host
+    cost: 1 EUR
+    error: {distribution: constant, value: 1 ms}
+"""
+
+
+@pytest.mark.parametrize(("limit", "meets"), [("72 mm", True), ("70 mm", False), ("1 mm", False)])
+@pytest.mark.parametrize("written", ["candidates: [only]", "sensor: only"])
+def test_one_combination_is_judged_alike_by_check_and_optimize(
+    tmp_path: Path, limit: str, meets: bool, written: str
+) -> None:
+    """7 cm of noise and 1 mm of motion: 71 mm.  Candidates without a design: infeasible."""
+    (tmp_path / "alone.yaml").write_text(ALONE_CATALOG)
+    text = ALONE.replace("LIMIT", limit).replace("WRITTEN", written)
+    loaded = load_text(text, tmp_path / "spec.yaml")
+    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False))
+    chosen = optimisation_json(optimize(loaded, OptimizeSettings()))
+    if meets:
+        assert verdict["verdict"] == chosen["verdict"] == "meets"
+    elif written == "sensor: only":
+        assert verdict["verdict"] == "fails"
+        assert verdict["syncline"]["total_m"] == pytest.approx(0.071, rel=1e-12)
+    else:
+        assert verdict["verdict"] == chosen["verdict"] == "infeasible"
+        assert verdict["infeasibility"] == chosen["infeasibility"]
+        (fix,) = [f for f in verdict["infeasibility"]["fixes"] if f["kind"] == "accuracy"]
+        assert 0.071 <= fix["to"] <= 0.0711

@@ -160,6 +160,26 @@ def test_an_effect_grows_with_the_distance_in_fixes_and_ledger(tmp_path: Path) -
     assert row.fails_at == pytest.approx(16.0, rel=2e-4)
 
 
+@pytest.mark.parametrize("factors", [(1.0,), (2.5,), (4.0,), (1.7, 2.2)])
+def test_understated_noise_grows_with_the_sensor_error_in_the_ledger(
+    tmp_path: Path, factors: tuple[float, ...]
+) -> None:
+    """By hand: a position noise s adds s (1 + sum of (factor - 1)), so room / that."""
+    share = 1.0 + sum(factor - 1.0 for factor in factors)
+    sigma = math.sqrt(3) * SIGMA["coarse"]
+    rest = total_m("coarse", 1.0) - sigma
+    limit = rest + 1.4 * sigma * share
+    effects = [UNDERSTATED.format(factor) for factor in factors]
+    loaded = spec(tmp_path, [f"{{id: A, kind: accuracy, limit: {limit!r} m}}"], effects)
+    result = found(loaded)
+    assert result.hinges is not None
+    assert result.hinges.slack is not None
+    (row,) = [row for row in result.hinges.slack if row.term == "position sensor error"]
+    assert row.fails_at == pytest.approx(1.4 * sigma, rel=1e-9)
+    assert row.payload_changes_at == pytest.approx(1.4 * sigma, rel=1e-5)
+    assert row.limited_by == "accuracy"
+
+
 def test_a_distance_fix_takes_the_effect_at_the_new_distance(tmp_path: Path) -> None:
     effects = ["  - {effect: range_scale, sensor: ranging, parameters: {scale: 0.05}}"]
     rigid = total_m("fine", 1.0, distance=0.0)

@@ -243,3 +243,16 @@ def test_never_is_said_only_where_proven(tmp_path: Any) -> None:
     assert by_term["distance"].searched_to == pytest.approx(1e6)
     assert any("distance" in line and "not up to" in line for line in shown)
     assert any("position sensor error" in line and "never" in line for line in shown)
+
+
+def test_the_noise_of_a_sensor_that_enters_no_error_has_no_row(tmp_path: Any) -> None:
+    """A stage without ranging locates itself: how well its attitude is known changes nothing."""
+    lines = FAR.splitlines()
+    text = "\n".join(line for line in lines if "ranging" not in line) + "\n"
+    loaded = load_text(text, tmp_path / "spec.yaml")
+    ledger = slack_ledger(loaded, build_problem(loaded), Design((0, 0), (0,)))
+    terms = [row.term for row in ledger]
+    assert "position sensor error" in terms
+    assert "attitude sensor error" not in terms
+    (stamp,) = [row for row in ledger if row.term == "attitude timestamp error"]
+    assert stamp.fails_at is None

@@ -77,12 +77,17 @@ class Slack:
 def slack_ledger(
     loaded: LoadedSpec, problem: Problem, design: Design, build: Build = build_problem
 ) -> tuple[Slack, ...]:
-    """Slack of every sensor error, timestamp bound and platform figure of a chosen design."""
+    """Slack of every sensor error, timestamp bound and platform figure of a chosen design.
+
+    A sensor whose noise enters no error (the attitude of a stage without ranging) has no such row.
+    """
     rows: list[Slack] = []
     for index, stage in enumerate(loaded.spec.stages):
         for r, table in enumerate(problem.roles):
             if table.stage == index:
-                rows += [_error_slack(problem, design, r), _tau_slack(problem, design, r)]
+                if chosen_options(problem, design)[r].error() > 0:
+                    rows.append(_error_slack(problem, design, r))
+                rows.append(_tau_slack(problem, design, r))
         for figure in PLATFORM_FIGURES:
             row = _platform_slack(loaded, problem, design, build, index, figure)
             rows += [replace(row, stage=stage.name)] if row else []
@@ -93,12 +98,16 @@ Limit = tuple[Fraction, str]  # value at which a requirement of a kind breaks
 
 
 def _error_slack(problem: Problem, design: Design, r: int) -> Slack:
-    """A sensor error may grow by what is left of the accuracy limit; sync only gains from it."""
+    """A sensor error may grow by what is left of the accuracy limit; sync only gains from it.
+
+    What known effects add in proportion to the noise grows with it.
+    """
     table, own = problem.roles[r], chosen_options(problem, design)[r]
     limit, fails = problem.limits.accuracy_m, None
     if limit is not None:
         total = evaluate(problem, design).total_m
-        fails = float(own.error() + Fraction(limit) - total)
+        slope = 1 + own.noise_systematic_m / own.error()
+        fails = float(own.error() + (Fraction(limit) - total) / slope)
 
     def changed(value: float) -> Problem:
         return _with_sensor(problem, r, own.sensor, Fraction(value))
@@ -115,11 +124,18 @@ def _with_sensor(problem: Problem, r: int, sensor: str, error_m: Fraction) -> Pr
     def grown(option: Option) -> Option:
         if option.sensor != sensor:
             return option
+        ratio = error_m / option.error()
         crit = option.tau_crit_s
-        if option.error() > 0:
-            crit = float(Fraction(crit) * error_m / option.error()) if math.isfinite(crit) else crit
+        crit = float(Fraction(crit) * ratio) if math.isfinite(crit) else crit
+        added = option.systematic() + option.noise_systematic_m * (ratio - 1)
         return replace(
-            option, sensor_error_m=float(error_m), exact_error_m=error_m, tau_crit_s=crit
+            option,
+            sensor_error_m=float(error_m),
+            exact_error_m=error_m,
+            tau_crit_s=crit,
+            systematic_m=float(added),
+            exact_systematic_m=added if added else None,
+            noise_systematic_m=option.noise_systematic_m * ratio,
         )
 
     return _with_options(problem, grown, {r})
