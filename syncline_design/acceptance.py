@@ -78,7 +78,7 @@ class Simulations:
         default_factory=dict
     )
     systems: set[System] = field(default_factory=set)
-    gave_up: bool = False
+    refusals: int = 0  # of systems beyond the most
     asked: LoadedSpec | None = None  # the spec itself; every other one is a what-if
 
     def decide(
@@ -91,7 +91,7 @@ class Simulations:
         if key not in self.known:
             self.systems.add(nameless)
             if len(self.systems) > self.most:
-                self.gave_up = True
+                self.refusals += 1
                 raise Unfinished(f"the search stopped after {self.most} simulated designs")
             cap = DEFAULT_CAP if loaded is self.asked else WHAT_IF_CAP
             self.known[key] = decide(nameless, settings, quantile, limit_m, cap)
@@ -129,9 +129,9 @@ class _SpecJudge:
     figures: Mapping[tuple[str, RoleName, tuple[str, str, str]], tuple[Fraction, Fraction]]
 
     @property
-    def gave_up(self) -> bool:
-        """Whether too many designs were simulated for one command."""
-        return self.simulations.gave_up
+    def refusals(self) -> int:
+        """How often a design was not simulated because the command had simulated too many."""
+        return self.simulations.refusals
 
     def hopeless(self, problem: DesignProblem, role: int, option: Option) -> bool:
         """Whether the noise of a sensor alone, with all else perfect, fails a limit by 1 %.

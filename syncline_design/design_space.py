@@ -213,8 +213,8 @@ class Judge(Protocol):
     def limits(self) -> tuple[tuple[str, float], ...]: ...
 
     @property
-    def gave_up(self) -> bool:
-        """Whether a search ended because too many designs were simulated."""
+    def refusals(self) -> int:
+        """How often a search ended because too many designs had been simulated."""
         ...
 
     def hopeless(self, problem: Problem, role: int, option: Option) -> bool:

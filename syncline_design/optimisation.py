@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from syncline_design import __version__
-from syncline_design.acceptance import Simulations
+from syncline_design.acceptance import MOST_SIMULATED, Simulations
 from syncline_design.choice_data import (
     designs_json,
     excluded_json,
@@ -18,10 +18,11 @@ from syncline_design.choice_data import (
     unproven_json,
 )
 from syncline_design.choose import presentation
+from syncline_design.choose.acceptable import refusals
 from syncline_design.choose.decide import best
 from syncline_design.choose.explain import Explanation, explain
 from syncline_design.choose.front import front
-from syncline_design.choose.outcome import ROADS, FrontPoint, Method
+from syncline_design.choose.outcome import ROADS, FrontPoint, Method, Unfinished
 from syncline_design.choose.prices import Step, staircase
 from syncline_design.choose.slack import Slack, slack_ledger
 from syncline_design.choose.tolerance import (
@@ -96,6 +97,7 @@ class Optimisation:
     hinges: Hinges | None
     explanation: Explanation | None
     cut_short: tuple[str, ...] = ()  # what the time limit left out or incomplete
+    gave_up: tuple[str, ...] = ()  # what lacks designs because too many were simulated
     verdict: Json | None = None
     unfinished: str = ""
 
@@ -135,7 +137,7 @@ def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
         )
     except OutOfTime as error:
         return _unfinished(loaded, problem, settings, checking, str(error))
-    pieces, nothing = Pieces(), _no_points()
+    pieces, nothing = Pieces(lambda: refusals(problem)), _no_points()
     points = nothing
     if settings.pareto:
         points = pieces.made("front", lambda: front(problem, settings.resource), nothing)
@@ -153,7 +155,7 @@ def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     steps = staircase([point for point in points if not point.undecided])
     found = Optimisation(
         loaded, problem, settings, picked, designs, points, steps, hinges,
-        explanation, tuple(pieces.cut_short),
+        explanation, tuple(pieces.cut_short), tuple(pieces.gave_up),
     )  # fmt: skip
     return replace(found, verdict=_verdict(found, checking)) if settings.report else found
 
@@ -194,9 +196,19 @@ def _designs(
 def _hinges(given: tuple[LoadedSpec, Problem, Design, Build], pieces: Pieces) -> Hinges:
     return Hinges(
         pieces.made("slack ledger", lambda: slack_ledger(*given), None),
-        pieces.made("tolerances", lambda: tolerance_verdict(*given), None),
+        pieces.made("tolerances", lambda: _tolerances(*given), None),
         pieces.made("what to measure next", lambda: measure_next(*given), None),
     )
+
+
+def _tolerances(
+    loaded: LoadedSpec, problem: Problem, design: Design, build: Build
+) -> ToleranceVerdict | None:
+    """The verdict under tolerances; None where simulation is refused it."""
+    try:
+        return tolerance_verdict(loaded, problem, design, build)
+    except Unfinished:
+        return None
 
 
 def _verdict(found: Optimisation, checking: CheckSettings) -> Json:
@@ -218,6 +230,7 @@ def optimisation_json(found: Optimisation) -> Json:
         "designs": designs_json(loaded, problem, found.designs),
         **excluded_json(problem),
         "cut_short": list(found.cut_short),
+        "gave_up": list(found.gave_up),
         "provenance": {
             "version": __version__,
             "spec_sha256": loaded.spec_sha256,
@@ -278,8 +291,16 @@ def optimisation_text(found: Optimisation) -> str:
     blocks += _hinge_blocks(found.hinges)
     if found.cut_short and not found.unfinished:
         blocks.append([f"The time limit ended this too early: {', '.join(found.cut_short)}."])
+    if found.gave_up:
+        blocks.append([gave_up_line(found.gave_up)])
     shown = ["\n".join(printable(line, len(line)) for line in block) for block in blocks]
     return "\n\n".join(shown) + "\n"
+
+
+def gave_up_line(pieces: Sequence[str]) -> str:
+    """What is not complete because simulation is bounded."""
+    names = ", ".join(pieces)
+    return f"After {MOST_SIMULATED} simulated designs the search gave up; not complete: {names}."
 
 
 def _hinge_blocks(hinges: Hinges | None) -> list[list[str]]:

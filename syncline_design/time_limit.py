@@ -104,35 +104,47 @@ def unhurried(items: Iterable[T]) -> Iterator[T]:
 class Pieces:
     """What belongs to an answer besides its heart; a time limit leaves the later pieces out.
 
-    cut_short: names of the pieces that are missing or not complete for that reason.
+    cut_short: names of the pieces that are missing or not complete for that reason; gave_up: of
+    those that lack designs because simulation was refused them, as `refusals` counts.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, refusals: Callable[[], int] = lambda: 0) -> None:
         self.cut_short: list[str] = []
+        self.gave_up: list[str] = []
+        self._refusals = refusals
+
+    @contextmanager
+    def _piece(self, name: str) -> Iterator[None]:
+        before = self._refusals()
+        try:
+            in_force().doing(name)
+            yield
+        except OutOfTime:
+            self.cut_short.append(name)
+        if self._refusals() > before:
+            self.gave_up.append(name)
 
     def made(self, name: str, make: Callable[[], T], without: T) -> T:
         """A piece, or what stands for it when the time is over."""
-        try:
-            in_force().doing(name)
+        with self._piece(name):
             return make()
-        except OutOfTime:
-            self.cut_short.append(name)
-            return without
+        return without
 
     def listed(self, name: str, make: Callable[[], Iterable[T]]) -> list[T]:
         """A piece as a list, as far as the time goes."""
         found: list[T] = []
-        try:
-            in_force().doing(name)
+        with self._piece(name):
             found.extend(make())
-        except OutOfTime:
-            self.cut_short.append(name)
         return found
 
     @property
-    def caution(self) -> dict[str, str] | None:
-        """The warning that goes with what is missing."""
-        if not self.cut_short:
-            return None
-        message = f"the time limit ended this before it was complete: {', '.join(self.cut_short)}"
-        return {"code": "time-limit", "message": message}
+    def cautions(self) -> list[dict[str, str]]:
+        """The warnings that go with what is missing."""
+        out = []
+        if self.cut_short:
+            message = "the time limit ended this before it was complete: "
+            out.append({"code": "time-limit", "message": message + ", ".join(self.cut_short)})
+        if self.gave_up:
+            message = "designs may be missing here, as no further ones were simulated: "
+            out.append({"code": "search-gave-up", "message": message + ", ".join(self.gave_up)})
+        return out

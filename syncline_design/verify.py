@@ -15,6 +15,7 @@ from syncline_design.acceptance import (
     simulation_settings,
 )
 from syncline_design.cautions import cautions
+from syncline_design.choose.acceptable import refusals
 from syncline_design.chosen_system import system_of
 from syncline_design.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.design_space import Design
@@ -223,12 +224,12 @@ def open_verdict(
         return _sole_verdict(loaded, problem, settings, build)
     if picked.verified is None:
         return _infeasible_json(loaded, problem, settings, build)
-    pieces = Pieces()
+    pieces = Pieces(lambda: refusals(problem))
     choice = choice_json(loaded, problem, picked, pieces, points)
     data = _verdict_json(loaded, problem, picked.verified, settings, choice)
     if picked.verified.word != "meets" and not picked.exhausted:
         data["verdict"] = "indeterminate"
-    data["warnings"][:0] = [*_unproven(picked), *([pieces.caution] if pieces.caution else [])]
+    data["warnings"][:0] = [*_unproven(picked), *pieces.cautions]
     if choice["front_left_out"]:
         text = left_out_text(choice["front_left_out"], "cost")
         data["warnings"].append({"code": "unpriced", "message": text})

@@ -16,8 +16,17 @@ import pytest
 import yaml
 from scipy.stats import chi
 
+from syncline_design import acceptance, optimisation, verify
+from syncline_design.acceptance import Simulations
+from syncline_design.choose.tolerance import ToleranceVerdict, tolerance_verdict
+from syncline_design.design_space import Design
 from syncline_design.loading import LoadedSpec, load_text
-from syncline_design.optimisation import OptimizeSettings, optimisation_json, optimize
+from syncline_design.optimisation import (
+    OptimizeSettings,
+    optimisation_json,
+    optimisation_text,
+    optimize,
+)
 from syncline_design.verify import CheckSettings, check_loaded, exit_code
 
 FACTOR = {q: float(chi.ppf(q, 3)) for q in (0.5, 0.95, 0.997)}
@@ -183,8 +192,14 @@ def test_two_simulated_requirements_each_count(tmp_path: Path) -> None:
     assert [m["id"] for m in why["conflict"]["requirements"]] == ["TAIL"]
 
 
-def test_a_design_that_its_samples_leave_open_carries_the_requirement(tmp_path: Path) -> None:
-    """The limit is the cheap sensor's own quantile to 1e-9: no number of samples decides."""
+def test_a_design_that_its_samples_leave_open_carries_the_requirement(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The limit is the cheap sensor's own quantile to 1e-9: no number of samples decides.
+
+    So it may as well be given up after 300 000 of them.
+    """
+    monkeypatch.setattr(acceptance, "DEFAULT_CAP", 300_000)
     limit = FACTOR[0.95] * 0.15 * (1 + 1e-9)
     loaded = spec(tmp_path, [simulated(limit)], sensors={"c": (0.15, 50)})
     verdict = check_loaded(loaded, CheckSettings())
@@ -194,6 +209,11 @@ def test_a_design_that_its_samples_leave_open_carries_the_requirement(tmp_path: 
     assert marked == {"c": ["MC"], "e": None, "f": None}
     points = {position(p["design"]): p.get("undecided") for p in verdict["choice"]["front"]}
     assert points == {"c": ["MC"], "d": None, "f": None}
+    printed = optimisation_text(optimize(loaded, OptimizeSettings(count=9, pareto=True)))
+    of_c = [line for line in printed.splitlines() if " c by " in line]
+    assert len(of_c) == 2  # among the designs and on the front
+    assert all(line.endswith("MC undecided") for line in of_c)
+    assert printed.count("undecided") == 2
 
 
 def test_nothing_but_an_open_design_is_no_verdict(tmp_path: Path) -> None:
@@ -240,3 +260,69 @@ def test_a_waived_simulated_requirement_excludes_nothing(tmp_path: Path) -> None
     verdict = check_loaded(loaded, CheckSettings())
     assert verdict["verdict"] == "meets"
     assert position(verdict["design"]) == "a"
+
+
+def tolerances_of_c(loaded: LoadedSpec) -> ToleranceVerdict:
+    build = Simulations().problem_of
+    problem = build(loaded)
+    place = [option.sensor for option in problem.roles[0].options].index("c")
+    return tolerance_verdict(loaded, problem, Design((place,), (0,)), build)
+
+
+@pytest.mark.parametrize(
+    ("at", "factor", "word"),
+    [(0.15, 1.0, "sometimes"), (0.17, 1.0, "sometimes"), (0.18, 1.0, "always"),
+     (0.17, 2.0, "sometimes"), (0.18, 2.0, "always")],
+)  # fmt: skip
+def test_the_word_on_tolerances_asks_simulation(
+    at: float, factor: float, word: str, tmp_path: Path
+) -> None:
+    """A sensor of 12 to 18 cm: it always passes where the quantile of 18 cm does (and 3 % more)."""
+    effects = [
+        {"effect": "noise_understated", "sensor": "position", "parameters": {"factor": factor}}
+    ]
+    limit = factor * FACTOR[0.95] * at * 1.03
+    data = {"c": ("0.12 m .. 0.18", 1)}
+    loaded = spec(tmp_path, [simulated(limit)], sensors=data, effects=effects)
+    found = tolerances_of_c(loaded)
+    assert found.word == word
+    assert found.deciding == (("c sigma_position",) if word != "always" else ())
+
+
+@pytest.mark.parametrize(
+    ("share", "word"), [(1.02, "sometimes"), (1.19, "sometimes"), (1.22, "always")]
+)
+def test_the_word_on_tolerances_counts_an_effect_at_the_same_end(
+    share: float, word: str, tmp_path: Path
+) -> None:
+    """Noise three times the datasheet's, 12 to 18 cm: between 0.36 and 0.54 m per axis in all."""
+    effects = [{"effect": "noise_understated", "sensor": "position", "parameters": {"factor": 3.0}}]
+    limit = f"{3 * 0.15 * math.sqrt(3) * share!r} m"
+    data = {"c": ("0.12 m .. 0.18", 1)}
+    loaded = spec(tmp_path, [sums("accuracy", limit, "A")], sensors=data, effects=effects)
+    assert tolerances_of_c(loaded).word == word
+
+
+def test_lists_that_simulation_cuts_short_say_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Six sensors pass; with three simulated, the lists hold no more than three."""
+
+    def few(*given: Any) -> Simulations:
+        return Simulations(*given, most=3)
+
+    loaded = spec(tmp_path, [simulated(0.9)])
+    whole = optimize(loaded, OptimizeSettings(count=9, pareto=True))
+    assert "gave up" not in optimisation_text(whole)
+    assert optimisation_json(whole)["gave_up"] == []
+    monkeypatch.setattr(optimisation, "Simulations", few)
+    monkeypatch.setattr(verify, "Simulations", few)
+    found = optimize(loaded, OptimizeSettings(count=9, pareto=True))
+    data = optimisation_json(found)
+    assert len(data["designs"]) <= 3
+    assert {"front", "next best designs"} <= set(data["gave_up"])
+    assert "not complete: front, next best designs" in optimisation_text(found)
+    verdict = check_loaded(loaded, CheckSettings())
+    assert verdict["verdict"] == "meets"
+    (said,) = [w["message"] for w in verdict["warnings"] if w["code"] == "search-gave-up"]
+    assert "front, next best designs" in said

@@ -24,6 +24,11 @@ def judgement(problem: Problem, design: Design) -> Judgement:
     return NOTHING_SIMULATED if problem.judge is None else problem.judge.judge(problem, design)
 
 
+def refusals(problem: Problem) -> int:
+    """How often simulation was refused because too many designs had been simulated."""
+    return 0 if problem.judge is None else problem.judge.refusals
+
+
 def unmet(problem: Problem, design: Design) -> tuple[str, ...]:
     """Kinds of requirement that a design does not meet; none: it is acceptable."""
     kinds = broken(problem, evaluate(problem, design))

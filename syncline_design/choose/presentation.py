@@ -8,6 +8,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
+from syncline_design.choose.acceptable import judgement
 from syncline_design.choose.evaluate import chosen_clocks, chosen_options, evaluate
 from syncline_design.choose.outcome import FrontPoint
 from syncline_design.choose.prices import Step
@@ -65,20 +66,31 @@ def role_cells(problem: Problem, design: Design) -> list[str]:
 def front_table(
     problem: Problem, points: Sequence[FrontPoint], resource: ResourceName, currency: str
 ) -> list[str]:
-    """The Pareto front, one line per point."""
+    """The Pareto front, one line per point; a point that simulation leaves open says so."""
+    left_open = any(point.undecided for point in points)
     rows = [
         [
             amount_text(point.amount, resource, currency),
             length_text(point.error_m),
             *role_cells(problem, point.design),
+            *([_open_text(point.undecided)] if left_open else []),
         ]
         for point in points
     ]
-    return table([resource, "error", *role_headers(problem)], rows)
+    heads = [resource, "error", *role_headers(problem), *(["simulation"] if left_open else [])]
+    return table(heads, rows)
+
+
+def _open_text(requirements: Sequence[str]) -> str:
+    """Simulated requirements that samples leave open for a design."""
+    return f"{', '.join(requirements)} undecided" if requirements else ""
 
 
 def designs_table(problem: Problem, designs: Iterable[Design], currency: str) -> list[str]:
-    """Designs one per line, best first, with what they cost and reach."""
+    """Designs one per line, best first, with what they cost and reach, and what is left open."""
+    designs = list(designs)
+    undecided = [judgement(problem, design).undecided for design in designs]
+    left_open = any(undecided)
     rows = []
     for place, design in enumerate(designs, 1):
         found = evaluate(problem, design)
@@ -90,9 +102,11 @@ def designs_table(problem: Problem, designs: Iterable[Design], currency: str) ->
                 amount_text(found.power, "power", currency),
                 length_text(found.error_m),
                 *role_cells(problem, design),
+                *([_open_text(undecided[place - 1])] if left_open else []),
             ]
         )
-    return table(["", "cost", "mass", "power", "error", *role_headers(problem)], rows)
+    heads = ["", "cost", "mass", "power", "error", *role_headers(problem)]
+    return table([*heads, *(["simulation"] if left_open else [])], rows)
 
 
 def staircase_lines(

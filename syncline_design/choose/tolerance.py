@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
+from syncline_design.choose.acceptable import judgement
 from syncline_design.choose.decide import choose
 from syncline_design.choose.evaluate import chosen_options, evaluate
 from syncline_design.choose.outcome import Choice, NoVerdict, OutOfTime
@@ -120,8 +121,11 @@ def _word(
     figures: Sequence[Figure],
     build: Build,
 ) -> Word:
-    """Always, sometimes or never, by the ends of every sensor's error."""
-    *_, low = _errors(_at(loaded, figures, "low"), selected, build)
+    """Always, sometimes or never, by the ends of every sensor's error.
+
+    Always asks simulation too, at the upper ends: what it leaves open is not said to pass always.
+    """
+    better, best_case, low = _errors(_at(loaded, figures, "low"), selected, build)
     problem, plain, high = _errors(_at(loaded, figures, "high"), selected, build)
     found = evaluate(problem, Design(plain.options, design.clocks))
     strict, limits = build(loaded).limits, problem.limits
@@ -136,11 +140,14 @@ def _word(
         return "never"
     keeps = all(e > bound for e, bound in zip(low, least, strict=True))
     if keeps and _fits(sum(high, Fraction(0)), room) and sum(low, Fraction(0)) > demand:
-        return "always"
+        noisiest = Design(plain.options, design.clocks)
+        return "always" if judgement(problem, noisiest).passed else "sometimes"
     reachable = all(e > bound for e, bound in zip(high, least, strict=True))
     lowest = sum(map(max, low, least), Fraction(0))
-    feasible = reachable and _fits(lowest, room) and sum(high, Fraction(0)) > demand
-    return "sometimes" if feasible and demand < room else "never"
+    best_found = evaluate(better, Design(best_case.options, design.clocks))
+    most = room + others - (best_found.total_m - best_found.sensor_error_m)
+    feasible = reachable and _fits(lowest, most) and sum(high, Fraction(0)) > demand
+    return "sometimes" if feasible and demand < most else "never"
 
 
 def _fits(error: Fraction, room: Fraction | float) -> bool:
