@@ -171,7 +171,18 @@ def _unfinished(
     known = None if problem is NO_TABLES else problem
     verdict = unfinished_verdict(loaded, known, checking, why) if settings.report else None
     return Optimisation(
-        loaded, problem, settings, None, (), (), (), None, None, ("choosing",), verdict, why
+        loaded,
+        problem,
+        settings,
+        None,
+        (),
+        (),
+        (),
+        None,
+        None,
+        ("choosing",),
+        verdict=verdict,
+        unfinished=why,
     )
 
 
