@@ -113,28 +113,33 @@ class Pieces:
         self.gave_up: list[str] = []
         self._refusals = refusals
 
-    @contextmanager
-    def _piece(self, name: str) -> Iterator[None]:
-        before = self._refusals()
-        try:
-            in_force().doing(name)
-            yield
-        except OutOfTime:
-            self.cut_short.append(name)
+    def _count(self, name: str, before: int) -> None:
         if self._refusals() > before:
             self.gave_up.append(name)
 
     def made(self, name: str, make: Callable[[], T], without: T) -> T:
         """A piece, or what stands for it when the time is over."""
-        with self._piece(name):
+        before = self._refusals()
+        try:
+            in_force().doing(name)
             return make()
-        return without
+        except OutOfTime:
+            self.cut_short.append(name)
+            return without
+        finally:
+            self._count(name, before)
 
     def listed(self, name: str, make: Callable[[], Iterable[T]]) -> list[T]:
         """A piece as a list, as far as the time goes."""
         found: list[T] = []
-        with self._piece(name):
+        before = self._refusals()
+        try:
+            in_force().doing(name)
             found.extend(make())
+        except OutOfTime:
+            self.cut_short.append(name)
+        finally:
+            self._count(name, before)
         return found
 
     @property
