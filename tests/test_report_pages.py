@@ -211,3 +211,17 @@ def test_missing_figures_read_as_missing() -> None:
             assert show(value) == numbers.MISSING
     assert numbers.time_limit(None) == "unlimited"
     assert numbers.money(38_400.0, "EUR") == "38\u00a0400\u00a0EUR"
+
+
+def test_a_page_says_fits_worse_only_of_what_does() -> None:
+    """Each effect in the named one's place carries its own comparison, not a common heading."""
+    data = samples.diagnosis()
+    data["findings"][0]["lookalikes"] = [
+        {"effect": "packetised_timestamps", "sensor": "attitude", "nats_worse": -157.4,
+         "possible": False},
+        {"effect": "filter_lag", "sensor": "position", "nats_worse": 31.6, "possible": True},
+    ]  # fmt: skip
+    text = " ".join(Page(render_diagnosis(data)).text.split())
+    assert "fits worse" not in text
+    assert "157 nat better, but only with impossible values" in text
+    assert "filter lag (position), 31.6 nat worse" in text
