@@ -106,6 +106,30 @@ def test_filter_lag_is_the_filter(name: str, omega_t: float) -> None:
     np.testing.assert_allclose(departed.position_m[0], expected, atol=1e-6)
 
 
+@pytest.mark.parametrize("omega_t", [0.05, 0.5, 2.0, 5.0])
+def test_filter_lag_of_a_straight_path_of_a_yawing_vehicle(omega_t: float) -> None:
+    """A path that does not turn with the body lags by T V; only the arm's circle is shortened."""
+    rate, velocity, arm = 1.0, np.array([6.0, -2.0, 1.0]), np.array([1.5, -0.5, -2.0])
+    time_constant = omega_t / rate
+
+    def lagging(at: float, output: Array) -> Array:
+        antenna = velocity * at + Rotation.from_rotvec([0.0, 0.0, rate * at]).apply(arm)
+        slope: Array = (antenna - output) / time_constant
+        return slope
+
+    start = -30.0 * time_constant
+    found = solve_ivp(lagging, (start, 0.0), velocity * start, "DOP853", rtol=1e-10, atol=1e-9)
+    rows = state(
+        velocity_mps=velocity[None],
+        rate_radps=np.array([[0.0, 0.0, rate]]),
+        antenna_m=arm,
+    )
+    departed = registry()["filter_lag"].depart(
+        rows, {"time_constant_s": time_constant}, "position", None
+    )
+    np.testing.assert_allclose(departed.position_m[0], found.y[:, -1] - arm, atol=1e-6)
+
+
 def test_filter_lag_of_a_straight_start() -> None:
     """x = a t^2 / 2 + v t: the filter settles at a T^2 - v T behind."""
     rows = state(velocity_mps=np.array([[3.0, 0, 0]]), acceleration_mps2=np.array([[0.5, 0, 0]]))

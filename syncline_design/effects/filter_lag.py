@@ -23,17 +23,28 @@ from syncline_design.model.system import Stage
 def _lag(rows: StageRows, time_constant_s: float) -> Array:
     """Output minus input of T dy/dt + y = x(t), x the antenna's path [m], NED, (n, 3).
 
-    y - x is minus the integral over the past of exp(-u / T) dx/dt(t - u) du.  For a vehicle that
-    has long been turning at the row's rate w, its body velocity changing at the row's dv/dt
-    (zero in a steady turn), that integral is closed:
-        y - x = R (-T M (v + w x l_G) + T^2 M^2 dv/dt),   M = (1 + T S(w))^-1,
-    for any T and any |w| T; M turns the lag back and shortens it, by sqrt(1 + (w T)^2) across w.
+    y - x is minus the integral over the past of exp(-u / T) dx/dt(t - u) du.  With M(a) =
+    (1 + T S(a))^-1, for a velocity that has long been turning at k w while it changes at c in
+    those axes, and a body that has long been turning at w, that integral is closed:
+        y - x = R (-T M(k w) v + T^2 M(k w)^2 c - T M(w) (w x l_G)),   c = a - k w x v,
+    for any T and any |w| T.  k: how much of the body's turn the path takes part in, 1 in a
+    coordinated turn, 0 for one that yaws and flies on straight; see `_followed`.
     """
     w, v, t = rows.rate_radps, rows.velocity_mps, time_constant_s
-    lever = np.broadcast_to(rows.antenna_m, v.shape)
-    change = rows.acceleration_mps2 - np.cross(w, v)
-    behind = -t * _turned_back(w * t, v + np.cross(w, lever) - t * _turned_back(w * t, change))
-    return rotate(rows.rotation, behind)
+    turning = _followed(rows) * w
+    change = rows.acceleration_mps2 - np.cross(turning, v)
+    behind = -t * _turned_back(turning * t, v - t * _turned_back(turning * t, change))
+    lever = np.cross(w, np.broadcast_to(rows.antenna_m, v.shape))
+    return rotate(rows.rotation, behind - t * _turned_back(w * t, lever))
+
+
+def _followed(rows: StageRows) -> Array:
+    """k (n, 1), 0 to 1, that leaves the least of a - k w x v; 1 where w x v vanishes."""
+    across = np.cross(rows.rate_radps, rows.velocity_mps)
+    size = np.sum(across * across, axis=1, keepdims=True)
+    shared = np.sum(across * rows.acceleration_mps2, axis=1, keepdims=True)
+    part: Array = np.clip(np.divide(shared, size, out=np.ones_like(size), where=size > 0.0), 0, 1)
+    return part
 
 
 def _turned_back(turn: Array, vector: Array) -> Array:
@@ -67,7 +78,7 @@ EFFECT = Effect(
     sentence="positions are smoothed with a time constant of {time_constant_s}",
     confused_with="latency",
     separated_by="accelerating hard and gently: sweep the frequency of the motion",
-    source="first-order low pass T dy/dt + y = x, solved for a steady turn and acceleration",
+    source="first-order low pass T dy/dt + y = x, solved for steady turns and accelerations",
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
