@@ -148,3 +148,28 @@ def test_pinned_spec_is_judged_however_little_time(tmp_path: Path) -> None:
     data = json.loads(out.read_text("utf-8"))
     kinds = {r["kind"]: r["status"] for r in data["requirements"]}
     assert kinds["accuracy"] in ("pass", "fail")
+
+
+def test_the_implied_sync_limit_has_a_name_in_every_format(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A conflict with the sync limit that the spec does not write has no id to print."""
+    real = explaining.parts_of
+
+    def at_the_end(problem: Any) -> Any:
+        in_force()._end = 0.0
+        return real(problem)
+
+    text = (SPECS / "infeasible_example.yaml").read_text("utf-8")
+    lines = [line for line in text.splitlines() if "kind: sync" not in line]
+    path = tmp_path / "implied.yaml"
+    path.write_text("\n".join(lines) + "\n", "utf-8")
+    monkeypatch.setattr(explaining, "parts_of", at_the_end)
+    names = ("github", "sarif", "junit", "markdown")
+    targets = [word for name in names for word in ("-o", f"{name}:{tmp_path / name}")]
+    code, _ = run("check", str(path), "--time-limit", "60", *targets)
+    assert code == 1
+    for name in names:
+        told = (tmp_path / name).read_text("utf-8")
+        assert "None" not in told, name
+    assert "the implied sync requirement" in (tmp_path / "github").read_text("utf-8")

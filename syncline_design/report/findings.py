@@ -17,6 +17,7 @@ from syncline_design.report.verdict_words import (
     margin_text,
     outcome,
     part,
+    requirement_name,
     value_text,
     waiver_text,
 )
@@ -113,7 +114,7 @@ def _conflict_of(row: Json, verdict: Json) -> list[str]:
     conflicts = [items(part(why, "conflict"), "requirements")]
     conflicts += further if isinstance(further, list) else []
     for members in conflicts:
-        ids = [str(entry.get("id")) for entry in members]
+        ids = [requirement_name(entry) for entry in members]
         if str(row.get("id")) in ids:
             return ids
     return []

@@ -207,15 +207,23 @@ def _platform_names(verdict: Json) -> list[str]:
     return [str(p.get("name") or p.get("id") or "the platform") for p in names] or ["the platform"]
 
 
+def requirement_name(entry: Json) -> str:
+    """The id of a requirement, or words for the sync limit that no one wrote."""
+    return str(entry.get("id") or "the implied sync requirement")
+
+
 def _no_design_sentence(verdict: Json) -> str:
     problems = items(verdict, "problems")
     if problems:
         plural = "problem" if len(problems) == 1 else "problems"
         return f"{len(problems)} {plural} in the file; nothing was computed."
     infeasibility = part(verdict, "infeasibility")
-    conflict = [str(r.get("id")) for r in items(part(infeasibility, "conflict"), "requirements")]
+    members = items(part(infeasibility, "conflict"), "requirements")
+    conflict = [requirement_name(member) for member in members]
     if conflict:
-        return f"{sentence_list(conflict)} cannot {'hold together' if conflict[1:] else 'be met'}."
+        listed = sentence_list(conflict)
+        ending = "hold together" if conflict[1:] else "be met"
+        return f"{listed[0].upper()}{listed[1:]} cannot {ending}."
     stuck = [f"{r.get('stage')} {r.get('role')}"
              for r in items(infeasibility, "roles_without_options")]  # fmt: skip
     if stuck:
