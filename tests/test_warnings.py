@@ -85,7 +85,6 @@ def test_noise_that_is_known_to_be_larger_counts_in_the_worst_case() -> None:
         assert [w["requirement"] for w in found["warnings"] if w["code"] == WORST] == (
             ["NEAR"] if warns else []
         )
-        assert found["monte_carlo"]["worst_case"]["value_m"] < limit  # so "found" would be a lie
         headline = verdict_text(found, colour=False).splitlines()[0]
         assert ("its certified worst case at one sigma exceeds" in headline) == warns
 
