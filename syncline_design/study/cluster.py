@@ -43,8 +43,13 @@ def run_on_cluster(
                 interrupts_held_back(),
             ):  # the threads and processes that it starts get none
                 target = stack.enter_context(
+                    # its workers' own logs are silent: when the scheduler ends first, as it does
+                    # on Ctrl-C, a worker tells of its missed heartbeat with a traceback
                     dask.LocalCluster(
-                        n_workers=workers, threads_per_worker=1, dashboard_address=None
+                        n_workers=workers,
+                        threads_per_worker=1,
+                        dashboard_address=None,
+                        silence_logs=logging.CRITICAL,
                     )
                 )
         try:
