@@ -13,9 +13,14 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design.catalog import SECTIONS
-from syncline_design.loading import BadInput, LoadedSpec, catalogs_of, load_document
+from syncline_design.loading import (
+    BadInput,
+    LoadedSpec,
+    catalogs_of,
+    load_document,
+    without_simulated,
+)
 from syncline_design.resolution import platform_of
-from syncline_design.study.case import without_simulated
 from syncline_design.study.factors import label
 from syncline_design.study.keys import PLATFORM_KEYS, put
 from syncline_design.verdict_file import read_verdict, text_of

@@ -15,7 +15,8 @@ from typing import Any
 from syncline_design.chosen_system import system_of
 from syncline_design.design_space import Design, Problem, is_empty
 from syncline_design.effects import registry
-from syncline_design.known_effects import effect_entries, known_of
+from syncline_design.effects.acting import known_of
+from syncline_design.known_effects import effect_entries
 from syncline_design.loading import LoadedSpec
 from syncline_design.model.budget import Budget, budget
 from syncline_design.model.system import EffectEntry, RoleName, Sensor, System

@@ -2,36 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from syncline_design.estimates import figure
 from syncline_design.loading import BadInput, LoadedSpec
-from syncline_design.model.system import EffectEntry, RoleName, System
+from syncline_design.model.system import EffectEntry
 from syncline_design.spec import EffectChoice
 from syncline_design.yaml_reader import KeyPath, Problem, show_path
 
 if TYPE_CHECKING:
     from syncline_design.effects.base import Parameter
-
-
-@dataclass(frozen=True, slots=True)
-class Known:
-    """What effects add: tau [s] by (stage, role), and systematic terms (name, stage, value [m])."""
-
-    extra_tau_s: Mapping[tuple[str, RoleName], float] = field(default_factory=dict)
-    systematic: tuple[tuple[str, str, float], ...] = ()
-
-
-def known_of(system: System) -> Known:
-    """Contributions of a system's known effects."""
-    if not system.effects:
-        return Known()
-    from syncline_design.simulate.known_effects import contributions
-
-    return Known(*contributions(system))
 
 
 def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:

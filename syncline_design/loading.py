@@ -217,3 +217,19 @@ __all__ = [
     "load_text",
     "problem_at",
 ]
+
+
+def without_simulated(loaded: LoadedSpec) -> LoadedSpec:
+    """The spec without its monte_carlo requirements, every other one still at its own line."""
+    kept = [i for i, r in enumerate(loaded.spec.requirements) if r.kind != "monte_carlo"]
+    requirements = tuple(loaded.spec.requirements[i] for i in kept)
+    renumbered = {old: new for new, old in enumerate(kept)}
+    positions: dict[KeyPath, Position] = {}
+    for path, position in loaded.positions.items():
+        if path[:1] == ("requirements",) and len(path) > 1:
+            if path[1] not in renumbered:
+                continue
+            path = ("requirements", renumbered[int(path[1])], *path[2:])
+        positions[path] = position
+    spec = loaded.spec.model_copy(update={"requirements": requirements})
+    return replace(loaded, spec=spec, positions=positions)

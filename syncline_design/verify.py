@@ -21,7 +21,8 @@ from syncline_design.design_data import assumptions, design_json, sources, used_
 from syncline_design.design_space import Design
 from syncline_design.design_space import Problem as DesignProblem
 from syncline_design.effect_tables import problem_of
-from syncline_design.known_effects import effect_entries, known_of
+from syncline_design.effects.acting import known_of
+from syncline_design.known_effects import effect_entries
 from syncline_design.loading import BadInput, LoadedSpec, Problem, load
 from syncline_design.model.budget import budget
 from syncline_design.model.system import System

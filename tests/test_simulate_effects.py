@@ -18,11 +18,11 @@ from scipy import stats
 from scipy.integrate import quad
 
 from syncline_design.effects import registry
+from syncline_design.effects.acting import contributions
 from syncline_design.effects.base import Array
 from syncline_design.horizon import Horizon
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
 from syncline_design.simulate import SimulationSettings, cross_check, sample_errors
-from syncline_design.simulate.known_effects import contributions
 from syncline_design.simulate.sampling import JOB
 from syncline_design.timing import NO_ERROR
 

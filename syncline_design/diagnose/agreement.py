@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.diagnose.trajectory import GAP_FACTOR
+from syncline_design.diagnose.log import GAP_FACTOR
 from syncline_design.effects.base import Array
 from syncline_design.effects.kinematics import rotate
 from syncline_design.estimates import figure

@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 
+from syncline_design.diagnose.log import GAP_FACTOR
 from syncline_design.diagnose.stamps import Index, groups, per_stamp, starts
-from syncline_design.diagnose.trajectory import GAP_FACTOR
 from syncline_design.effects.base import Array
 from syncline_design.simulate.chain import euler_to_rotation
 

@@ -11,11 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from syncline_design.diagnose.log import Log, StageLog, Track
+from syncline_design.diagnose.log import GAP_FACTOR, Log, StageLog, Track
 from syncline_design.diagnose.merging import hermite
 from syncline_design.diagnose.simulation import Acting, Scene, acting, scene
 from syncline_design.diagnose.stamps import per_stamp
-from syncline_design.diagnose.trajectory import GAP_FACTOR
 from syncline_design.effects import registry
 from syncline_design.effects.base import Array, Target
 from syncline_design.effects.frame_convention import conventions

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnose.stamps import usual_step_s
 from syncline_design.effects.base import Array
 
+GAP_FACTOR = 5.0  # rows further apart than this times the median interval are a gap
 Kind = Literal["georeference", "position"]
 Rows = NDArray[np.signedinteger[Any]] | NDArray[np.bool_] | slice
 

@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from syncline_design.diagnose.log import GAP_FACTOR
 from syncline_design.diagnose.stamps import per_stamp
 from syncline_design.effects.base import Array
 from syncline_design.simulate.chain import rotation_exp
 
 FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
-GAP_FACTOR = 5.0  # rows further apart than this times the median interval are a gap
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from pkgutil import iter_modules
 
 from syncline_design.effects.base import Effect
 
-NOT_EFFECTS = frozenset({"base", "kinematics"})
+NOT_EFFECTS = frozenset({"acting", "base", "kinematics"})
 
 
 @cache

@@ -16,6 +16,10 @@ ROLES: tuple[RoleName, ...] = ("position", "attitude", "ranging")
 UTC = "utc"
 
 
+class SimulationError(ValueError):
+    """A simulation that cannot be run as asked; the text says what was expected and found."""
+
+
 @dataclass(frozen=True, slots=True)
 class Platform:
     """How a vehicle moves: v_max [m/s], omega_max [rad/s], range d [m], largest lever arm b [m]."""

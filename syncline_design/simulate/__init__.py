@@ -5,6 +5,7 @@ the Syncline, `decide` settles a `monte_carlo` requirement, `sample_errors` hand
 an array.  Imports nothing but NumPy.
 """
 
+from syncline_design.model.system import SimulationError
 from syncline_design.simulate.comparison import comparison
 from syncline_design.simulate.results import (
     ComparisonRow,
@@ -15,7 +16,7 @@ from syncline_design.simulate.results import (
 )
 from syncline_design.simulate.run import Decision, cross_check, decide, simulate
 from syncline_design.simulate.sampling import sample_errors
-from syncline_design.simulate.settings import SimulationError, SimulationSettings
+from syncline_design.simulate.settings import SimulationSettings
 from syncline_design.simulate.worst_case import WorstCase, worst_cases
 
 __all__ = [

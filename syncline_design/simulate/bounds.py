@@ -12,11 +12,11 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from syncline_design.effects import acting as acting_effects
 from syncline_design.model.budget import budget
+from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.system import RoleName, Stage, System
-from syncline_design.simulate import known_effects
-from syncline_design.simulate.draws import arm_lengths
 
 ExtraTau = Mapping[tuple[str, RoleName], float]
 
@@ -126,7 +126,7 @@ def pairwise_bounds(
     system: System, shifts_s: Sequence[tuple[float, float]]
 ) -> tuple[StageBound, ...]:
     """Each stage's bound at its largest shifts (of position, of attitude) plus what effects add."""
-    extra, _ = known_effects.contributions(system)
+    extra, _ = acting_effects.contributions(system)
     tilt = system.horizon.tilt_rad
     return tuple(
         stage_bound(stage, index == 0, shifts, tilt, _added(system, index, extra))
@@ -143,7 +143,7 @@ def _added(system: System, index: int, extra: ExtraTau) -> Added:
     d = distance_m(stage)
     stretched = stage.ranging.sigma[0] / d if stage.ranging is not None and d > 0.0 else 0.0
     turn = euler = sight = offset = 0.0
-    for one, what in known_effects.stage_contributions(system, index):
+    for one, what in acting_effects.stage_contributions(system, index):
         if one.effect.kind == "stochastic":
             euler += what.turn_rad
         else:
@@ -175,7 +175,7 @@ def references(system: System, tau_s: float) -> tuple[float, float, float]:
     Known effects widen the pairs' shifts and add their systematic terms to all three; the
     Syncline is the paper's [eq:syncline], (sum of v + d w) tau + sensor errors.
     """
-    extra, systematic = known_effects.contributions(system)
+    extra, systematic = acting_effects.contributions(system)
     bounds = chain_bounds(system, tau_s)
     widest = max(
         pair_extra_s(system, index, role, extra)

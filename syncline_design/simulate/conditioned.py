@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from syncline_design.effects.base import Array
-from syncline_design.model.system import Stage, System
+from syncline_design.model.system import SimulationError, Stage, System
 from syncline_design.simulate import kernel
 from syncline_design.simulate.draws import Shifts, Source, generator, stage_draw, timing_draws
 from syncline_design.simulate.quadrature import (
@@ -33,7 +33,7 @@ from syncline_design.simulate.results import (
     ProportionEstimate,
     QuantileEstimate,
 )
-from syncline_design.simulate.settings import SimulationError, SimulationSettings
+from syncline_design.simulate.settings import SimulationSettings
 from syncline_design.simulate.worst_case import WorstCase
 
 CONDITIONED_STREAM = 3  # first word of the stream key, see draws.generator

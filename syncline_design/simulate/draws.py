@@ -14,6 +14,7 @@ from typing import Protocol
 import numpy as np
 
 from syncline_design.effects.base import Array
+from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.system import RoleName, Sensor, Stage, System
 from syncline_design.simulate.kernel import Draw
 from syncline_design.timing import (
@@ -199,13 +200,6 @@ def _express_from(found: Array) -> None:
         vector[:] = vector[0] * first + vector[1] * second + vector[2] * found[-1]
 
 
-def position_lever_arm(stage: Stage, first: bool) -> tuple[float, float, float] | None:
-    """l_G [m], body, as the spec gives it: the antenna's, later the transponder's."""
-    if first:
-        return None if stage.position is None else stage.position.lever_arm_m
-    return stage.transponder_lever_arm_m
-
-
 def lever_arms(stage: Stage, first: bool, direction: Array) -> tuple[Array, Array]:
     """l_G and l_L [m], body; not given: length b along `direction` (3, n), and zero."""
     given = position_lever_arm(stage, first)
@@ -214,21 +208,6 @@ def lever_arms(stage: Stage, first: bool, direction: Array) -> tuple[Array, Arra
         return antenna, antenna  # no object: the antenna itself is located
     arm = stage.ranging.lever_arm_m
     return antenna, _column((0.0, 0.0, 0.0) if arm is None else arm)
-
-
-def arm_lengths(stage: Stage, first: bool) -> tuple[float, float]:
-    """(|l_G|, largest |l_L - l_G|) [m]; a free l_G has length b and any direction.
-
-    Without a ranging sensor the antenna itself is located: (|l_G|, 0).
-    """
-    given = position_lever_arm(stage, first)
-    length = float(stage.platform.baseline_m) if given is None else math.hypot(*given)
-    if stage.ranging is None:
-        return length, 0.0
-    ranging = stage.ranging.lever_arm_m or (0.0, 0.0, 0.0)
-    if given is None:
-        return length, length + math.hypot(*ranging)
-    return length, math.dist(given, ranging)
 
 
 def _column(vector: tuple[float, float, float]) -> Array:

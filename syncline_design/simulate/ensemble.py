@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from syncline_design.effects.acting import by_stage, tilts
 from syncline_design.horizon import Horizon, duration_words
 from syncline_design.model.system import System
 from syncline_design.simulate.draws import entering
-from syncline_design.simulate.known_effects import by_stage, tilts
 
 OVER_MISSIONS = "over_missions"
 SLOW = ("correlated_noise", "height_drift")  # correlated in time: one stationary draw a sample

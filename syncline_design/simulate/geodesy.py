@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from syncline_design.effects.base import Array
-from syncline_design.simulate.settings import SimulationError
+from syncline_design.model.system import SimulationError
 
 
 def ecef_from_ned(latitude_rad: float, longitude_rad: float) -> Array:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from syncline_design.model.budget import budget
-from syncline_design.model.system import System
+from syncline_design.model.system import SimulationError, System
 from syncline_design.simulate import distribution
 from syncline_design.simulate.distribution import Binned, Values
 from syncline_design.simulate.ensemble import ensemble_of
@@ -24,7 +24,6 @@ from syncline_design.simulate.results import (
 from syncline_design.simulate.sampling import JOB, error_distribution
 from syncline_design.simulate.settings import (
     DEFAULT_MANOEUVRE,
-    SimulationError,
     SimulationSettings,
     demand_simulable,
 )

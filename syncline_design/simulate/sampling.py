@@ -14,6 +14,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.base import Array
 from syncline_design.model.system import System
 from syncline_design.simulate import known_effects
@@ -38,7 +39,7 @@ def job_errors(system: System, settings: SimulationSettings, job: int) -> Array:
 
         apart = generator(settings.seed, EFFECTS_STREAM, job)
         return trajectory_errors(system, settings, stream, apart, JOB)
-    if known_effects.by_stage(system):
+    if acting_effects.by_stage(system):
         return _errors_with_effects(system, settings, stream, job)
     source = RandomSource(stream, JOB)
     shifts = timing_draws(system, source)
@@ -57,7 +58,7 @@ def _errors_with_effects(
     source = RandomSource(stream, JOB)
     apart = generator(settings.seed, EFFECTS_STREAM, job)
     around = RandomSource(apart, JOB)
-    acting = known_effects.by_stage(system)
+    acting = acting_effects.by_stage(system)
     moment = moment_draw(system.horizon, around)
     shifts = timing_draws(system, source)
     carried: known_effects.Carried | None = None
@@ -72,7 +73,7 @@ def _errors_with_effects(
 
 def lean_draw(system: System, source: RandomSource) -> Array:
     """(roll, pitch) [rad] (2, n): level, unless an effect acts by tilt."""
-    if known_effects.tilts(system):
+    if acting_effects.tilts(system):
         return tilt_draw(system.horizon, source)
     return np.zeros((2, source.count))
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from syncline_design.input_files import FileContent
-from syncline_design.model.system import Sensor, Stage, System
+from syncline_design.model.system import Sensor, SimulationError, Stage, System
 from syncline_design.timing import Constant, Distribution, Empirical, Normal, Uniform
 
 Envelope = Literal["limits", "inside", "trajectory"]
@@ -16,10 +16,6 @@ Estimator = Literal["plain", "conditioned"]
 DEFAULT_QUANTILES = (0.5, 0.95, 0.997)
 DEFAULT_SAMPLES = 200_000
 DEFAULT_MANOEUVRE = "figure_eight"
-
-
-class SimulationError(ValueError):
-    """A simulation that cannot be run as asked; the text says what was expected and found."""
 
 
 @dataclass(frozen=True, slots=True)

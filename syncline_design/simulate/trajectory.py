@@ -23,10 +23,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.base import Array, StageRows
 from syncline_design.effects.kinematics import bearing, rotate
 from syncline_design.input_files import FileContent, UnsuitableError, read_plain
-from syncline_design.model.system import Platform, Stage, System
+from syncline_design.model.system import Platform, SimulationError, Stage, System
 from syncline_design.simulate import known_effects
 from syncline_design.simulate.chain import (
     Noise,
@@ -44,11 +45,7 @@ from syncline_design.simulate.draws import (
     time_margin_s,
     timing_draws,
 )
-from syncline_design.simulate.settings import (
-    DEFAULT_MANOEUVRE,
-    SimulationError,
-    SimulationSettings,
-)
+from syncline_design.simulate.settings import DEFAULT_MANOEUVRE, SimulationSettings
 from syncline_design.simulate.surroundings import Moment, moment_draw, on_the_level
 
 _FIGURE_EIGHT_RAD = 2.404825557695773  # first zero of the Bessel function J_0
@@ -145,7 +142,7 @@ def trajectory_errors(
     """
     source = RandomSource(stream, count)
     shifts = timing_draws(system, source)
-    acting = known_effects.by_stage(system)
+    acting = acting_effects.by_stage(system)
     mission = moment_draw(system.horizon, RandomSource(apart, count)) if acting else None
     moment = source.uniform(1)[0]
     repeated = settings.trajectory is None or str(settings.trajectory) in MANOEUVRES

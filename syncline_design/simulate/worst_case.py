@@ -14,12 +14,14 @@ from typing import Literal
 
 import numpy as np
 
+from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.base import Array
 from syncline_design.horizon import Horizon
+from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.system import Stage, System
 from syncline_design.simulate import kernel, known_effects
 from syncline_design.simulate.bounds import references
-from syncline_design.simulate.draws import generator, lever_arms, position_lever_arm
+from syncline_design.simulate.draws import generator, lever_arms
 from syncline_design.simulate.surroundings import Moment, lean
 
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
@@ -154,7 +156,7 @@ class _Search:
         self.tau_s = tau_s
         self.starts = starts
         self.blocks = blocks(system)
-        self.acting = known_effects.by_stage(system)
+        self.acting = acting_effects.by_stage(system)
         self.placed = _is_placed(system)
         self.size = self.blocks[-1].rows.stop
 

@@ -7,18 +7,18 @@ import hashlib
 import json
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from datetime import date
 from importlib import metadata
 from typing import Any
 
 from syncline_design import __version__
 from syncline_design.input_files import ReplacedInputError, noting
-from syncline_design.loading import BadInput, LoadedSpec
+from syncline_design.loading import BadInput, LoadedSpec, without_simulated
 from syncline_design.study.factors import plain
 from syncline_design.study.inputs import inputs_of
 from syncline_design.study.loading import Base, Study, engine_sha256
-from syncline_design.yaml_reader import KeyPath, Position, Problem
+from syncline_design.yaml_reader import Problem
 
 Json = dict[str, Any]
 SCHEMA = "syncline-design/study-case/v1"
@@ -155,22 +155,6 @@ def _checked(study: Study, base: Base, loaded: LoadedSpec, settings: CaseSetting
     if proof.get("optimal") is False:  # as far as this machine came within the time limit
         record["provisional"] = True
     return record
-
-
-def without_simulated(loaded: LoadedSpec) -> LoadedSpec:
-    """The spec without its monte_carlo requirements, every other one still at its own line."""
-    kept = [i for i, r in enumerate(loaded.spec.requirements) if r.kind != "monte_carlo"]
-    requirements = tuple(loaded.spec.requirements[i] for i in kept)
-    renumbered = {old: new for new, old in enumerate(kept)}
-    positions: dict[KeyPath, Position] = {}
-    for path, position in loaded.positions.items():
-        if path[:1] == ("requirements",) and len(path) > 1:
-            if path[1] not in renumbered:
-                continue
-            path = ("requirements", renumbered[int(path[1])], *path[2:])
-        positions[path] = position
-    spec = loaded.spec.model_copy(update={"requirements": requirements})
-    return replace(loaded, spec=spec, positions=positions)
 
 
 def _problem_json(problem: Problem) -> Json:

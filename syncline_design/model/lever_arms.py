@@ -1,0 +1,29 @@
+"""Lever arms of a stage as its spec gives them, and how long they are."""
+
+from __future__ import annotations
+
+import math
+
+from syncline_design.model.system import Stage
+
+
+def position_lever_arm(stage: Stage, first: bool) -> tuple[float, float, float] | None:
+    """l_G [m], body, as the spec gives it: the antenna's, later the transponder's."""
+    if first:
+        return None if stage.position is None else stage.position.lever_arm_m
+    return stage.transponder_lever_arm_m
+
+
+def arm_lengths(stage: Stage, first: bool) -> tuple[float, float]:
+    """(|l_G|, largest |l_L - l_G|) [m]; a free l_G has length b and any direction.
+
+    Without a ranging sensor the antenna itself is located: (|l_G|, 0).
+    """
+    given = position_lever_arm(stage, first)
+    length = float(stage.platform.baseline_m) if given is None else math.hypot(*given)
+    if stage.ranging is None:
+        return length, 0.0
+    ranging = stage.ranging.lever_arm_m or (0.0, 0.0, 0.0)
+    if given is None:
+        return length, length + math.hypot(*ranging)
+    return length, math.dist(given, ranging)
