@@ -33,12 +33,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parent))
 from choice_instances import instance
 
 from syncline_design import __version__
-from syncline_design.choose.enumerate import front_by_enumeration
-from syncline_design.choose.evaluate import evaluate
-from syncline_design.choose.front import front
-from syncline_design.choose.milp import best_by_milp
-from syncline_design.choose.outcome import Deadline, FrontPoint, NoVerdict
-from syncline_design.design_space import Problem
+from syncline_design.choice.enumerate import front_by_enumeration
+from syncline_design.choice.evaluate import evaluate
+from syncline_design.choice.front import front
+from syncline_design.choice.milp import best_by_milp
+from syncline_design.choice.outcome import Deadline, FrontPoint, NoVerdict
+from syncline_design.choice.table import Problem
 
 SEED = 0
 NM = 1e9

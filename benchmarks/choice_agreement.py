@@ -24,14 +24,14 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from random_problems import random_problem, with_random_limits
 from syncline_design import __version__
-from syncline_design.choose.decide import best_by_front
-from syncline_design.choose.enumerate import all_designs, front_by_enumeration
-from syncline_design.choose.evaluate import broken, error_key, evaluate, rank
-from syncline_design.choose.front import front
-from syncline_design.choose.milp import best_by_milp
-from syncline_design.choose.outcome import Deadline, FrontPoint, NoVerdict
-from syncline_design.choose.ranked import iter_best
-from syncline_design.design_space import Design, Problem
+from syncline_design.choice.decide import best_by_front
+from syncline_design.choice.enumerate import all_designs, front_by_enumeration
+from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
+from syncline_design.choice.front import front
+from syncline_design.choice.milp import best_by_milp
+from syncline_design.choice.outcome import Deadline, FrontPoint, NoVerdict
+from syncline_design.choice.ranked import iter_best
+from syncline_design.choice.table import Design, Problem
 
 
 def drawn(seed: int, most: int) -> Problem:

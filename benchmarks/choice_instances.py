@@ -6,7 +6,7 @@ import math
 import random
 from fractions import Fraction
 
-from syncline_design.design_space import (
+from syncline_design.choice.table import (
     NO_CLOCK,
     ClockOption,
     Infrastructure,

@@ -86,7 +86,7 @@ def columns(rows: int) -> dict[str, np.ndarray]:
 
 RUN = """
 import resource, sys, time
-from syncline_design.diagnose import diagnose
+from syncline_design.diagnosis import diagnose
 start = time.perf_counter()
 found = diagnose(sys.argv[1], [sys.argv[2]])
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2

@@ -26,11 +26,11 @@ from collections.abc import Callable
 import numpy as np
 
 from syncline_design.model.system import Platform, Sensor, Stage, System
-from syncline_design.simulate import SimulationSettings, cross_check
-from syncline_design.simulate.conditioned import rays
-from syncline_design.simulate.sampling import JOB, keep_freed_memory
-from syncline_design.simulate.worker import Share, count_share, tally
-from syncline_design.timing import TimingError, Uniform
+from syncline_design.model.timing import TimingError, Uniform
+from syncline_design.simulation import SimulationSettings, cross_check
+from syncline_design.simulation.conditioned import rays
+from syncline_design.simulation.sampling import JOB, keep_freed_memory
+from syncline_design.simulation.worker import Share, count_share, tally
 
 DEG = math.pi / 180.0
 TAU_S = 2e-4

@@ -25,10 +25,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from syncline_design.study import StudySettings, load_study, run_study
-from syncline_design.study.case import CaseSettings
-from syncline_design.study.loading import Study
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.studies import StudySettings, load_study, run_study
+from syncline_design.studies.case import CaseSettings
+from syncline_design.studies.loading import Study
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEC = """\
 syncline: 1

@@ -64,7 +64,7 @@ def ideal_of(case: Case, log: WorldLog, known: float | None) -> float | None:
 
 def solve(case: Case, ideal: float | None = None) -> Row:
     """Make the log, diagnose it, score it; a failure of the diagnosis is a result too."""
-    from syncline_design.diagnose import DiagnosisSettings, diagnose
+    from syncline_design.diagnosis import DiagnosisSettings, diagnose
 
     base = {"id": case.id, "group": case.group, "label": case.label, "seed": case.seed}
     run = case.run()

@@ -12,7 +12,7 @@ import tempfile
 from pathlib import Path
 
 from syncline_design.report.checks import render_checks
-from syncline_design.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 SPEC = Path("specs/uav_corridor.yaml")
 IMAGES = Path("docs/images").resolve()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 from fractions import Fraction
 
-from syncline_design.design_space import (
+from syncline_design.choice.table import (
     NO_CLOCK,
     ClockOption,
     Infrastructure,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import dataclasses
 import math
 
-from syncline_design.horizon import Horizon
+from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import Platform, Sensor, Stage, System
-from syncline_design.timing import Distribution, TimingError, Uniform
+from syncline_design.model.timing import Distribution, TimingError, Uniform
 
 DEG = math.pi / 180.0
 DEFAULT_ERROR = Uniform(-2e-4, 2e-4)

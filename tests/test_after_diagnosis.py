@@ -14,12 +14,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from syncline_design.after_diagnosis import DesignMeaning, format_duration, meaning
-from syncline_design.diagnose import Diagnosis
-from syncline_design.loading import load_text
+from syncline_design.comparison.meaning import DesignMeaning, format_duration, meaning
+from syncline_design.diagnosis import Diagnosis
 from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
 from syncline_design.report.pages import render_diagnosis
-from syncline_design.spec import EffectChoice
+from syncline_design.spec.load import load_text
+from syncline_design.spec.spec import EffectChoice
 
 ROOT = Path(__file__).resolve().parent.parent
 V, W, D = 6.0, np.radians(40.0), 30.0  # m/s, rad/s, m
@@ -141,10 +141,10 @@ def test_a_finding_in_a_spec_reads_as_it_was_found(
     effect: str, parameters: dict[str, float], words: str
 ) -> None:
     """The sentence of `check` about a known effect has the figures of `diagnose`'s sentence."""
-    from syncline_design.diagnose.findings import Figure, Finding
+    from syncline_design.diagnosis.findings import Figure, Finding
     from syncline_design.effects import registry
-    from syncline_design.known_effects import describe
     from syncline_design.model.system import EffectEntry
+    from syncline_design.spec.known_effects import describe
 
     sensor = registry()[effect].sensors[0]
     units = {p.name: p.unit for p in registry()[effect].parameters}

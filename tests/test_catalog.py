@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from syncline_design.catalog import (
+from syncline_design.spec.catalog import (
     Catalog,
     ClockEntry,
     ConstantError,
@@ -18,10 +18,10 @@ from syncline_design.catalog import (
     UniformError,
     read_error,
 )
-from syncline_design.loading import load_builtin
-from syncline_design.resolution import usable_primitives
-from syncline_design.validation import validate
-from syncline_design.yaml_reader import parse
+from syncline_design.spec.load import load_builtin
+from syncline_design.spec.resolve import usable_primitives
+from syncline_design.spec.validation import validate
+from syncline_design.spec.yaml_text import parse
 
 SENSOR = "modality: attitude, sigma_attitude: 0.1 deg, primitives: [pps, tov]"
 METHOD = "primitives: [pps], error: {distribution: constant, value: 0 s}"

@@ -15,10 +15,9 @@ import pytest
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from syncline_design.horizon import Horizon
+from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import UTC, Platform, Sensor, Stage, System
-from syncline_design.simulate.certified import certified_worst_case_m
-from syncline_design.timing import (
+from syncline_design.model.timing import (
     NO_ERROR,
     Constant,
     Empirical,
@@ -27,6 +26,7 @@ from syncline_design.timing import (
     Uniform,
     support,
 )
+from syncline_design.simulation.certified import certified_worst_case_m
 
 LEVEL = Horizon(tilt_rad=0.0)
 LATE = TimingError(Uniform(-0.05, 0.0))

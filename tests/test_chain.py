@@ -9,9 +9,9 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
-from syncline_design.effects.base import NOTHING, Departures, StageRows
-from syncline_design.simulate import kernel
-from syncline_design.simulate.chain import (
+from syncline_design.effects.record import NOTHING, Departures, StageRows
+from syncline_design.simulation import kernel
+from syncline_design.simulation.chain import (
     ConstantTwist,
     Noise,
     no_noise,
@@ -20,8 +20,8 @@ from syncline_design.simulate.chain import (
     screw_displacement,
     stage_error,
 )
-from syncline_design.simulate.draws import RandomSource, generator, stage_draw, timing_draws
-from syncline_design.simulate.surroundings import Moment, placed_rows
+from syncline_design.simulation.draws import RandomSource, generator, stage_draw, timing_draws
+from syncline_design.simulation.surroundings import Moment, placed_rows
 from tests.simulation_systems import DEG, altered, fixed_wing, position_only, survey
 
 

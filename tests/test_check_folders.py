@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from syncline_design.loading import BadInput
-from syncline_design.spec_folders import other_kind, spec_files
+from syncline_design.spec.folders import other_kind, spec_files
+from syncline_design.spec.load import BadInput
 
 ROOT = Path(__file__).parent.parent
 TRACK = (ROOT / "specs" / "position_track.yaml").read_text("utf-8")

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
-from syncline_design.loading import load_text
-from syncline_design.optimisation import OptimizeSettings, optimize
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.spec.load import load_text
+from syncline_design.verdict.optimise import OptimizeSettings, optimize
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEC = """\
 syncline: 1

@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 import yaml
 
-from syncline_design.loading import load_text
-from syncline_design.optimisation import OptimizeSettings, optimisation_json, optimize
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.spec.load import load_text
+from syncline_design.verdict.optimise import OptimizeSettings, optimisation_json, optimize
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEED, TURN_DEG, DISTANCE = 4.0, 6.0, 30.0
 UNIT = {"accuracy": "m", "sync": "", "cost": "EUR", "mass": "kg"}

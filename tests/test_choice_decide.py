@@ -14,19 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from random_problems import random_problem, with_random_limits
-from syncline_design.choose import decide
-from syncline_design.choose.decide import best, choose
-from syncline_design.choose.enumerate import all_designs
-from syncline_design.choose.evaluate import (
-    broken,
-    evaluate,
-    rank,
-    total_error_m,
-)
-from syncline_design.choose.outcome import Choice, Infeasible, NoVerdict, TooLarge
-from syncline_design.choose.ranked import iter_best
-from syncline_design.choose.rounded_once import exact_product, total_errors_m
-from syncline_design.design_space import (
+from syncline_design.choice import decide
+from syncline_design.choice.decide import best, choose
+from syncline_design.choice.enumerate import all_designs
+from syncline_design.choice.evaluate import broken, evaluate, rank, total_error_m
+from syncline_design.choice.outcome import Choice, Infeasible, NoVerdict, TooLarge
+from syncline_design.choice.ranked import iter_best
+from syncline_design.choice.rounded_once import exact_product, total_errors_m
+from syncline_design.choice.table import (
     ClockOption,
     Design,
     Infrastructure,

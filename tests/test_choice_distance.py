@@ -15,8 +15,8 @@ from typing import Any
 
 import pytest
 
-from syncline_design.loading import load_text
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.spec.load import load_text
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 from test_choice_conflicts import World, text_of
 
 SPEED, TURN = 4.0, math.radians(6.0)

@@ -16,12 +16,12 @@ from pathlib import Path
 import pytest
 
 from random_problems import random_problem
-from syncline_design.choose.front import front
-from syncline_design.design_space import Design, Option, Problem
-from syncline_design.effect_tables import problem_of
-from syncline_design.loading import LoadedSpec, load_text
-from syncline_design.optimisation import Optimisation, OptimizeSettings, optimize
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.choice.effect_tables import problem_of
+from syncline_design.choice.front import front
+from syncline_design.choice.table import Design, Option, Problem
+from syncline_design.spec.load import LoadedSpec, load_text
+from syncline_design.verdict.optimise import Optimisation, OptimizeSettings, optimize
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SIGMA = {"fine": 0.05, "coarse": 0.20}  # m per axis
 PRICE = {"fine": 9000, "coarse": 1000}

@@ -10,16 +10,16 @@ from typing import Any
 
 import pytest
 
-from syncline_design.choose.decide import choose
-from syncline_design.choose.explain import Explanation, explain
-from syncline_design.choose.fixes import Fix
-from syncline_design.choose.outcome import Choice, Infeasible
-from syncline_design.choose.parts import is_feasible, solve
-from syncline_design.choose.variations import with_methods
-from syncline_design.choose.written import rounded
-from syncline_design.design_space import with_limits
-from syncline_design.loading import LoadedSpec, load, load_text
-from syncline_design.problem import build_problem
+from syncline_design.choice.decide import choose
+from syncline_design.choice.explain import Explanation, explain
+from syncline_design.choice.fixes import Fix
+from syncline_design.choice.outcome import Choice, Infeasible
+from syncline_design.choice.parts import is_feasible, solve
+from syncline_design.choice.problem import build_problem
+from syncline_design.choice.table import with_limits
+from syncline_design.choice.variations import with_methods
+from syncline_design.choice.written import rounded
+from syncline_design.spec.load import LoadedSpec, load, load_text
 
 ROOT = Path(__file__).parent.parent
 

@@ -11,26 +11,26 @@ from pathlib import Path
 
 import pytest
 
-from syncline_design.choose import presentation
-from syncline_design.choose.decide import best, choose
-from syncline_design.choose.evaluate import broken, evaluate
-from syncline_design.choose.front import front
-from syncline_design.choose.outcome import Choice, Infeasible
-from syncline_design.choose.prices import price_of, staircase
-from syncline_design.choose.slack import Slack, payload, same_design, slack_ledger
-from syncline_design.choose.tolerance import measure_next, tolerance_verdict
-from syncline_design.choose.variations import (
+from syncline_design.choice import presentation
+from syncline_design.choice.decide import best, choose
+from syncline_design.choice.evaluate import broken, evaluate
+from syncline_design.choice.front import front
+from syncline_design.choice.outcome import Choice, Infeasible
+from syncline_design.choice.prices import price_of, staircase
+from syncline_design.choice.problem import build_problem, selection_of
+from syncline_design.choice.slack import Slack, payload, same_design, slack_ledger
+from syncline_design.choice.table import Design, Limits, Problem
+from syncline_design.choice.tolerance import measure_next, tolerance_verdict
+from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
     quantity,
     sigma_figures,
     with_figure,
     with_platform_figure,
 )
-from syncline_design.design_space import Design, Limits, Problem
-from syncline_design.loading import LoadedSpec, load, load_text
-from syncline_design.problem import build_problem, selection_of
-from syncline_design.recheck import recheck
-from syncline_design.units import Dimension
+from syncline_design.model.quantity import Dimension
+from syncline_design.spec.load import LoadedSpec, load, load_text
+from syncline_design.verdict.recheck import recheck
 from test_choice_explain import spec
 from test_front import one_stage, option
 

@@ -16,18 +16,19 @@ import pytest
 import yaml
 from scipy.stats import chi
 
-from syncline_design import acceptance, optimisation, verify
-from syncline_design.acceptance import Simulations
-from syncline_design.choose.tolerance import ToleranceVerdict, tolerance_verdict
-from syncline_design.design_space import Design
-from syncline_design.loading import LoadedSpec, load_text
-from syncline_design.optimisation import (
+from syncline_design.choice.table import Design
+from syncline_design.choice.tolerance import ToleranceVerdict, tolerance_verdict
+from syncline_design.spec.load import LoadedSpec, load_text
+from syncline_design.verdict import acceptance, verify
+from syncline_design.verdict import optimise as optimisation
+from syncline_design.verdict.acceptance import Simulations
+from syncline_design.verdict.optimise import (
     OptimizeSettings,
     optimisation_json,
     optimisation_text,
     optimize,
 )
-from syncline_design.verify import CheckSettings, check_loaded, exit_code
+from syncline_design.verdict.verify import CheckSettings, check_loaded, exit_code
 
 FACTOR = {q: float(chi.ppf(q, 3)) for q in (0.5, 0.95, 0.997)}
 SENSORS = {  # sigma [m], cost

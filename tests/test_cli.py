@@ -136,7 +136,7 @@ def test_version_and_quiet() -> None:
 
 def test_a_pinned_check_imports_nothing_heavy() -> None:
     code = (
-        "import sys; from pathlib import Path; from syncline_design.verify import *; "
+        "import sys; from pathlib import Path; from syncline_design.verdict.verify import *; "
         "from syncline_design.report.console import verdict_text; "
         "verdict_text(check_file(Path('specs/usv_mapping.yaml'))); "
         f"print(sorted({HEAVY} & set(sys.modules)))"

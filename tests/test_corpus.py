@@ -21,9 +21,9 @@ from typing import Any
 
 import pytest
 
-from syncline_design.loading import BadInput, LoadedSpec, load, load_text
-from syncline_design.spec_writer import yaml_text
-from syncline_design.yaml_reader import Problem, read
+from syncline_design.spec.edit import yaml_text
+from syncline_design.spec.load import BadInput, LoadedSpec, load, load_text
+from syncline_design.spec.yaml_text import Problem, read
 
 CORPUS = Path(__file__).parent / "corpus"
 SPECS = Path(__file__).parent.parent / "specs"
@@ -195,7 +195,7 @@ def test_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     def denied(*_: object, **__: object) -> int:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("syncline_design.input_files.os.open", denied)
+    monkeypatch.setattr("syncline_design.machine.input_files.os.open", denied)
     assert "permission denied" in refused(spec)[0]
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from syncline_design.choice_data import left_out
-from syncline_design.choose.front import front
-from syncline_design.cli import app
-from syncline_design.loading import BadInput, load
-from syncline_design.problem import build_problem
-from syncline_design.verify import CheckSettings, check_file
+from syncline_design.choice.front import front
+from syncline_design.choice.problem import build_problem
+from syncline_design.cli.app import app
+from syncline_design.spec.load import BadInput, load
+from syncline_design.verdict.choice_data import left_out
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 QUICK = CheckSettings(monte_carlo=False)
 AMOUNTS = {"cost": "{} EUR", "mass": "{} g", "power": "{} W"}

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from syncline_design.choose import explain as explaining
-from syncline_design.cli import app
-from syncline_design.time_limit import in_force
+from syncline_design.choice import explain as explaining
+from syncline_design.cli.app import app
+from syncline_design.machine.deadline import in_force
 
 SPECS = Path(__file__).parent.parent / "specs"
 OPEN = str(SPECS / "uav_corridor.yaml")
@@ -119,7 +119,7 @@ def test_making_the_tables_ends_with_the_time(
     command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """3 x 150 sensors x 24 ways of stamping are 10 800 options; only some are made."""
-    from syncline_design import problem
+    from syncline_design.choice import problem
 
     made = 0
     real = problem._Figures.option

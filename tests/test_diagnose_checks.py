@@ -16,15 +16,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from syncline_design.diagnose import Diagnosis, DiagnosisSettings, diagnose, summary_text
-from syncline_design.diagnose.checks import Check, log_checks
-from syncline_design.diagnose.covariance import inverse_3x3
-from syncline_design.diagnose.gap import Fit, Gap, closed_share
-from syncline_design.diagnose.simulation import scene
-from syncline_design.diagnose.summary import gap_text
-from syncline_design.diagnose.system import measured
-from syncline_design.loading import BadInput, load
+from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose, summary_text
+from syncline_design.diagnosis.checks import Check, log_checks
+from syncline_design.diagnosis.covariance import inverse_3x3
+from syncline_design.diagnosis.gap import Fit, Gap, closed_share
+from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.summary import gap_text
+from syncline_design.diagnosis.system import measured
 from syncline_design.report.diagnoses import render_diagnose
+from syncline_design.spec.load import BadInput, load
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario
 
 Array = NDArray[np.float64]
@@ -292,7 +292,7 @@ def test_a_share_of_next_to_nothing_is_not_given(
 
 SCRIPT = """
 import sys
-from syncline_design.diagnose import DiagnosisSettings, diagnose
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.report.json_out import json_text
 settings = DiagnosisSettings(max_effects=1)
 print(json_text(diagnose(sys.argv[1], [sys.argv[2]], settings).to_json()))

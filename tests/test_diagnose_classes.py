@@ -13,18 +13,18 @@ from typing import Any
 import pytest
 from scipy.stats import chi2
 
-from syncline_design.diagnose import DiagnosisSettings, diagnose
-from syncline_design.diagnose.candidates import candidates, directed_parts, signatures
-from syncline_design.diagnose.expected_noise import structure_of
-from syncline_design.diagnose.findings import AliasFigure
-from syncline_design.diagnose.fitting import data_of, fit
-from syncline_design.diagnose.identify import competed
-from syncline_design.diagnose.simulation import scene
-from syncline_design.diagnose.summary import lookalike_lines
-from syncline_design.diagnose.system import measured
-from syncline_design.diagnose.trials import with_effect
-from syncline_design.loading import load
-from syncline_design.report.diagnosis_page import finding_words
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
+from syncline_design.diagnosis.candidates import candidates, directed_parts, signatures
+from syncline_design.diagnosis.expected_noise import structure_of
+from syncline_design.diagnosis.findings import AliasFigure
+from syncline_design.diagnosis.fitting import data_of, fit
+from syncline_design.diagnosis.identify import competed
+from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.summary import lookalike_lines
+from syncline_design.diagnosis.system import measured
+from syncline_design.diagnosis.trials import with_effect
+from syncline_design.report.on_diagnosis import finding_words
+from syncline_design.spec.load import load
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario
 
 Document = dict[str, Any]

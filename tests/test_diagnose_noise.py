@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import chi2, multivariate_normal
 
-from syncline_design.diagnose.covariance import factored, inverse_3x3
-from syncline_design.diagnose.gross import whole_seconds
-from syncline_design.diagnose.noise import (
+from syncline_design.diagnosis.covariance import factored, inverse_3x3
+from syncline_design.diagnosis.gross import whole_seconds
+from syncline_design.diagnosis.noise import (
     Directed,
     NoiseLevel,
     Slow,
@@ -21,11 +21,11 @@ from syncline_design.diagnose.noise import (
     precision,
     spec_bounds,
 )
-from syncline_design.diagnose.scores import Gram, clean_threshold, log_p_of
-from syncline_design.diagnose.tails import tails_of
-from syncline_design.diagnose.trajectory import pieces
+from syncline_design.diagnosis.scores import Gram, clean_threshold, log_p_of
+from syncline_design.diagnosis.tails import tails_of
+from syncline_design.diagnosis.trajectory import pieces
 from syncline_design.effects.kinematics import gauss_markov
-from syncline_design.estimates import figure
+from syncline_design.model.estimates import figure
 
 Array = NDArray[np.float64]
 

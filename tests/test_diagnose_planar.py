@@ -14,7 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from syncline_design.diagnose import Diagnosis, DiagnosisSettings, diagnose
+from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Array]

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.diagnose import Diagnosis, diagnose
+from syncline_design.diagnosis import Diagnosis, diagnose
 
 ROOT = Path(__file__).parents[1]
 DATA = Path(os.environ.get("SYNCLINE_DATA", ROOT.parent / "shared" / "data"))

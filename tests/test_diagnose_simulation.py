@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.diagnose import DiagnosisSettings, diagnose
-from syncline_design.diagnose.simulation import Acting, scene
-from syncline_design.diagnose.system import measured
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
+from syncline_design.diagnosis.scene import Acting, scene
+from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
-from syncline_design.loading import load
-from syncline_design.spec_writer import with_effects_text, write_spec
+from syncline_design.spec.edit import with_effects_text, write_spec
+from syncline_design.spec.load import load
 from tests.world import SILENT, Hidden, WorldLog, hidden, make_log, scenario
 
 LEFT = 0.03  # share of the effect's error that second-order terms and splines may leave

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from syncline_design.diagnose import DiagnosisSettings, diagnose
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from tests.world import CHAIN, Hidden, Noise, WorldLog, hidden, make_log, scenario
 from tests.world.streams import write_streams
 

@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 from study_specs import SPEC
-from syncline_design.diff import diff
-from syncline_design.loading import BadInput
-from syncline_design.report.differences import DIFF_FORMATS, diff_text, headline, render_diff
+from syncline_design.comparison.diff import diff
 from syncline_design.report.json_out import json_text
-from syncline_design.verify import CheckSettings, check_file
+from syncline_design.report.on_difference import DIFF_FORMATS, diff_text, headline, render_diff
+from syncline_design.spec.load import BadInput
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 PLAIN = CheckSettings(monte_carlo=False)
 

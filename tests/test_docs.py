@@ -92,7 +92,7 @@ def test_the_site_lists_every_page_and_no_other() -> None:
 
 @pytest.mark.parametrize("study", sorted((ROOT / "specs" / "studies").glob("*.yaml")))
 def test_shipped_studies_can_be_read(study: Path) -> None:
-    from syncline_design.study import load_study
+    from syncline_design.studies import load_study
 
     loaded = load_study(study)
     assert 20 <= len(loaded) <= 200
@@ -107,10 +107,10 @@ def _ratio_table(first: str) -> list[list[str]]:
 
 
 def _worst_ratios(platform: str) -> list[float]:
-    from syncline_design.chosen_system import system_of
-    from syncline_design.loading import load_text
-    from syncline_design.simulate import comparison
-    from syncline_design.verify import picked_design
+    from syncline_design.choice.chosen_system import system_of
+    from syncline_design.simulation import comparison
+    from syncline_design.spec.load import load_text
+    from syncline_design.verdict.verify import picked_design
 
     how = "primitive: pps, timestamping: hardware"
     text = (
@@ -145,11 +145,11 @@ def test_how_often_errors_exceed_the_syncline_is_as_the_pages_say() -> None:
     import numpy as np
     from scipy.stats import chi2
 
-    from syncline_design.chosen_system import system_of
-    from syncline_design.loading import load
+    from syncline_design.choice.chosen_system import system_of
     from syncline_design.model.budget import budget
-    from syncline_design.simulate import SimulationSettings, sample_errors
-    from syncline_design.verify import picked_design
+    from syncline_design.simulation import SimulationSettings, sample_errors
+    from syncline_design.spec.load import load
+    from syncline_design.verdict.verify import picked_design
 
     assert f"{100 * chi2.sf(3.0, 3):.0f} %" == "39 %"
     loaded = load(ROOT / "specs" / "uav_corridor.yaml")

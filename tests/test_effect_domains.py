@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from syncline_design.cli import app
-from syncline_design.loading import BadInput
-from syncline_design.verify import CheckSettings, check_file
+from syncline_design.cli.app import app
+from syncline_design.spec.load import BadInput
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 SPEC = """\
 syncline: 1

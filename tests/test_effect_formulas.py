@@ -15,14 +15,14 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import norm, t
 
 from syncline_design.effects import registry
-from syncline_design.effects.base import Basis, StageRows
-from syncline_design.horizon import Horizon
+from syncline_design.effects.record import Basis, StageRows
+from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
-from syncline_design.simulate import SimulationSettings
-from syncline_design.simulate.chain import ConstantTwist, no_noise, stage_error
-from syncline_design.simulate.sampling import sample_errors
-from syncline_design.timing import NO_ERROR
-from syncline_design.verify import CheckSettings, check_file
+from syncline_design.model.timing import NO_ERROR
+from syncline_design.simulation import SimulationSettings
+from syncline_design.simulation.chain import ConstantTwist, no_noise, stage_error
+from syncline_design.simulation.sampling import sample_errors
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 Array = NDArray[np.float64]
 GRAVITY = 9.80665

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 import syncline_design.effects as effects_package
 from syncline_design.effects import NOT_EFFECTS, registry
-from syncline_design.effects.base import Basis, Departures, Effect, StageRows, Target
 from syncline_design.effects.frame_convention import conventions
+from syncline_design.effects.record import Basis, Departures, Effect, StageRows, Target
 from syncline_design.model.system import Platform, Sensor, Stage
-from syncline_design.simulate.chain import (
+from syncline_design.model.timing import NO_ERROR
+from syncline_design.simulation.chain import (
     ConstantTwist,
     euler_to_rotation,
     no_noise,
     rotation_to_euler,
     stage_error,
 )
-from syncline_design.timing import NO_ERROR
 
 Array = NDArray[np.float64]
 PAIRS = [(e, s) for e in registry().values() for s in e.sensors]

@@ -9,10 +9,10 @@ import pytest
 from scipy.optimize import minimize
 
 from syncline_design.effects import registry
-from syncline_design.horizon import Horizon
+from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import EffectEntry, Platform, RoleName, Sensor, Stage, System
-from syncline_design.simulate import worst_cases
-from syncline_design.timing import NO_ERROR
+from syncline_design.model.timing import NO_ERROR
+from syncline_design.simulation import worst_cases
 from tests.plain_chain import PlainHorizon, PlainStage, chain_error, size
 
 DEG = math.pi / 180.0

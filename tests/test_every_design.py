@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from syncline_design.cli import app
+from syncline_design.cli.app import app
 
 ROLES = ("position", "attitude", "ranging")
 SPEED, TURN_DEG, DISTANCE = 5, 20, 30

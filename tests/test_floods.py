@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from syncline_design.loading import BadInput, load_text
-from syncline_design.study import StudySettings, load_study, run_study
+from syncline_design.spec.load import BadInput, load_text
+from syncline_design.studies import StudySettings, load_study, run_study
 from test_study_inputs import BELOW, GRID, OWN, SPEC, STUDY, track
 
 ROOT = Path(__file__).resolve().parent.parent

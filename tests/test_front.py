@@ -14,17 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from random_problems import random_problem, with_random_limits
-from syncline_design.choose import front as front_module
-from syncline_design.choose.enumerate import (
-    all_designs,
-    best_by_enumeration,
-    front_by_enumeration,
-)
-from syncline_design.choose.evaluate import broken, error_key, evaluate, rank
-from syncline_design.choose.front import front, merged_front
-from syncline_design.choose.outcome import FrontPoint
-from syncline_design.choose.pareto import Columns, undominated
-from syncline_design.design_space import (
+from syncline_design.choice import front as front_module
+from syncline_design.choice.enumerate import all_designs, best_by_enumeration, front_by_enumeration
+from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
+from syncline_design.choice.front import front, merged_front
+from syncline_design.choice.outcome import FrontPoint
+from syncline_design.choice.pareto import Columns, undominated
+from syncline_design.choice.table import (
     NO_CLOCK,
     Limits,
     Option,
@@ -87,8 +83,8 @@ def test_front_equals_enumeration(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(1000, 1120))
 def test_optimum_equals_enumeration(seed: int) -> None:
-    from syncline_design.choose.decide import best_by_front
-    from syncline_design.choose.outcome import Deadline
+    from syncline_design.choice.decide import best_by_front
+    from syncline_design.choice.outcome import Deadline
 
     problem = limited(seed)
     assert best_by_front(problem, Deadline()) == best_by_enumeration(problem)
@@ -261,7 +257,7 @@ def test_filter_equals_the_definition(count: int) -> None:
 
 def test_merging_loads_no_solver() -> None:
     code = (
-        "import sys, syncline_design.choose.decide as d; "
+        "import sys, syncline_design.choice.decide as d; "
         "sys.exit(any(m in sys.modules for m in ('cvxpy', 'highspy', 'scipy', 'matplotlib')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from syncline_design.choose.front import front
-from syncline_design.design_space import (
+from syncline_design.choice.front import front
+from syncline_design.choice.table import (
     NO_CLOCK,
     RESOURCES,
     Limits,

@@ -13,17 +13,17 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
-from syncline_design.choose.decide import choose
-from syncline_design.choose.front import front
-from syncline_design.choose.outcome import Choice, Infeasible
-from syncline_design.choose.ranked import iter_best
-from syncline_design.cli import app
-from syncline_design.loading import BadInput, load
-from syncline_design.problem import build_problem, selection_of
-from syncline_design.recheck import recheck
-from syncline_design.recheck_facts import impossible
-from syncline_design.selection import ClockSelection, RoleSelection, Selection
-from syncline_design.verify import CheckSettings, check_file, exit_code
+from syncline_design.choice.decide import choose
+from syncline_design.choice.front import front
+from syncline_design.choice.outcome import Choice, Infeasible
+from syncline_design.choice.problem import build_problem, selection_of
+from syncline_design.choice.ranked import iter_best
+from syncline_design.cli.app import app
+from syncline_design.spec.load import BadInput, load
+from syncline_design.spec.selection import ClockSelection, RoleSelection, Selection
+from syncline_design.verdict.recheck import recheck
+from syncline_design.verdict.recheck_facts import impossible
+from syncline_design.verdict.verify import CheckSettings, check_file, exit_code
 
 QUICK = CheckSettings(monte_carlo=False)
 

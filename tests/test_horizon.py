@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from syncline_design.loading import BadInput, load_text
-from syncline_design.spec import HorizonChoice
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.spec.load import BadInput, load_text
+from syncline_design.spec.spec import HorizonChoice
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEC = """\
 syncline: 1

@@ -18,24 +18,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from syncline_design.choose.decide import choose
-from syncline_design.choose.enumerate import front_by_enumeration
-from syncline_design.choose.front import front
-from syncline_design.choose.outcome import Choice
-from syncline_design.choose.ranked import iter_best
-from syncline_design.diagnose.log import Log, StageLog
-from syncline_design.diagnose.simulation import scene
-from syncline_design.loading import load
+from syncline_design.choice.decide import choose
+from syncline_design.choice.enumerate import front_by_enumeration
+from syncline_design.choice.front import front
+from syncline_design.choice.outcome import Choice
+from syncline_design.choice.problem import build_problem, selection_of
+from syncline_design.choice.ranked import iter_best
+from syncline_design.diagnosis.scene import scene
+from syncline_design.logs.log import Log, StageLog
 from syncline_design.model.budget import budget
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
-from syncline_design.problem import build_problem, selection_of
-from syncline_design.recheck import recheck
-from syncline_design.simulate import SimulationSettings
-from syncline_design.simulate.conditioned import conditioned_monte_carlo
-from syncline_design.simulate.sampling import sample_errors
-from syncline_design.simulate.worst_case import WorstCase
-from syncline_design.timing import Constant, Empirical, Normal, TimingError, Uniform
-from syncline_design.verify import CheckSettings, check_file
+from syncline_design.model.timing import Constant, Empirical, Normal, TimingError, Uniform
+from syncline_design.simulation import SimulationSettings
+from syncline_design.simulation.conditioned import conditioned_monte_carlo
+from syncline_design.simulation.sampling import sample_errors
+from syncline_design.simulation.worst_case import WorstCase
+from syncline_design.spec.load import load
+from syncline_design.verdict.recheck import recheck
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 HOST, OTHER = "host:v", "host:w"
 EXACT = (0.0, 0.0, 0.0)

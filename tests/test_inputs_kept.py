@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from syncline_design.cli import app
-from syncline_design.result_files import OutputError, clear_stale, replace_whole, write_file
+from syncline_design.cli.app import app
+from syncline_design.machine.result_files import OutputError, clear_stale, replace_whole, write_file
 from test_study_inputs import BELOW, GRID, OWN, SPEC, track
 
 ROOT = Path(__file__).resolve().parent.parent

@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.diagnose.log import Log
-from syncline_design.diagnose.reading import read_log
-from syncline_design.loading import BadInput
+from syncline_design.logs.log import Log
+from syncline_design.logs.reading import read_log
+from syncline_design.spec.load import BadInput
 from tests.test_diagnose_log import NAMES, ROWS, columns, refusal, scanned, write
 from tests.world.geodesy import to_geodetic
 

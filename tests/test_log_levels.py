@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from syncline_design.diagnose.log import Log
-from syncline_design.diagnose.reading import read_log
+from syncline_design.logs.log import Log
+from syncline_design.logs.reading import read_log
 from tests.test_diagnose_log import columns, refusal, write
 from tests.world.geodesy import to_geodetic
 

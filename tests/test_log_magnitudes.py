@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.diagnose.delimited import dialect
-from syncline_design.diagnose.reading import read_log
-from syncline_design.loading import BadInput
+from syncline_design.logs.delimited import dialect
+from syncline_design.logs.reading import read_log
+from syncline_design.spec.load import BadInput
 from test_diagnose_log import columns, read, refusal, write
 
 # what is physically there: places on or about the Earth (an orbit of 42 000 km included), spinning

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from random_problems import random_problem, with_random_limits
-from syncline_design.choose import milp
-from syncline_design.choose.decide import choose
-from syncline_design.choose.enumerate import all_designs, best_by_enumeration
-from syncline_design.choose.evaluate import evaluate, rank
-from syncline_design.choose.milp import best_by_milp, is_recent
-from syncline_design.choose.outcome import Choice, Deadline, Infeasible, NoVerdict
-from syncline_design.design_space import Limits, Problem
+from syncline_design.choice import milp
+from syncline_design.choice.decide import choose
+from syncline_design.choice.enumerate import all_designs, best_by_enumeration
+from syncline_design.choice.evaluate import evaluate, rank
+from syncline_design.choice.milp import best_by_milp, is_recent
+from syncline_design.choice.outcome import Choice, Deadline, Infeasible, NoVerdict
+from syncline_design.choice.table import Limits, Problem
 from test_front import one_stage, option
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning", "ignore::FutureWarning")

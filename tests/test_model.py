@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from syncline_design.model import syncline
 from syncline_design.model.budget import Budget, budget, differs, lever_arm_m
 from syncline_design.model.pairing import largest
+from syncline_design.model.quantity import Dimension, parse_quantity
 from syncline_design.model.system import Platform, RoleName, Sensor, Stage, System
-from syncline_design.timing import Constant, Normal, TimingError, Uniform
-from syncline_design.units import Dimension, parse_quantity
+from syncline_design.model.timing import Constant, Normal, TimingError, Uniform
 
 DEG = math.pi / 180.0
 

@@ -10,17 +10,17 @@ from typing import Any
 import pytest
 
 from html_page import Page
-from syncline_design.loading import load_text
-from syncline_design.optimisation import (
+from syncline_design.report.axes import log_ticks
+from syncline_design.report.optimisations import render_optimize
+from syncline_design.report.pages import render_verdict
+from syncline_design.spec.load import load_text
+from syncline_design.verdict.optimise import (
     OptimizeSettings,
     optimisation_json,
     optimisation_text,
     optimize,
 )
-from syncline_design.report.axes import log_ticks
-from syncline_design.report.optimisations import render_optimize
-from syncline_design.report.pages import render_verdict
-from syncline_design.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 ROOT = Path(__file__).parent.parent
 PLAIN = CheckSettings(monte_carlo=False)
@@ -87,7 +87,7 @@ def test_a_datasheet_figure_reads_as_it_was_written() -> None:
     ],
 )
 def test_a_figure_in_the_unit_of_another(written: str, value_si: float, shown: str) -> None:
-    from syncline_design.units import format_like
+    from syncline_design.model.quantity import format_like
 
     assert format_like(written, value_si) == shown
 

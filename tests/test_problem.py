@@ -9,20 +9,20 @@ from pathlib import Path
 import mpmath
 import pytest
 
-from syncline_design import timing
-from syncline_design.choose.evaluate import evaluate
-from syncline_design.chosen_system import clock_error, timing_error
-from syncline_design.design_space import Design, Option, Problem, with_limits
-from syncline_design.exact_figures import norm, square_root, tau_bound
-from syncline_design.loading import LoadedSpec, load, load_text
-from syncline_design.model.budget import budget
-from syncline_design.problem import (
+from syncline_design.choice.chosen_system import clock_error, timing_error
+from syncline_design.choice.evaluate import evaluate
+from syncline_design.choice.problem import (
     build_problem,
     selection_of,
     sole_design,
     system_of,
     with_everything,
 )
+from syncline_design.choice.table import Design, Option, Problem, with_limits
+from syncline_design.model import timing
+from syncline_design.model.budget import budget
+from syncline_design.spec.exact import norm, square_root, tau_bound
+from syncline_design.spec.load import LoadedSpec, load, load_text
 
 SPECS = sorted((Path(__file__).parent.parent / "specs").glob("*.yaml"))
 

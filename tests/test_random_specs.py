@@ -13,9 +13,9 @@ import pytest
 import yaml
 
 from plain_enumeration import Enumeration, failed, limits_of, read_catalog
-from syncline_design.choose.front import front
-from syncline_design.loading import load
-from syncline_design.problem import build_problem
+from syncline_design.choice.front import front
+from syncline_design.choice.problem import build_problem
+from syncline_design.spec.load import load
 
 SPECS = sorted((Path(__file__).parent.parent / "specs").glob("*.yaml"))
 CATALOG = read_catalog()

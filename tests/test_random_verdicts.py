@@ -15,8 +15,8 @@ import pytest
 import yaml
 
 from plain_enumeration import Enumeration, Outcome, failed
-from syncline_design.loading import load
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.spec.load import load
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 from test_random_specs import MOST_DESIGNS, draw_spec, size
 
 WITHOUT_SIMULATION = CheckSettings(monte_carlo=False)

@@ -12,13 +12,13 @@ from typing import Any
 import mpmath
 import pytest
 
-from syncline_design.choose.evaluate import evaluate
-from syncline_design.choose.front import front
-from syncline_design.choose.ranked import iter_best
-from syncline_design.loading import LoadedSpec, load, load_text
-from syncline_design.problem import build_problem, selection_of, sole_design
-from syncline_design.recheck import IMPLIED_SYNC, NotADesign, recheck
-from syncline_design.selection import ClockSelection, Selection
+from syncline_design.choice.evaluate import evaluate
+from syncline_design.choice.front import front
+from syncline_design.choice.problem import build_problem, selection_of, sole_design
+from syncline_design.choice.ranked import iter_best
+from syncline_design.spec.load import LoadedSpec, load, load_text
+from syncline_design.spec.selection import ClockSelection, Selection
+from syncline_design.verdict.recheck import IMPLIED_SYNC, NotADesign, recheck
 
 ROOT = Path(__file__).parent.parent
 SPECS = sorted((ROOT / "specs").glob("*.yaml"))
@@ -239,10 +239,12 @@ def test_shares_no_code_with_what_it_checks() -> None:
     """The import contract is in force, and names every room that the recheck must not use."""
     config = tomllib.loads((ROOT / "pyproject.toml").read_text())
     contracts = config["tool"]["importlinter"]["contracts"]
-    own = [c for c in contracts if c.get("source_modules") == ["syncline_design.recheck"]]
+    own = [c for c in contracts if c.get("source_modules") == ["syncline_design.verdict.recheck"]]
     assert len(own) == 1
     forbidden = set(own[0]["forbidden_modules"])
-    assert {f"syncline_design.{room}" for room in ("choose", "problem", "model")} <= forbidden
-    text = (ROOT / "syncline_design" / "recheck.py").read_text()
-    for room in ("choose", "problem", "model", "design_space", "exact_figures", "timing"):
+    assert {
+        f"syncline_design.{room}" for room in ("choice", "spec.exact", "model.budget")
+    } <= forbidden
+    text = (ROOT / "syncline_design" / "verdict" / "recheck.py").read_text()
+    for room in ("choice", "model", "spec.exact", "spec.gnss", "simulation"):
         assert f"syncline_design.{room}" not in text

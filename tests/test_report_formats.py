@@ -15,7 +15,7 @@ import pytest
 
 import report_samples as samples
 from syncline_design.report.checks import CHECK_FORMATS, render_checks
-from syncline_design.report.findings import findings
+from syncline_design.report.ci import findings
 from syncline_design.report.json_out import json_text
 from syncline_design.report.sarif import artifact_uri
 from syncline_design.report.text import markdown_safe, spreadsheet_safe, visible

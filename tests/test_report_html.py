@@ -15,7 +15,7 @@ import pytest
 
 import report_samples as samples
 from html_page import Page
-from syncline_design.paper_errata import ERRATA
+from syncline_design.paper.errata import ERRATA
 from syncline_design.report import errata, figures
 from syncline_design.report.pages import render_verdict, render_verdicts
 from syncline_design.report.text import visible

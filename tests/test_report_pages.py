@@ -11,11 +11,7 @@ import pytest
 import report_samples as samples
 from html_page import Page
 from syncline_design.report import numbers
-from syncline_design.report.pages import (
-    render_diagnosis,
-    render_reproduction,
-    render_simulation,
-)
+from syncline_design.report.pages import render_diagnosis, render_reproduction, render_simulation
 from syncline_design.report.text import visible
 
 CASES = (
@@ -167,8 +163,8 @@ def test_a_finding_reads_the_same_on_console_page_markdown_and_json(
     """One estimate through all four outputs; mpmath undoes the unit and finds the value again."""
     from dataclasses import replace
 
-    from syncline_design.diagnose.findings import Figure, Finding
-    from syncline_design.diagnose.result import finding_json
+    from syncline_design.diagnosis.findings import Figure, Finding
+    from syncline_design.diagnosis.result import finding_json
     from syncline_design.effects import registry
     from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
 

@@ -8,19 +8,18 @@ from fractions import Fraction
 
 import pytest
 
-from syncline_design.catalog import Catalog
-from syncline_design.loading import load_builtin
 from syncline_design.model.budget import budget
-from syncline_design.paper_errata import ERRATA
-from syncline_design.paper_figures import (
+from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
+from syncline_design.paper.errata import ERRATA
+from syncline_design.paper.figures import (
     FIGURE_2_PAYLOAD,
     SURVEY_PAYLOAD,
     Figure,
     figures,
     survey_system,
 )
-from syncline_design.paper_tables import PRINTED
-from syncline_design.reproduce import (
+from syncline_design.paper.printed import PRINTED
+from syncline_design.paper.reproduce import (
     SCHEMA,
     Cell,
     Reproduction,
@@ -29,7 +28,8 @@ from syncline_design.reproduce import (
     tau_crit_cells,
     text,
 )
-from syncline_design.units import Dimension, Quantity, parse_quantity
+from syncline_design.spec.catalog import Catalog
+from syncline_design.spec.load import load_builtin
 
 
 @pytest.fixture(scope="module")
@@ -344,7 +344,7 @@ def test_a_single_bearing_sigma_holds_for_both_axes(catalog: Catalog, result: Re
 
 def test_one_display_unit_is_exact() -> None:
     """The comparison is made in fractions: 577.35 us against 577 us, one unit being 1 us."""
-    from syncline_design.reproduce import _cell
+    from syncline_design.paper.reproduce import _cell
 
     key = ("tau_crit_georeferencing", "ublox_f9p_rtk", "car")
 

@@ -10,17 +10,17 @@ from typing import Any
 import jsonschema
 import pytest
 
-from syncline_design.key_glossary import KEYS, STUDY_KEYS
-from syncline_design.loading import BadInput, load
-from syncline_design.scaffold import (
+from syncline_design.report.key_glossary import KEYS, STUDY_KEYS
+from syncline_design.report.scaffold import (
     SCHEMA_NAME,
     SPEC_NAME,
     STUDY_NAME,
     STUDY_SCHEMA_NAME,
     init_project,
 )
-from syncline_design.schema import json_schema, schema_text
-from syncline_design.yaml_reader import read
+from syncline_design.report.schema import json_schema, schema_text
+from syncline_design.spec.load import BadInput, load
+from syncline_design.spec.yaml_text import read
 
 ROOT = Path(__file__).parent.parent
 CORPUS = Path(__file__).parent / "corpus"
@@ -116,7 +116,7 @@ def test_the_starter_spec_is_accepted_by_loader_and_schema(tmp_path: Path) -> No
 
 
 def test_the_starter_study_runs_and_satisfies_its_schema(tmp_path: Path) -> None:
-    from syncline_design.study import load_study
+    from syncline_design.studies import load_study
 
     init_project(tmp_path)
     study = tmp_path / STUDY_NAME

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from syncline_design.diagnose import diagnose
-from syncline_design.diagnose.reading import read_log
-from syncline_design.diagnose.row_choice import Arranged, arranged, thinned
-from syncline_design.diagnose.tables import read_tables
+from syncline_design.diagnosis import diagnose
+from syncline_design.logs.reading import read_log
+from syncline_design.logs.row_choice import Arranged, arranged, thinned
+from syncline_design.logs.tables import read_tables
 
 Columns = dict[str, np.ndarray]
 LATENCY_S, SIGMA_M, RANGE_M = 0.06, 0.02, 0.005
@@ -167,7 +167,7 @@ def test_files_of_one_log_keep_the_same_windows() -> None:
 def test_the_kept_rows_are_the_file_s(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     made = scans(400, 3, 13, 0.0)
     path = write(tmp_path / "log.csv", made)
-    monkeypatch.setattr("syncline_design.diagnose.tables.thinned", lambda f: thinned(f, 240))
+    monkeypatch.setattr("syncline_design.logs.tables.thinned", lambda f: thinned(f, 240))
     (table,) = read_tables([path], {}, ("car",))
     assert table.rows == 1200
     assert len(table) + table.thinned == 1200

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from plain_enumeration import CATALOGS, bound_of, clock_bound, number, read_catalog
-from syncline_design.catalog import CatalogFile
-from syncline_design.timing import Normal, TimingError, Uniform, bound
-from syncline_design.yaml_reader import read
+from syncline_design.model.timing import Normal, TimingError, Uniform, bound
+from syncline_design.spec.catalog import CatalogFile
+from syncline_design.spec.yaml_text import read
 
 FILES = ("platforms", "sensors", "timestamping")
 SECTIONS = ("platforms", "sensors", "timestamping", "infrastructure", "clocks")

@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from plain_enumeration import Enumeration, Outcome, failed, limits_of, number, read_spec
-from syncline_design.cli import app
-from syncline_design.loading import load
+from syncline_design.cli.app import app
+from syncline_design.spec.load import load
 
 SPECS = sorted((Path(__file__).parent.parent / "specs").glob("*.yaml"))
 EXIT_CODES = {"meets": 0, "fails": 1, "infeasible": 1}

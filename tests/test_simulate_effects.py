@@ -19,12 +19,12 @@ from scipy.integrate import quad
 
 from syncline_design.effects import registry
 from syncline_design.effects.acting import contributions
-from syncline_design.effects.base import Array
-from syncline_design.horizon import Horizon
+from syncline_design.effects.record import Array
+from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
-from syncline_design.simulate import SimulationSettings, cross_check, sample_errors
-from syncline_design.simulate.sampling import JOB
-from syncline_design.timing import NO_ERROR
+from syncline_design.model.timing import NO_ERROR
+from syncline_design.simulation import SimulationSettings, cross_check, sample_errors
+from syncline_design.simulation.sampling import JOB
 
 V, W, D = 10.0, 0.8, 50.0
 T, EXTENT, TILT = 1800.0, 400.0, math.radians(20.0)

@@ -12,8 +12,8 @@ from scipy import stats
 from scipy.integrate import quad
 
 from syncline_design.model.system import EffectEntry, System
-from syncline_design.simulate import SimulationError, SimulationSettings, cross_check
-from syncline_design.simulate.conditioned import (
+from syncline_design.simulation import SimulationError, SimulationSettings, cross_check
+from syncline_design.simulation.conditioned import (
     Rays,
     conditional_moments,
     conditioned_monte_carlo,
@@ -21,24 +21,24 @@ from syncline_design.simulate.conditioned import (
     noise_curvature_m,
     rays,
 )
-from syncline_design.simulate.draws import RandomSource, generator, stage_draw, timing_draws
-from syncline_design.simulate.intervals import (
+from syncline_design.simulation.draws import RandomSource, generator, stage_draw, timing_draws
+from syncline_design.simulation.intervals import (
     binomial_cdf,
     binomial_quantile,
     incomplete_beta,
     proportion_interval,
     quantile_ranks,
 )
-from syncline_design.simulate.kernel import stage_error
-from syncline_design.simulate.quadrature import (
+from syncline_design.simulation.kernel import stage_error
+from syncline_design.simulation.quadrature import (
     LatticeSource,
     chi3_cdf,
     generating_vector,
     normal_quantile,
     student_quantile,
 )
-from syncline_design.simulate.sampling import error_distribution, job_errors
-from syncline_design.simulate.worst_case import WorstCase
+from syncline_design.simulation.sampling import error_distribution, job_errors
+from syncline_design.simulation.worst_case import WorstCase
 from tests.simulation_systems import DEG, fixed_wing, survey
 
 UNUSED = WorstCase(0.0, 1.0, 1.0, 1.0, 1.0, 0.0)

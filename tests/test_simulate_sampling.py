@@ -16,7 +16,8 @@ from scipy import stats
 
 from syncline_design.effects import registry
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
-from syncline_design.simulate import (
+from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
+from syncline_design.simulation import (
     SimulationError,
     SimulationSettings,
     cross_check,
@@ -27,18 +28,10 @@ from syncline_design.simulate import (
     worker,
     worst_cases,
 )
-from syncline_design.simulate.distribution import Binned, Values, add_counts, no_counts
-from syncline_design.simulate.draws import RandomSource, generator, timing_draw, timing_draws
-from syncline_design.simulate.intervals import proportion_interval
-from syncline_design.simulate.run import look_sizes, quantile_estimates
-from syncline_design.timing import (
-    NO_ERROR,
-    Constant,
-    Empirical,
-    Normal,
-    TimingError,
-    Uniform,
-)
+from syncline_design.simulation.distribution import Binned, Values, add_counts, no_counts
+from syncline_design.simulation.draws import RandomSource, generator, timing_draw, timing_draws
+from syncline_design.simulation.intervals import proportion_interval
+from syncline_design.simulation.run import look_sizes, quantile_estimates
 from tests.simulation_systems import fixed_wing, position_only, sensor, survey
 
 SIGMA = 0.02

@@ -13,24 +13,24 @@ import pytest
 from scipy import stats
 from scipy.spatial.transform import Rotation
 
-from syncline_design.input_files import FileContent
+from syncline_design.machine.input_files import FileContent
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
-from syncline_design.simulate import (
+from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
+from syncline_design.simulation import (
     SimulationError,
     SimulationSettings,
     cross_check,
     sample_errors,
     simulate,
 )
-from syncline_design.simulate.geodesy import ecef_from_ned, errors_in_ecef
-from syncline_design.simulate.summary import CSV_HEADER, duration, grid_csv, length, summary_text
-from syncline_design.simulate.trajectory import (
+from syncline_design.simulation.geodesy import ecef_from_ned, errors_in_ecef
+from syncline_design.simulation.summary import CSV_HEADER, duration, grid_csv, length, summary_text
+from syncline_design.simulation.trajectory import (
     MANOEUVRES,
     _file_track,
     _manoeuvre_track,
     rotation_log,
 )
-from syncline_design.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
 from tests.simulation_systems import DEG, altered, fixed_wing, position_only, sensor, survey
 
 PLATFORM = Platform(20.0, 0.5, 100.0)

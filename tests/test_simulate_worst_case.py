@@ -13,10 +13,10 @@ from scipy.optimize import minimize
 
 from syncline_design.model.budget import budget
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
-from syncline_design.simulate import comparison, worst_cases
-from syncline_design.simulate.bounds import references
-from syncline_design.simulate.worst_case import _Search, blocks
-from syncline_design.timing import NO_ERROR
+from syncline_design.model.timing import NO_ERROR
+from syncline_design.simulation import comparison, worst_cases
+from syncline_design.simulation.bounds import references
+from syncline_design.simulation.worst_case import _Search, blocks
 from tests.simulation_systems import DEG, altered, fixed_wing, position_only, survey, tilted
 
 

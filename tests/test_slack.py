@@ -10,11 +10,11 @@ from typing import Any
 
 import pytest
 
-from syncline_design.choose.presentation import slack_table
-from syncline_design.choose.slack import Slack, slack_ledger
-from syncline_design.design_space import Design, Problem
-from syncline_design.loading import LoadedSpec, load_text
-from syncline_design.problem import build_problem
+from syncline_design.choice.presentation import slack_table
+from syncline_design.choice.problem import build_problem
+from syncline_design.choice.slack import Slack, slack_ledger
+from syncline_design.choice.table import Design, Problem
+from syncline_design.spec.load import LoadedSpec, load_text
 
 Option = dict[str, Any]
 Tables = list[list[Option]]

@@ -11,15 +11,16 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from syncline_design.loading import BadInput, LoadedSpec, load, load_text
-from syncline_design.resolution import (
-    candidate_sensors,
-    platform_of,
-    sensor_id,
-    timestamping_of,
+from syncline_design.model.quantity import UNITS, Dimension, Quantity
+from syncline_design.spec.load import BadInput, LoadedSpec, load, load_text
+from syncline_design.spec.resolve import candidate_sensors, platform_of, sensor_id, timestamping_of
+from syncline_design.spec.spec import (
+    EffectChoice,
+    InlineTimestamping,
+    RoleChoice,
+    Waiver,
+    split_column,
 )
-from syncline_design.spec import EffectChoice, InlineTimestamping, RoleChoice, Waiver, split_column
-from syncline_design.units import UNITS, Dimension, Quantity
 
 SPECS = Path(__file__).parent.parent / "specs"
 SHIPPED = sorted(SPECS.glob("*.yaml"))

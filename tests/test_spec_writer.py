@@ -7,17 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from syncline_design.loading import BadInput, LoadedSpec, load, load_text
-from syncline_design.resolution import candidate_sensors, timestamping_of, usable_primitives
-from syncline_design.result_files import OutputError, write_file
-from syncline_design.spec import ROLE_NAMES, EffectChoice, InlineTimestamping
-from syncline_design.spec_writer import (
-    PinnedRole,
-    pinned_spec_text,
-    with_effects_text,
-    write_spec,
-)
-from syncline_design.yaml_reader import parse
+from syncline_design.machine.result_files import OutputError, write_file
+from syncline_design.spec.edit import PinnedRole, pinned_spec_text, with_effects_text, write_spec
+from syncline_design.spec.load import BadInput, LoadedSpec, load, load_text
+from syncline_design.spec.resolve import candidate_sensors, timestamping_of, usable_primitives
+from syncline_design.spec.spec import ROLE_NAMES, EffectChoice, InlineTimestamping
+from syncline_design.spec.yaml_text import parse
 
 SPECS = Path(__file__).parent.parent / "specs"
 SHIPPED = sorted(SPECS.glob("*.yaml"))

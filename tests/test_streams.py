@@ -16,12 +16,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from syncline_design.cli import app
-from syncline_design.diff import diff
-from syncline_design.loading import BadInput
-from syncline_design.report.differences import diff_text
-from syncline_design.streams import harmless
-from syncline_design.verify import check_file
+from syncline_design.cli.app import app
+from syncline_design.comparison.diff import diff
+from syncline_design.machine.streams import harmless
+from syncline_design.report.on_difference import diff_text
+from syncline_design.spec.load import BadInput
+from syncline_design.verdict.verify import check_file
 
 ROOT = Path(__file__).resolve().parent.parent
 COMMAND = Path(sys.executable).parent / "syncline-design"

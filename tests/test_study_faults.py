@@ -17,7 +17,7 @@ import pytest
 
 from study_specs import STUDY, write
 from syncline_design.report.studies import render_study
-from syncline_design.study import (
+from syncline_design.studies import (
     Progress,
     StudyError,
     StudyResult,
@@ -25,10 +25,10 @@ from syncline_design.study import (
     StudyStoppedError,
     run_study,
 )
-from syncline_design.study.case import CaseSettings, canonical, case_keys
-from syncline_design.study.loading import load_study
-from syncline_design.study.pool import MAX_DEATHS, Pool
-from syncline_design.study.store import Store
+from syncline_design.studies.case import CaseSettings, canonical, case_keys
+from syncline_design.studies.loading import load_study
+from syncline_design.studies.pool import MAX_DEATHS, Pool
+from syncline_design.studies.store import Store
 
 FORMATS = ("csv", "json", "junit", "sarif", "github", "markdown")
 # Limits that can be met: explaining an infeasible case takes many times longer than a check.
@@ -68,13 +68,13 @@ needs_proc = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="ne
 
 
 # Sources that change while the tests run would be another program, with other cases.
-FIXED = "from syncline_design.study import case\ncase.engine_sha256 = lambda: 'fixed'\n"
+FIXED = "from syncline_design.studies import case\ncase.engine_sha256 = lambda: 'fixed'\n"
 
 
 @pytest.fixture(autouse=True, scope="module")
 def _fixed_program() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("syncline_design.study.case.engine_sha256", lambda: "fixed")
+        patch.setattr("syncline_design.studies.case.engine_sha256", lambda: "fixed")
         yield
 
 
@@ -118,7 +118,7 @@ def test_a_killed_parent_resumes_and_ends_with_the_same_bytes(plain: Any, tmp_pa
     script = (
         f"import sys\n{FIXED}"
         "from pathlib import Path\n"
-        "from syncline_design.study import StudySettings, run_study\n"
+        "from syncline_design.studies import StudySettings, run_study\n"
         "if __name__ == '__main__':\n"
         "    run_study(sys.argv[1], StudySettings(workers=2, store=Path(sys.argv[2])))\n"
     )
@@ -261,7 +261,7 @@ def test_a_folder_that_cannot_be_written_is_a_clear_error(tmp_path: Path) -> Non
 def test_a_case_without_verdict_is_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from syncline_design import verify
+    from syncline_design.verdict import verify
 
     path = write(tmp_path)
     check = verify.check_loaded
@@ -315,7 +315,7 @@ def test_a_script_without_main_guard_gets_an_error_not_a_hang(tmp_path: Path) ->
     script = tmp_path / "unguarded.py"
     path = write(tmp_path, WIDER)
     script.write_text(
-        f"from syncline_design.study import run_study\nrun_study({str(path)!r})\n",
+        f"from syncline_design.studies import run_study\nrun_study({str(path)!r})\n",
         encoding="utf-8",
     )
     done = subprocess.run(
@@ -354,7 +354,7 @@ def test_a_dask_cluster_gives_the_same_bytes_with_a_worker_killed(
 
 def test_no_scheduler_is_a_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr("syncline_design.study.cluster.TIMEOUT", "1s")
+    monkeypatch.setattr("syncline_design.studies.cluster.TIMEOUT", "1s")
     with pytest.raises(StudyError, match="no Dask scheduler answers at"):
         run_study(write(tmp_path), StudySettings(scheduler="tcp://127.0.0.1:9"))
 

@@ -13,8 +13,8 @@ from typing import Any
 import pytest
 
 from syncline_design.report.studies import render_study
-from syncline_design.study import StudyResult, StudySettings, run_study
-from syncline_design.verify import check_file
+from syncline_design.studies import StudyResult, StudySettings, run_study
+from syncline_design.verdict.verify import check_file
 
 SPEC = """\
 syncline: 1

@@ -15,10 +15,10 @@ from syncline_design.report.figures_study import cost_map, sampled_cases
 from syncline_design.report.markdown import markdown_table
 from syncline_design.report.studies import render_study
 from syncline_design.report.study_words import MOST_ACROSS, heat_table, study_text
-from syncline_design.study import StudyResult, StudySettings, run_study
-from syncline_design.study.factors import Factor
-from syncline_design.study.scatter import scatter
-from syncline_design.study.summary import HeatMap, heat_map, summarise
+from syncline_design.spec.factors import Factor
+from syncline_design.studies import StudyResult, StudySettings, run_study
+from syncline_design.studies.scatter import scatter
+from syncline_design.studies.summary import HeatMap, heat_map, summarise
 from test_report_browser import Opened, browser  # noqa: F401  a fixture
 
 SAMPLE = """\

@@ -16,8 +16,8 @@ from study_specs import SPEC, STUDY, write
 from syncline_design.report.progress_line import ProgressLine
 from syncline_design.report.studies import STUDY_FORMATS, render_study
 from syncline_design.report.study_words import plain_table, progress_text, study_text
-from syncline_design.report.tables import table
-from syncline_design.study import Progress, StudyResult, StudySettings, run_study
+from syncline_design.report.table import table
+from syncline_design.studies import Progress, StudyResult, StudySettings, run_study
 
 LINE_OF_ACC = 4
 

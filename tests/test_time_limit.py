@@ -16,17 +16,17 @@ from typing import Any
 import pytest
 
 from random_problems import random_problem
-from syncline_design.choose import ranked
-from syncline_design.choose.decide import best, choose
-from syncline_design.choose.evaluate import evaluate
-from syncline_design.choose.outcome import Choice
-from syncline_design.choose.partition import iter_differing
-from syncline_design.choose.ranked import iter_best, lower_bound
-from syncline_design.cli import app
-from syncline_design.design_space import Design, Problem
-from syncline_design.loading import load
-from syncline_design.problem import build_problem
-from syncline_design.time_limit import Deadline, NoVerdict, OutOfTime, in_force, within
+from syncline_design.choice import ranked
+from syncline_design.choice.decide import best, choose
+from syncline_design.choice.evaluate import evaluate
+from syncline_design.choice.outcome import Choice
+from syncline_design.choice.partition import iter_differing
+from syncline_design.choice.problem import build_problem
+from syncline_design.choice.ranked import iter_best, lower_bound
+from syncline_design.choice.table import Design, Problem
+from syncline_design.cli.app import app
+from syncline_design.machine.deadline import Deadline, NoVerdict, OutOfTime, in_force, within
+from syncline_design.spec.load import load
 from test_front_ties import ROLES, as_problem, coarse_options, plain_designs
 
 SPECS = Path(__file__).parent.parent / "specs"
@@ -171,7 +171,7 @@ def test_search_gives_way_to_splitting_without_a_gap(
 @pytest.mark.parametrize("seed", range(12))
 def test_design_in_hand_meets_and_its_gap_holds(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """When no proof comes in time: a design that meets, not below the bound, gap at least true."""
-    from syncline_design.choose import decide
+    from syncline_design.choice import decide
 
     problem = random_problem(random.Random(seed + 40), 100)
     proven = choose(problem)
@@ -208,7 +208,7 @@ def test_unproven_design_ends_zero_and_says_so(
 ) -> None:
     from typer.testing import CliRunner
 
-    from syncline_design.choose import decide
+    from syncline_design.choice import decide
 
     def late(*_: Any) -> Any:
         raise OutOfTime("the time limit was reached")

@@ -10,8 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncline_design import timing
-from syncline_design.timing import Constant, Empirical, Normal, TimingError, Uniform
+from syncline_design.model import timing
+from syncline_design.model.timing import Constant, Empirical, Normal, TimingError, Uniform
 
 SECONDS = st.floats(-1.0, 1.0, allow_nan=False, width=32)
 WIDTHS = st.floats(0.0, 1.0, allow_nan=False, width=32)

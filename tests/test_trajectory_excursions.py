@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from syncline_design.loading import load
 from syncline_design.report.checks import render_checks
 from syncline_design.report.console import verdict_text
-from syncline_design.verify import CheckSettings, check_loaded
+from syncline_design.spec.load import load
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEC = """\
 syncline: 1

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncline_design.units import (
+from syncline_design.model.quantity import (
     CURRENCIES,
     EXAMPLES,
     PI,

@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from syncline_design.loading import BadInput, load_text
-from syncline_design.verify import CheckSettings, check_loaded, exit_code
+from syncline_design.spec.load import BadInput, load_text
+from syncline_design.verdict.verify import CheckSettings, check_loaded, exit_code
 
 PINNED = """\
 syncline: 1

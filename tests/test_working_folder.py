@@ -82,7 +82,7 @@ def test_an_empty_entry_of_the_search_path_is_not_handed_on(hostile: Path) -> No
     """`PYTHONPATH=$PYTHONPATH:/x` with nothing set before names the working folder."""
     code = (
         "import os, subprocess, sys\n"
-        "from syncline_design.processes import forget_working_folder, python_command\n"
+        "from syncline_design.machine.processes import forget_working_folder, python_command\n"
         "sys.path.insert(0, '')\n"
         f"os.environ['PYTHONPATH'] = os.pathsep + {str(ROOT)!r} + os.pathsep + '.'\n"
         "forget_working_folder()\n"

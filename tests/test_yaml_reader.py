@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncline_design import yaml_reader
-from syncline_design.spec_writer import flow_text, yaml_text
-from syncline_design.yaml_reader import Number, parse, plain_scalar, read, show_path
+from syncline_design.spec import yaml_text as yaml_reader
+from syncline_design.spec.edit import flow_text, yaml_text
+from syncline_design.spec.yaml_text import Number, parse, plain_scalar, read, show_path
 
 ROOT = Path(__file__).parent.parent
 SHIPPED = sorted([*ROOT.glob("specs/*.yaml"), *ROOT.glob("catalogs/*.yaml")])

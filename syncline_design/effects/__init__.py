@@ -6,9 +6,9 @@ from functools import cache
 from importlib import import_module
 from pkgutil import iter_modules
 
-from syncline_design.effects.base import Effect
+from syncline_design.effects.record import Effect
 
-NOT_EFFECTS = frozenset({"acting", "base", "kinematics"})
+NOT_EFFECTS = frozenset({"acting", "kinematics", "record"})
 
 
 @cache

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from syncline_design.effects import registry
-from syncline_design.effects.base import (
+from syncline_design.effects.record import (
     NOTHING,
     Basis,
     Contribution,

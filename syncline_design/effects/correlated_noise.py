@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.base import (
+from syncline_design.effects.kinematics import wander
+from syncline_design.effects.record import (
     Basis,
     Contribution,
     Covariance,
@@ -17,7 +18,6 @@ from syncline_design.effects.base import (
     Values,
     Wander,
 )
-from syncline_design.effects.kinematics import wander
 from syncline_design.model.system import Stage
 
 AXES = np.ones(3)

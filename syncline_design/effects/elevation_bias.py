@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.base import (
+from syncline_design.effects.kinematics import column, rotate
+from syncline_design.effects.record import (
     Array,
     Basis,
     Contribution,
@@ -16,7 +17,6 @@ from syncline_design.effects.base import (
     Target,
     Values,
 )
-from syncline_design.effects.kinematics import column, rotate
 from syncline_design.model.system import Stage
 
 

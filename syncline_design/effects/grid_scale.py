@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.base import (
+from syncline_design.effects.record import (
     Array,
     Basis,
     Contribution,

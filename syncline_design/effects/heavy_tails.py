@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from syncline_design.effects.base import (
+from syncline_design.effects.record import (
     Basis,
     Contribution,
     Departures,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from syncline_design.effects.base import (
+from syncline_design.effects.kinematics import column, shifted
+from syncline_design.effects.record import (
     Basis,
     Contribution,
     Departures,
@@ -13,7 +14,6 @@ from syncline_design.effects.base import (
     Target,
     Values,
 )
-from syncline_design.effects.kinematics import column, shifted
 from syncline_design.model.system import Stage
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.base import Array, Departures, StageRows, Target
+from syncline_design.effects.record import Array, Departures, StageRows, Target
 
 
 def bearing(azimuth_rad: Array, elevation_rad: Array) -> Array:

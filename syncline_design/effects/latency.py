@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from syncline_design.effects.base import (
+from syncline_design.effects.kinematics import antenna_velocity, column, sweep_velocity
+from syncline_design.effects.record import (
     Array,
     Basis,
     Contribution,
@@ -14,7 +15,6 @@ from syncline_design.effects.base import (
     Target,
     Values,
 )
-from syncline_design.effects.kinematics import antenna_velocity, column, sweep_velocity
 from syncline_design.model.system import Stage
 
 

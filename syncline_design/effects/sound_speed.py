@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from syncline_design.effects.base import (
+from syncline_design.effects.kinematics import column, ranging_vector, rotate
+from syncline_design.effects.record import (
     Array,
     Basis,
     Contribution,
@@ -18,7 +19,6 @@ from syncline_design.effects.base import (
     Target,
     Values,
 )
-from syncline_design.effects.kinematics import column, ranging_vector, rotate
 from syncline_design.model.system import Stage
 
 ACOUSTIC = ("usbl", "mbes")

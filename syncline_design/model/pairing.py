@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from syncline_design import timing
+from syncline_design.model import timing
 from syncline_design.model.system import UTC, RoleName, Sensor, Stage, System
 
 ExtraTau = Mapping[tuple[str, RoleName], float]

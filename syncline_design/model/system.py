@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from syncline_design.horizon import DEFAULT_HORIZON, Horizon
-from syncline_design.timing import NO_ERROR, TimingError
+from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
+from syncline_design.model.timing import NO_ERROR, TimingError
 
 RoleName = Literal["position", "attitude", "ranging"]
 ROLES: tuple[RoleName, ...] = ("position", "attitude", "ranging")

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from difflib import get_close_matches
 from typing import Any
 
-from syncline_design.catalog import Catalog, Entry
-from syncline_design.design_data import figure_text
 from syncline_design.report.console import table
 from syncline_design.report.text import visible
+from syncline_design.spec.catalog import Catalog, Entry
+from syncline_design.verdict.design_data import figure_text
 
 SECTIONS = ("platforms", "sensors", "timestamping", "infrastructure", "clocks")
 _TEXT_FIELDS = ("name", "source", "basis", "note")

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 
 from syncline_design.report import numbers
-from syncline_design.report.tables import Cell, Table, Tone, table
+from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_tables import currency_of
 from syncline_design.report.verdict_words import KINDS, PRIMITIVES, Json, items, named, part

@@ -9,10 +9,10 @@ from collections.abc import Iterable, Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
-from syncline_design.horizon import duration_words
+from syncline_design.model.horizon import duration_words
+from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import qualification
-from syncline_design.units import Dimension, format_quantity
 
 Data = Mapping[str, Any]
 

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from syncline_design.report.findings import spec_file, spec_name
+from syncline_design.report.ci import spec_file, spec_name
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import spreadsheet_safe
 from syncline_design.report.verdict_words import Json, items

@@ -17,6 +17,6 @@ def render_diagnose(name: str, data: dict[str, Any]) -> str:
         from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
 
         return render_diagnosis_markdown(data)
-    from syncline_design.report.diagnosis_page import render_diagnosis
+    from syncline_design.report.on_diagnosis import render_diagnosis
 
     return render_diagnosis(data)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from syncline_design.report.diagnosis_page import (
+from syncline_design.report.markdown import markdown_table
+from syncline_design.report.on_diagnosis import (
     check_sentences,
     design_lines,
     finding_words,
@@ -14,7 +15,6 @@ from syncline_design.report.diagnosis_page import (
     remaining_text,
     sentence_text,
 )
-from syncline_design.report.markdown import markdown_table
 from syncline_design.report.text import markdown_safe
 from syncline_design.report.verdict_words import Json, items, part
 

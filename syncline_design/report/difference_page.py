@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from syncline_design.report import numbers, page
-from syncline_design.report.differences import (
+from syncline_design.report.on_difference import (
     cause_words,
     effect_words,
     headline,
@@ -13,7 +13,7 @@ from syncline_design.report.differences import (
     signed_change,
     sum_name,
 )
-from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import harmless
 from syncline_design.report.verdict_words import (
     OUTCOMES,

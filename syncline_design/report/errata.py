@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from syncline_design.paper_errata import ERRATA
+from syncline_design.paper.errata import ERRATA
 from syncline_design.report.verdict_tables import roles
 from syncline_design.report.verdict_words import Json, items, part
 

@@ -16,8 +16,8 @@ from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.svg import InlineFigure, add_axes, draw
 from syncline_design.report.text import shortened
-from syncline_design.study.scatter import Scatter, ScatterAxis
-from syncline_design.study.summary import HeatMap
+from syncline_design.studies.scatter import Scatter, ScatterAxis
+from syncline_design.studies.summary import HeatMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

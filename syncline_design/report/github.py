@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from syncline_design.report.findings import SILENT, Finding, all_findings, spec_file, spec_name
+from syncline_design.report.ci import SILENT, Finding, all_findings, spec_file, spec_name
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import Json, design_sentence, outcome
 

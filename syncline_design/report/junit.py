@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from syncline_design.report.findings import Finding, findings, spec_file, spec_name
+from syncline_design.report.ci import Finding, findings, spec_file, spec_name
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import Json, outcome
 

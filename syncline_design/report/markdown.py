@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from syncline_design.report import numbers, verdict_tables
-from syncline_design.report.findings import no_design_text, spec_file, spec_name
-from syncline_design.report.tables import Table
+from syncline_design.report.ci import no_design_text, spec_file, spec_name
+from syncline_design.report.table import Table
 from syncline_design.report.text import markdown_safe
 from syncline_design.report.verdict_words import Json, design_sentence, items, outcome, part
 

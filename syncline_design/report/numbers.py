@@ -6,9 +6,9 @@ import math
 from collections.abc import Mapping
 from typing import Any, Final
 
-from syncline_design import estimates
-from syncline_design.horizon import duration_words
-from syncline_design.units import Dimension, format_quantity
+from syncline_design.model import estimates
+from syncline_design.model.horizon import duration_words
+from syncline_design.model.quantity import Dimension, format_quantity
 
 MISSING: Final = "\N{EM DASH}"
 _TYPOGRAPHIC = (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from syncline_design.optimisation import Optimisation, optimisation_csv, optimisation_json
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
+from syncline_design.verdict.optimise import Optimisation, optimisation_csv, optimisation_json
 
 _HINGES: Final = ("staircase", "slack", "tolerances", "measure_next")
 
@@ -18,7 +18,7 @@ def render_optimize(name: str, found: Optimisation) -> str:
         from syncline_design.report.json_out import json_text
 
         return json_text(optimisation_json(found))
-    from syncline_design.report.verdict_page import render_verdict
+    from syncline_design.report.on_verdict import render_verdict
 
     verdict = found.verdict or {}
     told = optimisation_json(found)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from syncline_design.report import numbers, page, verdict_tables, verdict_words
-from syncline_design.report.findings import spec_file, spec_name
-from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.ci import spec_file, spec_name
+from syncline_design.report.on_verdict import render_verdict
+from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import harmless
-from syncline_design.report.verdict_page import render_verdict
 from syncline_design.report.verdict_words import Json, items, part
 
 

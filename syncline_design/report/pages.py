@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from syncline_design.report.diagnosis_page import render_diagnosis
+from syncline_design.report.on_diagnosis import render_diagnosis
+from syncline_design.report.on_paper import render_reproduction
+from syncline_design.report.on_simulation import render_simulation
+from syncline_design.report.on_verdict import render_verdict
 from syncline_design.report.overview_page import render_verdicts
-from syncline_design.report.reproduction_page import render_reproduction
-from syncline_design.report.simulation_page import render_simulation
-from syncline_design.report.verdict_page import render_verdict
 
 __all__ = [
     "render_diagnosis",

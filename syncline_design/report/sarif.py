@@ -13,7 +13,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from syncline_design import __version__
-from syncline_design.report.findings import SILENT, Finding, all_findings
+from syncline_design.report.ci import SILENT, Finding, all_findings
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import Json

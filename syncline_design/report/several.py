@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from syncline_design.report.text import sentence_list, visible
 from syncline_design.report.verdict_words import Json
-from syncline_design.spec_folders import Skipped
+from syncline_design.spec.folders import Skipped
 
 _WORDS = {
     "meets": ("meets its requirements", "meet their requirements"),

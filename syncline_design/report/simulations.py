@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from syncline_design.report.formats import SIMULATE_FORMATS as SIMULATE_FORMATS
-from syncline_design.simulate.summary import grid_csv
-from syncline_design.simulated_spec import SimulatedSpec
+from syncline_design.simulation.summary import grid_csv
+from syncline_design.verdict.simulated_spec import SimulatedSpec
 
 
 def render_simulate(name: str, run: SimulatedSpec) -> str:
@@ -15,6 +15,6 @@ def render_simulate(name: str, run: SimulatedSpec) -> str:
         from syncline_design.report.json_out import json_text
 
         return json_text(run.to_json())
-    from syncline_design.report.simulation_page import render_simulation
+    from syncline_design.report.on_simulation import render_simulation
 
     return render_simulation(run.to_json())

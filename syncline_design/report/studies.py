@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from syncline_design.report.formats import STUDY_FORMATS as STUDY_FORMATS
-from syncline_design.study.result import StudyResult
+from syncline_design.studies.result import StudyResult
 
 
 def render_study(name: str, result: StudyResult) -> str | bytes:
@@ -23,7 +23,7 @@ def render_study(name: str, result: StudyResult) -> str | bytes:
 
             return json_text(study_data(result))
         case "html":
-            from syncline_design.report.study_page import render_study_page
+            from syncline_design.report.on_study import render_study_page
 
             return render_study_page(result)
         case "markdown":

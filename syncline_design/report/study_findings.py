@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any
 from xml.etree import ElementTree
 
-from syncline_design.report.findings import Finding, Level, requirement_sentence
+from syncline_design.report.ci import Finding, Level, requirement_sentence
 from syncline_design.report.study_rows import reason
 from syncline_design.report.study_words import outcome, rule_sentence
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import Json, is_waived, items
-from syncline_design.study.result import CaseResult, StudyResult
+from syncline_design.studies.result import CaseResult, StudyResult
 
 
 @dataclass
@@ -148,8 +148,8 @@ def study_data(result: StudyResult) -> dict[str, Any]:
 
     from syncline_design import __version__
     from syncline_design.report.study_rows import rows, si_unit
-    from syncline_design.study.factors import label
-    from syncline_design.study.summary import boundaries, heat_map, summarise, winners
+    from syncline_design.spec.factors import label
+    from syncline_design.studies.summary import boundaries, heat_map, summarise, winners
 
     study, summary = result.study, summarise(result)
     heat = heat_map(summary)

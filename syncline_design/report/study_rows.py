@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from syncline_design.model.quantity import Dimension
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import design_sentence, items
-from syncline_design.study.factors import Factor, figure_of
-from syncline_design.study.result import CaseResult, StudyResult
-from syncline_design.study.summary import picks_of
-from syncline_design.units import Dimension
+from syncline_design.spec.factors import Factor, figure_of
+from syncline_design.studies.result import CaseResult, StudyResult
+from syncline_design.studies.summary import picks_of
 
 Json = dict[str, Any]
 _SI_UNITS = {

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 
 from syncline_design.report import numbers
 from syncline_design.report.markdown import markdown_table
-from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import markdown_safe, sentence_list, visible
 from syncline_design.report.verdict_words import OUTCOMES, Outcome
-from syncline_design.study.progress import Progress
-from syncline_design.study.result import StudyResult
-from syncline_design.study.summary import (
+from syncline_design.studies.progress import Progress
+from syncline_design.studies.result import StudyResult
+from syncline_design.studies.summary import (
     HeatMap,
     Summary,
     boundaries,

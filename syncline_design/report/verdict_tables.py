@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from syncline_design.report import numbers
-from syncline_design.report.tables import Cell, Table, table
+from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import (
     PRIMITIVES,
     Json,

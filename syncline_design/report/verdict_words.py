@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from syncline_design.report import numbers
-from syncline_design.report.tables import Tone
+from syncline_design.report.table import Tone
 from syncline_design.report.text import sentence_list, visible
 
 Json = Mapping[str, Any]

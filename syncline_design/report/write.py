@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from syncline_design.machine.result_files import OutputError, descriptor_of, is_stream, write_files
 from syncline_design.report.formats import NOT_FOR_A_TERMINAL
-from syncline_design.result_files import OutputError, descriptor_of, is_stream, write_files
 
 __all__ = [
     "STDOUT", "OutputError", "Target", "check_targets", "check_writable", "parse_target",

@@ -1,0 +1,89 @@
+"""The one predicate: a design is acceptable when it meets every requirement.
+
+Sums (accuracy, sync, cost, mass, power) are decided exactly, simulated quantiles by the problem's
+judge; known effects are part of both.  Choice, front, prices, runners-up, ledger, measurements and
+fixes all ask here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from syncline_design.choice.evaluate import broken, evaluate
+from syncline_design.choice.narrowed import Narrowed, kept
+from syncline_design.choice.outcome import Deadline
+from syncline_design.choice.ranked import iter_best
+from syncline_design.choice.table import Design, Judgement, Problem
+
+NOTHING_SIMULATED = Judgement()
+
+
+def judgement(problem: Problem, design: Design) -> Judgement:
+    """What simulation says of a design."""
+    return NOTHING_SIMULATED if problem.judge is None else problem.judge.judge(problem, design)
+
+
+def refusals(problem: Problem) -> int:
+    """How often simulation was refused because too many designs had been simulated."""
+    return 0 if problem.judge is None else problem.judge.refusals
+
+
+def unmet(problem: Problem, design: Design) -> tuple[str, ...]:
+    """Kinds of requirement that a design does not meet; none: it is acceptable."""
+    kinds = broken(problem, evaluate(problem, design))
+    if kinds or judgement(problem, design).passed:
+        return kinds
+    return ("monte_carlo",)
+
+
+def iter_acceptable(
+    problem: Problem, deadline: Deadline | None = None
+) -> Iterator[tuple[Design, Judgement]]:
+    """Designs that meet all requirements, best first; those that simulation leaves open as such."""
+    for design, found in iter_judged(problem, deadline):
+        if not found.failed:
+            yield design, found
+
+
+def iter_judged(
+    problem: Problem, deadline: Deadline | None = None
+) -> Iterator[tuple[Design, Judgement]]:
+    """Designs that keep every sum, best first, with what simulation says of them.
+
+    From the first that fails on, sensors whose noise alone fails are left out.
+    """
+    known: set[Design] = set()
+    some_failed = False
+    for design in iter_best(problem, deadline):
+        found = judgement(problem, design)
+        known.add(design)
+        yield design, found
+        if found.failed:
+            some_failed = True
+            break
+    if not some_failed:
+        return
+    smaller = promising(problem)
+    if smaller.is_empty:
+        return
+    for inner in iter_best(smaller.problem, deadline):
+        design = smaller.whole(inner)
+        if design not in known:
+            yield design, judgement(problem, design)
+
+
+def promising(problem: Problem) -> Narrowed:
+    """The problem without the options that simulation rules out by their sensor alone."""
+    judge = problem.judge
+    assert judge is not None
+    return kept(
+        problem,
+        lambda r, option: not judge.hopeless(problem, r, option),
+        lambda _, clock: True,
+    )
+
+
+def without_simulation(problem: Problem) -> Problem:
+    """The problem with the sums alone."""
+    return replace(problem, judge=None)

@@ -1,0 +1,151 @@
+"""A chosen design as a System: what the Syncline, the simulator and the effects take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from syncline_design.choice.table import Design, Option, Problem
+from syncline_design.model import timing
+from syncline_design.model.system import (
+    ROLES,
+    UTC,
+    EffectEntry,
+    Platform,
+    RoleName,
+    Sensor,
+    Stage,
+    System,
+)
+from syncline_design.spec.catalog import (
+    ClockEntry,
+    ConstantError,
+    NormalError,
+    SensorEntry,
+    TimestampError,
+    UniformError,
+)
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.resolve import candidate_sensors, platform_of
+from syncline_design.spec.spec import InlineTimestamping, StageChoice
+
+Vector = tuple[float, float, float]
+
+
+def system_of(
+    loaded: LoadedSpec, problem: Problem, design: Design, effects: tuple[EffectEntry, ...] = ()
+) -> System:
+    """The system that a design of this problem is."""
+    chosen = {
+        (table.stage, table.role): table.options[place]
+        for table, place in zip(problem.roles, design.options, strict=True)
+    }
+    stages = tuple(
+        _stage(loaded, index, {role: chosen.get((index, role)) for role in ROLES})
+        for index in range(len(loaded.spec.stages))
+    )
+    offsets = []
+    for vehicle, place in zip(problem.vehicles, design.clocks, strict=True):
+        identity = vehicle.clocks[place].id
+        if identity is not None:
+            error = clock_error(loaded.catalog.clocks[identity])
+            offsets.append((host_timeline(vehicle.name), error))
+    factor = float(loaded.spec.coverage_factor)
+    return System(stages, factor, tuple(offsets), effects, loaded.spec.horizon.horizon())
+
+
+def host_timeline(vehicle: str) -> str:
+    """Name of the timeline of a vehicle's host clock."""
+    return f"host:{vehicle}"
+
+
+def timing_error(entry: TimestampError) -> timing.TimingError:
+    """A catalog's timestamp error as the model takes it."""
+    left = None if entry.calibrated is None else float(entry.calibrated)
+    return timing.TimingError(_distribution(entry), left)
+
+
+def _distribution(entry: TimestampError) -> timing.Distribution:
+    if isinstance(entry, UniformError):
+        return timing.Uniform(float(entry.low), float(entry.high))
+    if isinstance(entry, NormalError):
+        return timing.Normal(float(entry.mean), float(entry.std))
+    if isinstance(entry, ConstantError):
+        return timing.Constant(float(entry.value))
+    return timing.Empirical(tuple(float(value) for value in entry.values or ()))
+
+
+def clock_error(entry: ClockEntry) -> timing.TimingError:
+    """Offset of a host clock against UTC, with what it drifts away in holdover.
+
+    The drift's sign is unknown: plus and minus drift times holdover, beside the offset's own draw.
+    """
+    offset = timing_error(entry.offset)
+    if entry.drift is None or entry.holdover is None:
+        return offset
+    return replace(offset, drifted_s=abs(float(entry.drift)) * float(entry.holdover))
+
+
+def _stage(loaded: LoadedSpec, index: int, chosen: dict[RoleName, Option | None]) -> Stage:
+    choice = loaded.spec.stages[index]
+    entry = platform_of(choice.platform, loaded.catalog)
+    platform = Platform(
+        float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline)
+    )
+    sensors = {
+        role: _sensor(loaded, choice, role, option) if option is not None else None
+        for role, option in chosen.items()
+    }
+    transponder = choice.position.lever_arm if index > 0 and choice.position else None
+    return Stage(
+        name=choice.name,
+        vehicle=choice.vehicle_name,
+        platform=platform,
+        position=sensors["position"],
+        attitude=sensors["attitude"],
+        ranging=sensors["ranging"],
+        transponder_lever_arm_m=_vector(transponder),
+    )
+
+
+def _vector(arm: Sequence[float] | None) -> Vector | None:
+    return None if arm is None else (float(arm[0]), float(arm[1]), float(arm[2]))
+
+
+def _sensor(loaded: LoadedSpec, stage: StageChoice, role: RoleName, option: Option) -> Sensor:
+    choice = stage.role(role)
+    assert choice is not None
+    candidates = dict(candidate_sensors(loaded.spec, stage, role, loaded.catalog))
+    entry = candidates[option.sensor]
+    own = choice.timestamping
+    error = (
+        own.error
+        if isinstance(own, InlineTimestamping)
+        else loaded.catalog.timestamping[option.method].error
+    )
+    return Sensor(
+        id=option.sensor,
+        role=role,
+        sigma=_sigma(entry, role),
+        timing=timing_error(error),
+        timeline=UTC if option.timeline == "utc" else host_timeline(stage.vehicle_name),
+        lever_arm_m=_vector(choice.lever_arm),
+        type=entry.type,
+    )
+
+
+def _sigma(entry: SensorEntry, role: RoleName) -> Vector:
+    """Standard deviations per axis; one figure holds for each of them."""
+    if role == "ranging":
+        azimuth, elevation = _axes(entry.sigma_bearing, 2)
+        return (float(entry.sigma_range or 0.0), azimuth, elevation)
+    north, east, down = _axes(
+        entry.sigma_position if role == "position" else entry.sigma_attitude, 3
+    )
+    return (north, east, down)
+
+
+def _axes(figures: float | Sequence[float] | None, count: int) -> tuple[float, ...]:
+    if figures is None or isinstance(figures, float | int):
+        return (float(figures or 0.0),) * count
+    return tuple(float(figure) for figure in figures)

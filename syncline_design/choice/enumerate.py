@@ -1,0 +1,60 @@
+"""Plain enumeration: every design, one by one.  Slow, obvious, the oracle of the other roads."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+from syncline_design.choice.evaluate import Evaluation, broken, error_key, evaluate, rank
+from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
+from syncline_design.choice.table import Design, Problem, ResourceName
+from syncline_design.machine.deadline import in_force
+
+MOST_COMBINATIONS = 300_000
+
+
+def all_designs(
+    problem: Problem, deadline: Deadline | None = None
+) -> Iterator[tuple[Design, Evaluation]]:
+    """Every design with what it costs and reaches; NoVerdict after the deadline."""
+    end = deadline or in_force()
+    if problem.combinations > MOST_COMBINATIONS:
+        raise TooLarge(
+            f"{problem.combinations:.3g} combinations are too many to enumerate "
+            f"(at most {MOST_COMBINATIONS})"
+        )
+    option_ranges = [range(len(role.options)) for role in problem.roles]
+    clock_ranges = [range(len(vehicle.clocks)) for vehicle in problem.vehicles]
+    for options in itertools.product(*option_ranges):
+        end.check()
+        for clocks in itertools.product(*clock_ranges):
+            design = Design(options, clocks)
+            yield design, evaluate(problem, design)
+
+
+def best_by_enumeration(problem: Problem, deadline: Deadline | None = None) -> Design | None:
+    """The first design, in the documented order, that meets every requirement."""
+    feasible = [
+        (rank(problem, design, found), design)
+        for design, found in all_designs(problem, deadline)
+        if not broken(problem, found)
+    ]
+    return min(feasible, key=lambda entry: entry[0])[1] if feasible else None
+
+
+def front_by_enumeration(
+    problem: Problem, resource: ResourceName = "cost"
+) -> tuple[FrontPoint, ...]:
+    """The Pareto front over all designs that meet every requirement but accuracy."""
+    found = []
+    for design, evaluation in all_designs(problem):
+        amount = evaluation.amount(resource)
+        if amount is not None and not broken(problem, evaluation, accuracy=False):
+            ranked = rank(problem, design, evaluation)[2:]
+            found.append((amount, error_key(evaluation.error_m), ranked, evaluation, design))
+    found.sort(key=lambda entry: entry[:3])
+    points: list[FrontPoint] = []
+    for amount, error, _, evaluation, design in found:
+        if not points or error < error_key(points[-1].error_m):
+            points.append(FrontPoint(amount, evaluation.error_m, design))
+    return tuple(points)

@@ -1,0 +1,221 @@
+"""Smallest changes that make an infeasible spec feasible, each solved again as it would be written.
+
+A fix is applied to the loaded spec (its limit, its platform, its methods) and the whole choice is
+made anew, simulation and known effects included, before it is offered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, Literal
+
+from syncline_design.choice.outcome import NoVerdict
+from syncline_design.choice.parts import SIMULATED, Part, is_feasible, least, parts_of, solve
+from syncline_design.choice.table import Problem
+from syncline_design.choice.variations import Build, with_methods
+from syncline_design.choice.written import in_unit_of, money, plain
+from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.resolve import candidate_sensors, timestamping_of, usable_primitives
+from syncline_design.spec.spec import InlineTimestamping, Requirement
+
+FixKind = Literal[
+    "accuracy", "sync", "cost", "mass", "power", "monte_carlo", "platform", "timestamping"
+]
+MOST_METHODS = 3
+TRIES = 6
+WIDENING = Fraction(1, 100)  # by which a simulated limit is widened when it does not hold yet
+IMPLIED = "SYNC"
+DIMENSIONS = {
+    "accuracy": Dimension.LENGTH,
+    "monte_carlo": Dimension.LENGTH,
+    "mass": Dimension.MASS,
+    "power": Dimension.POWER,
+}
+UNITS_OF = {"accuracy": "m", "monte_carlo": "m", "sync": "1", "mass": "kg", "power": "W"}
+
+
+@dataclass(frozen=True, slots=True)
+class Fix:
+    """One change that was solved again and does make the spec feasible.
+
+    requirement: id of the requirement it changes, None where it changes something else; figure and
+    stage: of the platform figure that it changes.  before, after: the figure in SI or the spec's
+    currency (None: not a figure), unit: theirs.
+    """
+
+    kind: FixKind
+    requirement: str | None
+    before: float | None
+    after: float | None
+    text: str
+    figure: str | None = None
+    stage: str | None = None
+    unit: str | None = None
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry under `fixes`."""
+        return {
+            "kind": self.kind,
+            "requirement": self.requirement,
+            "figure": self.figure,
+            "stage": self.stage,
+            "from": self.before,
+            "to": self.after,
+            "unit": self.unit,
+            "text": self.text,
+            "proven": True,
+        }
+
+
+Move = tuple[Requirement | None, float, Quantity]  # requirement (None: implied), before, after
+
+
+def requirement_fixes(
+    loaded: LoadedSpec, problem: Problem, build: Build
+) -> Iterator[tuple[Fix, ...]]:
+    """For each requirement alone the least relaxation that helps.
+
+    Several fixes at once where two requirements of a kind stand in the way.
+    """
+    for part in parts_of(problem):
+        try:
+            value = least(problem, part)
+            found = value and proven(loaded, problem, build, {part: value})
+        except NoVerdict:  # a remedy that cannot be proven is not offered
+            continue
+        if found:
+            yield found
+
+
+def proven(
+    loaded: LoadedSpec, problem: Problem, build: Build, values: Mapping[Part, Fraction]
+) -> tuple[Fix, ...] | None:
+    """The changes that bring limits to these values, if the spec so written has a design."""
+    for attempt in range(TRIES):
+        moves = [
+            move
+            for part, value in values.items()
+            for move in _moves(loaded, problem, part, _widened(part, value, attempt))
+        ]
+        if moves and is_feasible(build(with_moves(loaded, moves))):
+            return tuple(_fix(loaded, move) for move in moves)
+        if not any(part.kind == SIMULATED for part in values):
+            return None
+    return None
+
+
+def as_written(loaded: LoadedSpec, problem: Problem, part: Part, value: Fraction) -> Fraction:
+    """The limit that a value becomes once it is written with so many figures."""
+    afters = [after for _, _, after in _moves(loaded, problem, part, value)]
+    if part.kind == "cost":
+        return min((loaded.spec.in_currency(after) for after in afters), default=value)
+    return min((after.exact for after in afters), default=value)
+
+
+def _widened(part: Part, value: Fraction, attempt: int) -> Fraction:
+    return value * (1 + attempt * WIDENING) if part.kind == SIMULATED else value
+
+
+def _moves(loaded: LoadedSpec, problem: Problem, part: Part, value: Fraction) -> Iterator[Move]:
+    """Requirements whose limit has to move for the kind's to reach a value, and where to."""
+    if part.kind == "sync" and part.id is None:
+        yield None, problem.limits.sync, plain(value, up=True)
+        return
+    for requirement in loaded.spec.requirements:
+        if requirement.kind != part.kind or (part.kind == SIMULATED and requirement.id != part.id):
+            continue
+        before = _limit(loaded, requirement)
+        if before < value:
+            yield requirement, float(before), _rounded_up(loaded, requirement, value)
+
+
+def _limit(loaded: LoadedSpec, requirement: Requirement) -> Fraction:
+    """A requirement's limit in SI or the spec's currency."""
+    limit = requirement.limit
+    if requirement.kind == "cost" and isinstance(limit, Quantity):
+        return loaded.spec.in_currency(limit)
+    return limit.exact if isinstance(limit, Quantity) else Fraction(limit)
+
+
+def _rounded_up(loaded: LoadedSpec, requirement: Requirement, value: Fraction) -> Quantity:
+    limit = requirement.limit
+    if requirement.kind == "sync":
+        return plain(value, up=True)
+    if requirement.kind == "cost":
+        currency = getattr(limit, "currency", None) or loaded.spec.currency
+        rate = loaded.spec.in_currency(Quantity(Fraction(1), "", None, currency))
+        return money(value, rate, currency)
+    return in_unit_of(getattr(limit, "text", ""), value, DIMENSIONS[requirement.kind], up=True)
+
+
+def with_moves(loaded: LoadedSpec, moves: Sequence[Move]) -> LoadedSpec:
+    """The spec with other limits."""
+    limits = {requirement.id: after for requirement, _, after in moves if requirement is not None}
+    requirements = [
+        one.model_copy(update={"limit": limits[one.id]}) if one.id in limits else one
+        for one in loaded.spec.requirements
+    ]
+    for requirement, _, after in moves:
+        if requirement is None:
+            requirements.append(Requirement.model_construct(id=IMPLIED, kind="sync", limit=after))
+    return with_requirements(loaded, requirements)
+
+
+def with_requirements(loaded: LoadedSpec, requirements: Sequence[Requirement]) -> LoadedSpec:
+    """The spec with other requirements."""
+    spec = loaded.spec.model_copy(update={"requirements": tuple(requirements)})
+    return replace(loaded, spec=spec)
+
+
+def _fix(loaded: LoadedSpec, move: Move) -> Fix:
+    requirement, before, after = move
+    if requirement is None:
+        text = (
+            f"the implied sync limit from {before:.6g} to {after.text}: "
+            f"write {{kind: sync, limit: {after.text}}}"
+        )
+        return Fix("sync", None, before, float(after), text, unit="1")
+    name, kind = requirement.id, requirement.kind
+    written = getattr(requirement.limit, "text", f"{before:.6g}")
+    unit = UNITS_OF.get(kind, loaded.spec.currency)
+    if kind != "cost":
+        text = f"{name} from {written} to {after.text}"
+        return Fix(kind, name, before, float(after), text, unit=unit)
+    exact = requirement.limit.exact if isinstance(requirement.limit, Quantity) else Fraction(0)
+    currency = after.currency or loaded.spec.currency
+    shown = [
+        format_quantity(float(v), Dimension.MONEY, currency=currency)
+        for v in (after.exact - exact, exact, after.exact)
+    ]
+    text = f"{name} by {shown[0]}, from {shown[1]} to {shown[2]}"
+    return Fix(kind, name, before, float(loaded.spec.in_currency(after)), text, unit=unit)
+
+
+def method_fixes(loaded: LoadedSpec, build: Build, problem: Problem) -> Iterator[Fix]:
+    """Timestamping methods of the catalogs that, opened to a role without options, do help."""
+    for table in problem.roles:
+        if table.options:
+            continue
+        stage = loaded.spec.stages[table.stage]
+        choice = stage.role(table.role)
+        assert choice is not None
+        now = timestamping_of(loaded.spec, stage, choice, loaded.catalog)
+        if isinstance(now, InlineTimestamping):
+            continue
+        have = tuple(name for name, _ in now)
+        sensors = candidate_sensors(loaded.spec, stage, table.role, loaded.catalog)
+        found: list[tuple[float, str]] = []
+        for name, method in loaded.catalog.timestamping.items():
+            if name in have or not any(
+                usable_primitives(s, method, choice.primitive) for _, s in sensors
+            ):
+                continue
+            best = solve(build(with_methods(loaded, table.stage, table.role, (*have, name))))
+            if best is not None:
+                found.append((float(best.cost or 0), name))
+        for _, name in sorted(found)[:MOST_METHODS]:
+            text = f"let {table.role} of {stage.name} be stamped by {name}"
+            yield Fix("timestamping", None, None, None, text, stage=stage.name)

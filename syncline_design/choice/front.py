@@ -1,0 +1,261 @@
+"""The exact front by merging: what couples the roles is fixed or carried along, the rest adds up.
+
+Fixed: each vehicle's clock and, stage by stage, the timing class (tau, timeline) of the ranging
+option, the reference of that stage.  Carried along: sums of resources, channels in use, sensor
+error E and the largest pair bound M so far.  With the `syncline` model the total is
+E + rate max(M, what follows), so a partial design with no larger sums, E and E + rate M replaces
+another: whatever follows, it ends no worse.
+
+One constraint bounds the sensor error from below: tau_sys < limit * E / rate.  There the better
+sensor can be the one that fails.  The merge first ignores that constraint; if nothing on the
+result breaks it, the result is exact.  Otherwise a second, guarded merge lets only those partial
+designs replace others that satisfy the constraint whatever follows.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+import numpy as np
+
+from syncline_design.choice.arrays import MARGIN, Tables, tabulate, tie_order, useful_options
+from syncline_design.choice.evaluate import Rank, error_key, evaluate, known_or_more, rank
+from syncline_design.choice.labels import Labels, concatenate, total_m
+from syncline_design.choice.merge import Ceiling, Merge, lowered
+from syncline_design.choice.narrowed import stated
+from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
+from syncline_design.choice.pareto import Bools, Columns, Floats, Indices, undominated
+from syncline_design.choice.rounded_once import total_errors_m
+from syncline_design.choice.table import ClockOption, Design, Problem, ResourceName, is_empty
+from syncline_design.machine.deadline import in_force
+
+
+@dataclass(frozen=True, slots=True)
+class _Finished:
+    """Complete designs by rising resource; `clocks` lists the combinations of clocks."""
+
+    labels: Labels  # the last column of `choice` is a place in `clocks`
+    total: Floats
+    clocks: tuple[tuple[int, ...], ...]
+
+
+def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint, ...]:
+    """The exact front of a resource against error, over designs that meet all but accuracy.
+
+    By rising amount and falling error; errors that agree to 12 figures count as equal.  What does
+    not say how much of the resource it takes has no place on it.
+    """
+    priced = stated(problem, resource)
+    if priced.is_empty:
+        return ()
+    points = merged_front(priced.problem, resource, accuracy=False)
+    if problem.judge is not None:
+        from syncline_design.choice.simulated_front import accepted_front
+
+        points = accepted_front(priced.problem, resource, points)
+    return tuple(replace(point, design=priced.whole(point.design)) for point in points)
+
+
+def merged_front(
+    problem: Problem,
+    resource: ResourceName,
+    *,
+    accuracy: bool,
+    deadline: Deadline | None = None,
+) -> tuple[FrontPoint, ...]:
+    """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12)."""
+    demand_structure(problem)
+    if is_empty(problem):
+        return ()
+    tables = _one_timeline(tabulate(problem, resource))
+    end = deadline or in_force()
+    relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=None)
+    holds = _hold_sync(tables, relaxed)
+    points = _points(tables, relaxed, holds)
+    if bool(holds.all()):
+        return points
+    ceiling = None
+    if bool(holds.any()):
+        ceiling = Ceiling(relaxed.labels.resources[0][holds], relaxed.total[holds])
+    guarded = _merge_all(tables, accuracy, end, guarded=True, ceiling=ceiling)
+    found = _points(tables, guarded, np.ones(len(guarded.total), dtype=bool))
+    return _joined([*points, *found], problem)
+
+
+def _reduced(tables: Tables) -> Tables:
+    """Tables without the options that others make superfluous when nothing bounds E from below."""
+    problem = tables.problem
+    per_sensor = problem.sync_model == "per_sensor"
+    roles = []
+    for r, role in enumerate(tables.roles):
+        rates = [p.rate_mps for p in problem.pairs if r in (p.role, p.reference)]
+        rate = math.fsum(rates) if per_sensor else problem.sync_rate_mps * bool(rates)
+        roles.append(useful_options(tables, role, rate, per_sensor))
+    return replace(tables, roles=tuple(roles))
+
+
+def _one_timeline(tables: Tables) -> Tables:
+    """Tables without timelines where no clock is off: then none of them matters."""
+    clocks = [clock for vehicle in tables.problem.vehicles for clock in vehicle.clocks]
+    if any(clock.offset_bound_s != 0.0 for clock in clocks):
+        return tables
+    roles = tuple(replace(r, host=np.zeros(len(r), dtype=bool)) for r in tables.roles)
+    return replace(tables, roles=roles)
+
+
+def demand_structure(problem: Problem) -> None:
+    """Refuse couplings that merging does not remove: the MILP takes those."""
+    for pair in problem.pairs:
+        own = problem.roles[pair.role]
+        if pair.reference is None:
+            if own.role == "ranging":
+                raise TooLarge("a chain that ends in a stage without a ranging sensor")
+            continue
+        other = problem.roles[pair.reference]
+        same = own.stage == other.stage and own.role != "ranging"
+        chain = own.stage == other.stage - 1 and own.role == "ranging"
+        if other.role != "ranging" or not (same or chain):
+            raise TooLarge("pairs of timestamps that do not form a chain of stages")
+    stages = [role.stage for role in problem.roles]
+    if stages != sorted(stages):
+        raise TooLarge("roles that are not in the order of the stages")
+
+
+def _merge_all(
+    tables: Tables, accuracy: bool, deadline: Deadline, *, guarded: bool, ceiling: Ceiling | None
+) -> _Finished:
+    """Complete designs of every combination of clocks that may matter, the front of them."""
+    combinations = tuple(clock_combinations(tables.problem))
+    parts: list[Labels] = []
+    for place, clocks in enumerate(combinations):
+        deadline.check()
+        merge = Merge(tables, clocks, accuracy=accuracy, guarded=guarded, ceiling=ceiling)
+        labels = merge.run(deadline)
+        if labels is not None and len(labels):
+            if not guarded:
+                ceiling = lowered(ceiling, labels, total_m(tables.problem, labels))
+            clock = np.full((len(labels), 1), place, dtype=np.intp)
+            parts.append(replace(labels, choice=np.column_stack([labels.choice, clock])))
+    if not parts:
+        return _Finished(_no_labels(len(tables.keys)), np.zeros(0), combinations)
+    finished = _with_total(tables, concatenate(parts), combinations)
+    if guarded:
+        rows = np.flatnonzero(_hold_sync(tables, finished))
+        finished = _Finished(finished.labels.take(rows), finished.total[rows], combinations)
+    ties = tie_order(tables, finished.labels.resources, finished.labels.ties)
+    rows = undominated(Columns((finished.labels.resources[0], finished.total), tie=ties))
+    labels, total = finished.labels.take(rows), finished.total[rows]
+    order = np.argsort(-total, kind="stable")
+    return _Finished(labels.take(order), total[order], combinations)
+
+
+def _no_labels(keys: int) -> Labels:
+    none = np.zeros(0)
+    whole = tuple(np.zeros(0, dtype=np.int64) for _ in range(keys))
+    return Labels(
+        whole, (), none, none, none, none, (), np.zeros((0, 1), dtype=np.intp), none, none > 0
+    )
+
+
+def _with_total(
+    tables: Tables, labels: Labels, combinations: tuple[tuple[int, ...], ...]
+) -> _Finished:
+    """Complete designs with their total error."""
+    return _Finished(labels, total_m(tables.problem, labels), combinations)
+
+
+def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
+    """Which complete designs keep tau_sys below their limit; close calls are decided exactly."""
+    problem, labels = tables.problem, finished.labels
+    limit = problem.limits.sync
+    if math.isinf(limit) or len(labels) == 0:
+        return np.ones(len(labels), dtype=bool)
+    caused, allowed = problem.sync_rate_mps * labels.bound, limit * labels.noise
+    holds = np.asarray(caused < allowed * (1.0 - MARGIN))
+    close = np.flatnonzero(~holds & (caused <= allowed * (1.0 + MARGIN)))
+    for row, design in zip(close, _designs(tables, finished, close), strict=True):
+        holds[row] = evaluate(problem, design).sync_ratio < limit
+    return holds
+
+
+def _designs(tables: Tables, finished: _Finished, rows: Indices) -> list[Design]:
+    """Designs of some of the labels."""
+    if len(rows) == 0:
+        return []
+    places = finished.labels.choice[rows]
+    options = np.column_stack(
+        [np.array(order)[places[:, r]] for r, order in enumerate(tables.order)]
+    )
+    clocks = [finished.clocks[place] for place in places[:, -1].tolist()]
+    return [Design(tuple(o), c) for o, c in zip(options.tolist(), clocks, strict=True)]
+
+
+def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
+    """Clock indices per vehicle, without clocks that another one of the vehicle replaces."""
+    useful = []
+    for vehicle in problem.vehicles:
+        order = sorted(range(len(vehicle.clocks)), key=lambda i: vehicle.clocks[i].id or "")
+        kept: list[int] = []
+        for i in order:
+            clock = vehicle.clocks[i]
+            if not any(
+                _replaces(vehicle.clocks[j], clock, j in order[: order.index(i)])
+                for j in order
+                if j != i
+            ):
+                kept.append(i)
+        useful.append(kept)
+    yield from itertools.product(*useful)
+
+
+def _replaces(one: ClockOption, other: ClockOption, earlier: bool) -> bool:
+    """Whether a clock is nowhere worse, and better in resources or earlier by name."""
+    ours = [known_or_more(getattr(one.resources, n)) for n in ("cost", "mass", "power")]
+    theirs = [known_or_more(getattr(other.resources, n)) for n in ("cost", "mass", "power")]
+    worse = any(a > b for a, b in zip(ours, theirs, strict=True))
+    if worse or one.offset_bound_s > other.offset_bound_s:
+        return False
+    if set(one.requires) - set(other.requires):
+        return False
+    return ours != theirs or earlier
+
+
+def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoint, ...]:
+    """Front points of complete designs, by rising amount; errors exact, rounded once."""
+    kept = np.flatnonzero(rows)
+    designs = _designs(tables, finished, kept)
+    errors = total_errors_m(tables.problem, designs)
+    bottom = tables.keys[0].denominator
+    amounts = [
+        a if math.isinf(a) else Fraction(a, bottom)
+        for a in finished.labels.resources[0][kept].tolist()
+    ]
+    return _joined(list(map(FrontPoint, amounts, errors, designs)), tables.problem)
+
+
+def _joined(points: list[FrontPoint], problem: Problem) -> tuple[FrontPoint, ...]:
+    """Points as one front; errors equal to 12 figures count as equal, the order settles those."""
+    keyed = [((point.amount, error_key(point.error_m)), point) for point in points]
+    keyed.sort(key=lambda entry: entry[0])
+    out: list[FrontPoint] = []
+    least = math.inf
+    for (_, error), tied in itertools.groupby(keyed, key=lambda entry: entry[0]):
+        if error < least:
+            out.append(_first([point for _, point in tied], problem))
+            least = error
+    return tuple(out)
+
+
+def _first(tied: list[FrontPoint], problem: Problem) -> FrontPoint:
+    """The first in the documented order of points that agree in amount and error."""
+    if len(tied) == 1:
+        return tied[0]
+
+    def place(point: FrontPoint) -> Rank:
+        return rank(problem, point.design, evaluate(problem, point.design))
+
+    return min(tied, key=lambda point: place(point)[2:])

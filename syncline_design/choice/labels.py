@@ -1,0 +1,172 @@
+"""Partial designs as columns, and how a role's options extend them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.choice.arrays import RoleArrays
+from syncline_design.choice.outcome import TooLarge
+from syncline_design.choice.pareto import Bools, Column, Floats, Indices
+from syncline_design.choice.table import Problem
+
+CHUNK = 200_000  # candidates looked at in one go
+MOST_PER_STEP = 10 * CHUNK
+MOST_LABELS = 400_000  # partial designs kept before the merge gives up
+
+
+@dataclass(frozen=True, slots=True)
+class Labels:
+    """Partial designs, in the order of their choices.
+
+    resources, ties: sums so far.  error: sensor and systematic errors [m], added in the order of
+    the roles; noise: the sensor errors alone [m], which the sync requirement is held against.
+    bound: largest pair bound so far [s].  sync: sync error so far [m] (per_sensor only).
+    used: channels in use, one column per (vehicle, shared hardware).  choice: one row of option
+    places per label, one column per role decided.  reference_tau, reference_host: of the last
+    finished stage's ranging option.
+    """
+
+    resources: tuple[Column, ...]
+    ties: tuple[Column, ...]
+    error: Floats
+    noise: Floats
+    bound: Floats
+    sync: Floats
+    used: tuple[Column, ...]
+    choice: NDArray[np.intp]
+    reference_tau: Floats
+    reference_host: Bools
+
+    def __len__(self) -> int:
+        return len(self.error)
+
+    def take(self, rows: Indices | Bools) -> Labels:
+        """Some of the labels."""
+        return Labels(
+            tuple(c[rows] for c in self.resources),
+            tuple(c[rows] for c in self.ties),
+            self.error[rows],
+            self.noise[rows],
+            self.bound[rows],
+            self.sync[rows],
+            tuple(c[rows] for c in self.used),
+            self.choice[rows],
+            self.reference_tau[rows],
+            self.reference_host[rows],
+        )
+
+
+def concatenate(parts: list[Labels]) -> Labels:
+    """Several sets of labels as one, in the order of their choices."""
+    if len(parts) == 1:
+        return parts[0]
+    joined = Labels(
+        tuple(np.concatenate(c) for c in zip(*(p.resources for p in parts), strict=True)),
+        tuple(np.concatenate(c) for c in zip(*(p.ties for p in parts), strict=True)),
+        np.concatenate([p.error for p in parts]),
+        np.concatenate([p.noise for p in parts]),
+        np.concatenate([p.bound for p in parts]),
+        np.concatenate([p.sync for p in parts]),
+        tuple(np.concatenate(c) for c in zip(*(p.used for p in parts), strict=True)),
+        np.concatenate([p.choice for p in parts]),
+        np.concatenate([p.reference_tau for p in parts]),
+        np.concatenate([p.reference_host for p in parts]),
+    )
+    if joined.choice.shape[1] == 0:
+        return joined
+    return joined.take(np.lexsort(joined.choice.T[::-1]))
+
+
+@dataclass(frozen=True, slots=True)
+class Addition:
+    """Options of one role as they add to a label.
+
+    bound: pair bound that each option completes [s], None when it completes none; rate_mps: the
+    pair's rate; used_at: where this vehicle's columns start in Labels.used.
+    """
+
+    options: RoleArrays
+    bound: Floats | None
+    rate_mps: float
+    used_at: int
+
+
+def extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) -> Labels:
+    """Every label with every option, in the order of their choices; of those what `keep` keeps."""
+    n, m = len(labels), len(added.options)
+    if m > MOST_PER_STEP:
+        raise TooLarge(f"{m} options in one role")
+    rows = max(1, CHUNK // max(1, m))
+    if n <= rows:
+        return _extend(labels, added, keep)
+    parts: list[Labels] = []
+    for start in range(0, n, rows):
+        parts.append(_extend(labels.take(np.arange(start, min(n, start + rows))), added, keep))
+        if sum(map(len, parts)) > MOST_LABELS:
+            raise TooLarge(f"more than {MOST_LABELS} partial designs that none replaces")
+    joined = concatenate(parts)
+    return joined.take(keep(joined))
+
+
+# Stands in for columns that are only worked out for the candidates that stay.
+_NO_CHOICE: Any = np.broadcast_to(np.zeros((1, 1)), (MOST_PER_STEP, 1))
+
+
+def _extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) -> Labels:
+    n, m = len(labels), len(added.options)
+    left, right = np.repeat(np.arange(n), m), np.tile(np.arange(m), n)
+    options, bound, sync = added.options, labels.bound[left], labels.sync[left]
+    if added.bound is not None:
+        bound = np.maximum(bound, added.bound[right])
+        sync = sync + (added.rate_mps * added.bound)[right]
+    used = [column[left] for column in labels.used]
+    for k, channels in enumerate(options.channels):
+        used[added.used_at + k] = used[added.used_at + k] + channels[right]
+    candidates = Labels(
+        _sums(labels.resources, options.resources, left, right),
+        _sums(labels.ties, options.ties, left, right),
+        labels.error[left] + options.error[right],
+        labels.noise[left] + options.noise[right],
+        bound,
+        sync,
+        tuple(used),
+        _NO_CHOICE[: n * m],
+        _NO_CHOICE[: n * m, 0],
+        _NO_CHOICE[: n * m, 0],
+    )
+    rows = keep(candidates)
+    left, right = left[rows], right[rows]
+    return replace(
+        candidates.take(rows),
+        choice=np.column_stack([labels.choice[left], options.place[right]]),
+        reference_tau=labels.reference_tau[left],
+        reference_host=labels.reference_host[left],
+    )
+
+
+def _sums(
+    own: tuple[Column, ...], added: tuple[Column, ...], left: Indices, right: Indices
+) -> tuple[Column, ...]:
+    return tuple(np.asarray(a[left] + b[right]) for a, b in zip(own, added, strict=True))
+
+
+def with_pair(labels: Labels, bound: Floats, rate_mps: float) -> Labels:
+    """Labels after one more pair of timestamps meets."""
+    return replace(
+        labels,
+        bound=np.maximum(labels.bound, bound),
+        sync=labels.sync + rate_mps * bound,
+    )
+
+
+def total_m(problem: Problem, labels: Labels) -> Floats:
+    """Total error of complete designs [m]."""
+    caused = labels.sync
+    if problem.sync_model == "syncline":
+        caused = problem.sync_rate_mps * labels.bound
+    return np.asarray(labels.error + problem.fixed_error_m + caused)

@@ -1,0 +1,375 @@
+"""The mixed-integer program through cvxpy and HiGHS: the general road and second opinion.
+
+Variables: one binary per option and clock, an integer per vehicle and shared hardware, and one
+binary z_k per value T_k that tau_sys can take.  Which pair bound demands which ceiling is said by
+0/1 rows (y_a + y_b - 1 <= sum of z_k with T_k >= bound), so no time in seconds enters the matrix;
+errors are scaled by the limit of their row, and resources are whole cents, grams, milliwatts.
+HiGHS drops coefficients at or below 1e-9 and accepts violations of 1e-6: a design that it calls
+optimal is therefore recomputed exactly, and excluded by a cut when it does not stand.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from importlib import metadata
+from typing import Any
+
+import numpy as np
+
+from syncline_design.choice.arrays import MARGIN, Scaled, Tables, tabulate
+from syncline_design.choice.evaluate import broken, evaluate
+from syncline_design.choice.outcome import Deadline, NoVerdict
+from syncline_design.choice.table import Design, Pair, Problem, ResourceName, is_empty
+
+LEAST_HIGHSPY = (1, 15)
+MOST_CUTS = 40
+MOST_DEMANDS = 10_000
+OPTIONS: dict[str, Any] = {"mip_rel_gap": 0.0, "mip_abs_gap": 0.0, "threads": 1, "random_seed": 1}
+TIGHT = {
+    "mip_feasibility_tolerance": 1e-9,
+    "primal_feasibility_tolerance": 1e-9,
+    "dual_feasibility_tolerance": 1e-9,
+}
+ERROR_STEPS = 1e6  # the error objective counts millionths of a typical error
+
+_SUNG: list[bool] = []  # whether the canary has been solved rightly in this process
+
+
+def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
+    """A design with the least objective and, among those, the least error; None if none is."""
+    if is_empty(problem):
+        return None
+    solver = _Solver(deadline)
+    solver.demand_canary()
+    model = _Model(problem, solver.cp, deadline)
+    first = model.solve(solver, model.objective())
+    if first is None or problem.objective == "error":
+        return first
+    amount = evaluate(problem, first).amount(problem.objective)
+    model.hold_objective(first)
+    second = model.solve(solver, model.error())
+    if second is None or evaluate(problem, second).amount(problem.objective) != amount:
+        return first
+    return second
+
+
+class _Solver:
+    """cvxpy with HiGHS: imported here only, checked for its version, one thread, both gaps 0."""
+
+    def __init__(self, deadline: Deadline) -> None:
+        try:
+            import cvxpy
+            import highspy  # noqa: F401 - whether it is there
+        except ImportError as error:
+            raise NoVerdict(f"the MILP needs cvxpy and highspy: {error}") from None
+        version = metadata.version("highspy")
+        if not is_recent(version):
+            raise NoVerdict(
+                f"highspy {version} is too old: 1.14 gives wrong optima on small problems; "
+                "install highspy >= 1.15"
+            )
+        self.cp: Any = cvxpy
+        self.deadline = deadline
+
+    def run(self, problem: Any) -> str:
+        """Solve; anything but a proven optimum or infeasibility is no verdict."""
+        self.deadline.check()
+        try:
+            self._solve(problem, OPTIONS | TIGHT)
+        except self.cp.error.SolverError:
+            # Now and then the presolve of HiGHS 1.15.1 undoes itself wrongly: it notices, and ends
+            # in an error ("untransformed violations").  Without presolve it finds the optimum.
+            try:
+                self._solve(problem, OPTIONS | TIGHT | {"presolve": "off"})
+            except self.cp.error.SolverError as error:
+                raise NoVerdict(f"the MILP solver stopped without an answer: {error}") from None
+        status = str(problem.status)
+        if status not in ("optimal", "infeasible"):
+            self.deadline.check()
+            raise NoVerdict(f"the MILP solver ended without a proof (status {status})")
+        return status
+
+    def _solve(self, problem: Any, options: dict[str, Any]) -> None:
+        left = self.deadline.left_s()
+        limit = {} if left is None else {"time_limit": left}
+        problem.solve(solver=self.cp.HIGHS, **options, **limit)
+
+    def demand_canary(self) -> None:
+        """min 2 x + 3 z, x + z >= 4.5, z whole: 9; HiGHS 1.14 says 15 (highs-js issue 53).
+
+        Once per process: the solver does not change under way.
+        """
+        if _SUNG:
+            return
+        x, z = self.cp.Variable(), self.cp.Variable(integer=True)
+        rows = [x + z >= 4.5, x >= 0, x <= 10, z >= 0, z <= 10]
+        canary = self.cp.Problem(self.cp.Minimize(2 * x + 3 * z), rows)
+        if self.run(canary) != "optimal" or abs(float(canary.value) - 9.0) > 1e-6:
+            raise NoVerdict(f"the MILP solver fails its canary: {canary.value} instead of 9")
+        _SUNG.append(True)
+
+
+def is_recent(version: str) -> bool:
+    """Whether a highspy version is one that the product trusts."""
+    numbers = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
+    return numbers >= LEAST_HIGHSPY
+
+
+@dataclass(frozen=True, slots=True)
+class _TimingClass:
+    """Options of a role that share tau and timeline."""
+
+    tau: float
+    host: bool
+    rows: np.ndarray
+
+
+@dataclass
+class _Model:
+    """Variables and rows of one problem."""
+
+    problem: Problem
+    cp: Any
+    deadline: Deadline
+    tables: Tables = field(init=False)
+    rows: list[Any] = field(init=False, default_factory=list)
+
+    def __post_init__(self) -> None:
+        objective: ResourceName = (
+            "cost" if self.problem.objective == "error" else self.problem.objective
+        )
+        self.tables = tabulate(self.problem, objective)
+        cp = self.cp
+        self.x = [cp.Variable(len(role), boolean=True) for role in self.tables.roles]
+        self.c = [cp.Variable(len(v.clocks), boolean=True) for v in self.problem.vehicles]
+        self.units = {
+            (v, k): cp.Variable(integer=True)
+            for v in range(len(self.problem.vehicles))
+            for k in range(len(self.tables.tracked))
+        }
+        self.classes = [list(_classes(self.tables, r)) for r in range(len(self.x))]
+        self._demand_size()
+        self.demands = list(self._demands())
+        self.ceilings = sorted({bound for bound, _ in self.demands} | {0.0})
+        self.z = cp.Variable(len(self.ceilings), boolean=True)
+        self.rows += [cp.sum(x) == 1 for x in (*self.x, *self.c, self.z)]
+        self._add_rows()
+
+    def _add_rows(self) -> None:
+        place = {bound: k for k, bound in enumerate(self.ceilings)}
+        for bound, members in self.demands:
+            self.deadline.check()
+            if place[bound]:
+                at_least = self.cp.sum(self.z[place[bound] :])
+                self.rows.append(sum(members) - (len(members) - 1) <= at_least)
+        self._add_hardware()
+        self._add_accuracy()
+        self._add_sync()
+        for k, scale in enumerate(self.tables.keys):
+            budget = self.problem.limits.budget(scale.name)
+            if budget is not None:
+                amount = max(1, scale.whole(budget))
+                self.rows.append(self._amount(k, 1.0 / amount) <= scale.whole(budget) / amount)
+
+    def _demand_size(self) -> None:
+        """Refuse what would take longer to write down than to solve otherwise."""
+        count = sum(
+            len(self.classes[p.role])
+            * (1 if p.reference is None else len(self.classes[p.reference]))
+            for p in self.problem.pairs
+        )
+        if count > MOST_DEMANDS:
+            raise NoVerdict(
+                f"{count} pairs of different timestamp errors are too many for the MILP "
+                f"(at most {MOST_DEMANDS})"
+            )
+
+    def _demands(self) -> Iterator[tuple[float, list[Any]]]:
+        """(pair bound, binaries that are all 1 where it applies)."""
+        for pair in self.problem.pairs:
+            for own in self.classes[pair.role]:
+                y = self.cp.sum(self.x[pair.role][own.rows])
+                if pair.reference is None:
+                    for offset, clocks in self._from_utc(pair.role, own.host):
+                        yield own.tau + offset, [y, *clocks]
+                    continue
+                for other in self.classes[pair.reference]:
+                    other_y = self.cp.sum(self.x[pair.reference][other.rows])
+                    for offset, clocks in self._offsets(pair, own.host, other.host):
+                        yield own.tau + other.tau + offset, [y, other_y, *clocks]
+
+    def _offsets(self, pair: Pair, host: bool, other: bool) -> Iterator[tuple[float, list[Any]]]:
+        """(offset between two timelines, clock binaries that make it)."""
+        assert pair.reference is not None
+        vehicles = [self.problem.roles[r].vehicle for r in (pair.role, pair.reference)]
+        if host == other and (not host or vehicles[0] == vehicles[1]):
+            yield 0.0, []
+            return
+        involved = [v for v, is_host in zip(vehicles, (host, other), strict=True) if is_host]
+        tables = [self.problem.vehicles[v].clocks for v in involved]
+        for places in np.ndindex(*(len(clocks) for clocks in tables)):
+            chosen = [(v, clocks, i) for v, clocks, i in zip(involved, tables, places, strict=True)]
+            yield (
+                sum(clocks[i].offset_bound_s for _, clocks, i in chosen),
+                [self.c[v][i] for v, _, i in chosen],
+            )
+
+    def _from_utc(self, role: int, host: bool) -> Iterator[tuple[float, list[Any]]]:
+        """(offset of a role's timeline from UTC, clock binaries that make it)."""
+        if not host:
+            yield 0.0, []
+            return
+        v = self.problem.roles[role].vehicle
+        for i, clock in enumerate(self.problem.vehicles[v].clocks):
+            yield clock.offset_bound_s, [self.c[v][i]]
+
+    def _add_hardware(self) -> None:
+        for (v, k), units in self.units.items():
+            item = self.problem.infrastructure[self.tables.tracked[k]]
+            used = sum(
+                role.channels[k] @ self.x[r]
+                for r, role in enumerate(self.tables.roles)
+                if self.problem.roles[r].vehicle == v
+            )
+            for i, clock in enumerate(self.problem.vehicles[v].clocks):
+                used = used + sum(n for name, n in clock.requires if name == item.id) * self.c[v][i]
+            self.rows += [used <= item.channels * units, units >= 0]
+
+    def _amount(self, k: int, factor: float) -> Any:
+        """Sum of a resource in whole units, times a factor."""
+        scale: Scaled = self.tables.keys[k]
+        total = sum(
+            (role.resources[k].astype(float) * factor) @ self.x[r]
+            for r, role in enumerate(self.tables.roles)
+        )
+        for v, vehicle in enumerate(self.problem.vehicles):
+            own = [float(scale.whole(c.resources.of(scale.name))) * factor for c in vehicle.clocks]
+            total = total + np.array(own) @ self.c[v]
+        for (_, item), units in self.units.items():
+            each = self.problem.infrastructure[self.tables.tracked[item]].resources
+            total = total + float(scale.whole(each.of(scale.name))) * factor * units
+        return total
+
+    def _total(self, scale_m: float) -> Any:
+        """Total error over `scale_m`, without the fixed terms."""
+        error = sum((role.error / scale_m) @ self.x[r] for r, role in enumerate(self.tables.roles))
+        if self.problem.sync_model == "syncline":
+            caused = self.problem.sync_rate_mps * np.array(self.ceilings) / scale_m
+            return error + caused @ self.z
+        return error + self._per_sensor(scale_m)
+
+    def _per_sensor(self, scale_m: float) -> Any:
+        """Each pair's rate times its own bound: tau terms add up, offsets hang on the clocks."""
+        total: Any = 0.0
+        for pair in self.problem.pairs:
+            for r in (pair.role, pair.reference):
+                if r is not None:
+                    total = total + (pair.rate_mps * self.tables.roles[r].tau / scale_m) @ self.x[r]
+            for offset, members in self._apart(pair):
+                if not offset > 0.0:
+                    continue
+                active = self.cp.Variable(nonneg=True)
+                self.rows.append(active >= sum(members) - (len(members) - 1))
+                total = total + pair.rate_mps * offset / scale_m * active
+        return total
+
+    def _apart(self, pair: Pair) -> Iterator[tuple[float, list[Any]]]:
+        """(offset between a pair's timelines, binaries that are all 1 where it applies)."""
+        for host in (False, True):
+            own = self._on_timeline(pair.role, host)
+            if own is None:
+                continue
+            if pair.reference is None:
+                for offset, clocks in self._from_utc(pair.role, host):
+                    yield offset, [own, *clocks]
+                continue
+            for other in (False, True):
+                theirs = self._on_timeline(pair.reference, other)
+                if theirs is not None:
+                    for offset, clocks in self._offsets(pair, host, other):
+                        yield offset, [own, theirs, *clocks]
+
+    def _on_timeline(self, role: int, host: bool) -> Any:
+        """1 where a role's choice stamps on the host clock (or in UTC); None if no option does."""
+        rows = np.flatnonzero(self.tables.roles[role].host == host)
+        return self.cp.sum(self.x[role][rows]) if len(rows) else None
+
+    def _add_accuracy(self) -> None:
+        limit = self.problem.limits.accuracy_m
+        if limit is None:
+            return
+        for r, role in enumerate(self.tables.roles):
+            over = np.flatnonzero(role.error > limit * (1.0 + MARGIN))
+            if len(over):
+                self.rows.append(self.x[r][over] == 0)
+        left = 1.0 - self.problem.fixed_error_m / limit
+        self.rows.append(self._capped_total(limit) <= left + MARGIN)
+
+    def _capped_total(self, limit: float) -> Any:
+        """The total over the limit; what alone exceeds it counts twice the limit, no more."""
+        error = sum(
+            np.minimum(role.error / limit, 2.0) @ self.x[r]
+            for r, role in enumerate(self.tables.roles)
+        )
+        if self.problem.sync_model == "per_sensor":
+            return error + self._per_sensor(limit)
+        caused = self.problem.sync_rate_mps * np.array(self.ceilings) / limit
+        return error + np.minimum(caused, 2.0) @ self.z
+
+    def _add_sync(self) -> None:
+        """For each ceiling the sensor error that it demands, as a cover row scaled by itself."""
+        limit = self.problem.limits.sync
+        if math.isinf(limit):
+            return
+        for k, ceiling in enumerate(self.ceilings):
+            demand = self.problem.sync_rate_mps * ceiling / limit
+            if demand > 0.0:
+                covered = sum(
+                    np.minimum(role.noise / demand, 1.0) @ self.x[r]
+                    for r, role in enumerate(self.tables.roles)
+                )
+                self.rows.append(covered >= (1.0 - MARGIN) * self.z[k])
+
+    def objective(self) -> Any:
+        """What is minimised first."""
+        return self.error() if self.problem.objective == "error" else self._amount(0, 1.0)
+
+    def error(self) -> Any:
+        """The total error in small parts of a typical one."""
+        least = sum(float(role.error.min()) for role in self.tables.roles)
+        return self._total((least or 1.0) / ERROR_STEPS)
+
+    def hold_objective(self, design: Design) -> None:
+        """No more of the objective than this design needs."""
+        assert self.problem.objective != "error"
+        scale = self.tables.keys[0]
+        amount = scale.whole(evaluate(self.problem, design).amount(scale.name))
+        self.rows.append(self._amount(0, 1.0 / max(1, amount)) <= amount / max(1, amount))
+
+    def solve(self, solver: _Solver, objective: Any) -> Design | None:
+        """The best design that stands up to exact arithmetic; None when proven that none is."""
+        for _ in range(MOST_CUTS):
+            program = self.cp.Problem(self.cp.Minimize(objective), self.rows)
+            if solver.run(program) == "infeasible":
+                return None
+            places = [int(np.argmax(x.value)) for x in self.x]
+            clocks = tuple(int(np.argmax(c.value)) for c in self.c)
+            options = (order[i] for order, i in zip(self.tables.order, places, strict=True))
+            design = Design(tuple(options), clocks)
+            if not broken(self.problem, evaluate(self.problem, design)):
+                return design
+            chosen = [x[i] for x, i in zip((*self.x, *self.c), (*places, *clocks), strict=True)]
+            self.rows.append(sum(chosen) <= len(chosen) - 1)
+        raise NoVerdict(
+            f"{MOST_CUTS} designs in a row were optimal to the MILP solver and did not stand up to "
+            "the exact recheck"
+        )
+
+
+def _classes(tables: Tables, role: int) -> Iterator[_TimingClass]:
+    arrays = tables.roles[role]
+    for tau, host in sorted(set(zip(arrays.tau.tolist(), arrays.host.tolist(), strict=True))):
+        rows = np.flatnonzero((arrays.tau == tau) & (arrays.host == host))
+        yield _TimingClass(tau, host, rows)

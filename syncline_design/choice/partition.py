@@ -1,0 +1,100 @@
+"""Designs one after the other by splitting what is left: memory grows with the designs alone.
+
+E. L. Lawler, "A procedure for computing the K best solutions to discrete optimization problems",
+Management Science 18 (1972): the best design of a set is found by merging; the rest of the set
+falls into parts that agree with it up to some role and differ there, and the best of each part
+waits for its turn.  Two designs differ when a role (or, where asked, a clock) carries another
+label.
+"""
+
+from __future__ import annotations
+
+import heapq
+import itertools
+from collections.abc import Callable, Hashable, Iterator
+from dataclasses import dataclass
+
+from syncline_design.choice.evaluate import Rank, broken, evaluate, rank
+from syncline_design.choice.front import merged_front
+from syncline_design.choice.narrowed import Narrowed, narrowed
+from syncline_design.choice.table import Design, Option, Problem, ResourceName
+from syncline_design.machine.deadline import Deadline, in_force
+
+Label = Callable[[Option], Hashable]
+Open = tuple[tuple[int, ...], ...]  # places still open, per role or vehicle
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A set of designs: what is open in it."""
+
+    options: Open
+    clocks: Open
+
+
+def iter_differing(
+    problem: Problem, label: Label, *, clocks: bool = False, deadline: Deadline | None = None
+) -> Iterator[Design]:
+    """Designs that meet every sum, best first, one for each combination of labels.
+
+    clocks: whether designs that differ in a clock alone are two.  Raises NoVerdict after the
+    deadline and where merging gives up.
+    """
+    end = deadline or in_force()
+    whole = _Part(
+        tuple(tuple(range(len(role.options))) for role in problem.roles),
+        tuple(tuple(range(len(vehicle.clocks))) for vehicle in problem.vehicles),
+    )
+    counter = itertools.count()
+    waiting: list[tuple[Rank, int, Design, _Part]] = []
+
+    def put(part: _Part) -> None:
+        design = best_of(narrowed(problem, part.options, part.clocks), end)
+        if design is not None:
+            place = rank(problem, design, evaluate(problem, design))
+            heapq.heappush(waiting, (place, next(counter), design, part))
+
+    put(whole)
+    while waiting:
+        _, _, design, part = heapq.heappop(waiting)
+        yield design
+        for rest in _split(problem, part, design, label, clocks):
+            put(rest)
+
+
+def best_of(part: Narrowed, deadline: Deadline) -> Design | None:
+    """The first design of a part in the documented order, by merging, decided exactly."""
+    deadline.check()
+    if part.is_empty:
+        return None
+    problem = part.problem
+    resource: ResourceName = "cost" if problem.objective == "error" else problem.objective
+    points = list(merged_front(problem, resource, accuracy=True, deadline=deadline))
+    if problem.objective == "error":
+        points.reverse()
+    for point in points:
+        if not broken(problem, evaluate(problem, point.design)):
+            return part.whole(point.design)
+    return None
+
+
+def _split(
+    problem: Problem, part: _Part, design: Design, label: Label, clocks: bool
+) -> Iterator[_Part]:
+    """The rest of a part without the designs that carry the labels of one."""
+    options = list(part.options)
+    for r, table in enumerate(problem.roles):
+        own = label(table.options[design.options[r]])
+        alike = tuple(i for i in options[r] if label(table.options[i]) == own)
+        others = tuple(i for i in options[r] if label(table.options[i]) != own)
+        if others:
+            yield _Part((*options[:r], others, *options[r + 1 :]), part.clocks)
+        options[r] = alike
+    if not clocks:
+        return
+    left = list(part.clocks)
+    for v, own_clock in enumerate(design.clocks):
+        others = tuple(i for i in left[v] if i != own_clock)
+        if others:
+            yield _Part(tuple(options), (*left[:v], others, *left[v + 1 :]))
+        left[v] = (own_clock,)

@@ -1,0 +1,139 @@
+"""The requirements of a problem one by one: lifted, moved, and the least limit that would do."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any, NamedTuple
+
+from syncline_design.choice.acceptable import iter_acceptable
+from syncline_design.choice.decide import choose
+from syncline_design.choice.evaluate import Evaluation, evaluate
+from syncline_design.choice.outcome import Choice, Infeasible, TooLarge, Unfinished
+from syncline_design.choice.table import RESOURCES, Limits, Objective, Problem, with_limits
+
+KINDS = ("accuracy", "sync", "cost", "mass", "power")
+SIMULATED = "monte_carlo"
+STEPS = 40
+CLOSE = 1e-4
+LARGEST_RATIO = 1e12
+MOST_TRIED = 60  # designs simulated for the least limit of a simulated requirement
+
+
+class Part(NamedTuple):
+    """What a conflict is made of: a kind of sums at its tightest limit, or a simulated quantile.
+
+    id: of the requirement that sets the limit; None for the implied sync limit.
+    """
+
+    kind: str
+    id: str | None
+
+
+def parts_of(problem: Problem) -> tuple[Part, ...]:
+    """Every requirement in force, the tightest of each kind of sum."""
+    names = dict(problem.limits.ids)
+    found = [Part(kind, names.get(kind)) for kind in KINDS if _is_active(problem.limits, kind)]
+    if problem.judge is not None:
+        found += [Part(SIMULATED, name) for name, _ in problem.judge.limits]
+    return tuple(found)
+
+
+def _is_active(limits: Limits, kind: str) -> bool:
+    if kind == "sync":
+        return math.isfinite(limits.sync)
+    return (limits.accuracy_m if kind == "accuracy" else getattr(limits, kind)) is not None
+
+
+def lifted(problem: Problem, parts: Iterable[Part]) -> Problem:
+    """The problem without some of its requirements."""
+    return moved(problem, {part: math.inf if part.kind == "sync" else None for part in parts})
+
+
+def moved(problem: Problem, limits: Mapping[Part, Any]) -> Problem:
+    """The problem with other limits; None lifts a requirement, infinity the sync one."""
+    changes: dict[str, Any] = {}
+    for part, value in limits.items():
+        if part.kind != SIMULATED:
+            changes["accuracy_m" if part.kind == "accuracy" else part.kind] = value
+    out = with_limits(problem, replace(problem.limits, **changes)) if changes else problem
+    if problem.judge is None:
+        return out
+    simulated = {p.id: value for p, value in limits.items() if p.kind == SIMULATED}
+    kept = [(name, simulated.get(name, limit)) for name, limit in problem.judge.limits]
+    left = tuple((name, limit) for name, limit in kept if limit is not None)
+    return replace(out, judge=problem.judge.with_limits(left) if left else None)
+
+
+def solve(problem: Problem) -> Evaluation | None:
+    """Sums of the best design that meets every requirement; None when there is none."""
+    try:
+        found: Choice | Infeasible = choose(problem, "front")
+    except TooLarge:
+        found = choose(problem)
+    if isinstance(found, Infeasible):
+        return None
+    if not found.exhausted:
+        raise Unfinished("the search for a design that passes simulation gave up")
+    return evaluate(problem, found.design) if found.accepted else None
+
+
+def is_feasible(problem: Problem) -> bool:
+    """Whether any design meets every requirement."""
+    return solve(problem) is not None
+
+
+def least(problem: Problem, part: Part) -> Fraction | None:
+    """The least limit of one requirement at which some design meets all; None: at none.
+
+    Sums exactly; sync to 1e-4; a simulated quantile as near as its samples tell, over the designs
+    of the least Syncline error.
+    """
+    if part.kind == "sync":
+        return _least_sync(problem, part)
+    if part.kind == SIMULATED:
+        return _least_simulated(problem, part)
+    objective: Objective = "error"
+    if part.kind != "accuracy":
+        objective = next(name for name in RESOURCES if name == part.kind)
+    best = solve(replace(lifted(problem, [part]), objective=objective))
+    if best is None:
+        return None
+    return Fraction(best.error_m) if objective == "error" else best.amount(objective)
+
+
+def _least_sync(problem: Problem, part: Part) -> Fraction | None:
+    def holds(limit: float) -> bool:
+        return is_feasible(moved(problem, {part: limit}))
+
+    if not holds(math.inf):
+        return None
+    fails = problem.limits.sync
+    if math.isinf(fails):
+        fails = 1e-6
+    works = 2.0 * fails
+    while not holds(works) and works < LARGEST_RATIO:
+        fails, works = works, works * 4.0
+    if not holds(works):
+        return None
+    for _ in range(STEPS):
+        if works - fails <= CLOSE * works:
+            break
+        middle = 0.5 * (works + fails)
+        works, fails = (middle, fails) if holds(middle) else (works, middle)
+    return Fraction(works)
+
+
+def _least_simulated(problem: Problem, part: Part) -> Fraction | None:
+    assert problem.judge is not None
+    assert part.id is not None
+    rest = replace(lifted(problem, [part]), objective="error")
+    reached = math.inf
+    for tried, (design, found) in enumerate(iter_acceptable(rest)):
+        if found.passed:
+            reached = min(reached, problem.judge.reached_m(rest, design, part.id))
+        if tried >= MOST_TRIED:
+            break
+    return Fraction(reached) if math.isfinite(reached) else None

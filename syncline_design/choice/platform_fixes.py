@@ -1,0 +1,216 @@
+"""Slower, nearer, farther or turning less: the least change of one platform figure that helps.
+
+A design may be feasible in a window only: nearer is more accurate, but a smaller error of the
+sensors also asks for better timestamps.  So a range of values is ruled out by a problem that takes
+the better end for every figure; what cannot be ruled out is halved, the part near the present
+value first.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+
+from syncline_design.choice.acceptable import without_simulation
+from syncline_design.choice.fixes import Fix
+from syncline_design.choice.parts import CLOSE, is_feasible
+from syncline_design.choice.table import Option, Pair, Problem, RoleTable, sync_ratio, with_limits
+from syncline_design.choice.variations import (
+    PLATFORM_FIGURES,
+    Build,
+    PlatformFigure,
+    platform_figure,
+    quantity,
+    with_platform_figure,
+)
+from syncline_design.choice.written import DIGITS, in_unit_of
+from syncline_design.model.quantity import Dimension, Quantity
+from syncline_design.spec.load import LoadedSpec
+
+LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
+LARGEST_SHARE = 10.0  # nor a distance raised above this multiple
+MOST_RANGES = 400
+SIMULATED_CLOSE = 1e-2  # where simulation decides
+MOST_DIGITS = 6
+UNITS_OF: dict[PlatformFigure, str] = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}
+SHARES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.01, LEAST_SHARE)
+
+
+def platform_fixes(loaded: LoadedSpec, build: Build) -> Iterator[Fix]:
+    """The least change of each figure of each stage that helps, a distance to either side."""
+    for index, stage in enumerate(loaded.spec.stages):
+        for figure, (words, dimension) in PLATFORM_FIGURES.items():
+            before = platform_figure(loaded, index, figure)
+            if not before > 0.0:
+                continue
+            written = getattr(before, "text", "")
+            ends = (LEAST_SHARE, LARGEST_SHARE) if figure == "distance" else (LEAST_SHARE,)
+            for end in ends:
+                asked = _Asked(loaded, build, index, figure, dimension, float(before), written)
+                after = asked.nearest(end * float(before))
+                if after is not None:
+                    text = f"{words} of {stage.name} from {_shown(before, dimension)}"
+                    yield Fix(
+                        "platform", None, float(before), float(after), f"{text} to {after.text}",
+                        figure, stage.name, UNITS_OF[figure],
+                    )  # fmt: skip
+
+
+def _shown(value: float, dimension: Dimension) -> str:
+    written = getattr(value, "text", "")
+    return written or in_unit_of("", Fraction(value), dimension, up=True, digits=DIGITS + 2).text
+
+
+@dataclass
+class _Asked:
+    """One figure of one stage, and what is known of its values."""
+
+    loaded: LoadedSpec
+    build: Build
+    stage: int
+    figure: PlatformFigure
+    dimension: Dimension
+    before: float
+    written: str
+    problems: dict[float, Problem] = field(default_factory=dict)
+
+    def nearest(self, end: float) -> Quantity | None:
+        """The value nearest to the present one, on the way to an end, at which a design exists."""
+        found = self._window(self.before, end)
+        if found is None or self._simulation_rules_out(end):
+            return None
+        fails, works = found
+        if not self._holds(works):  # simulation decides: nearer helps, farther does not
+            if end > self.before:
+                return None
+            fails, works = self._by_shares(works, end)
+            if not self._holds(works):
+                return None
+        return self._rounded(self._edge(fails, works), end)
+
+    def _simulation_rules_out(self, end: float) -> bool:
+        """Whether the far end keeps every sum and still fails in simulation: then no value helps,
+        since a slower or nearer vehicle errs no more."""
+        last = self._problem(end)
+        if last.judge is None or end > self.before:
+            return False
+        return is_feasible(without_simulation(last)) and not is_feasible(last)
+
+    def _problem(self, value: float) -> Problem:
+        if value not in self.problems:
+            self.problems[value] = self.build(self._changed(quantity(value, self.dimension)))
+        return self.problems[value]
+
+    def _changed(self, value: Quantity) -> LoadedSpec:
+        return with_platform_figure(self.loaded, self.stage, self.figure, value)
+
+    def _holds(self, value: float) -> bool:
+        return is_feasible(self._problem(value))
+
+    def _window(self, near: float, end: float) -> tuple[float, float] | None:
+        """Nearest (value that fails, value next to it that keeps the sums)."""
+        ranges = [(near, end)]
+        for _ in range(MOST_RANGES):
+            if not ranges:
+                return None
+            one, other = ranges.pop()
+            best = better_of(self._problem(one), self._problem(other))
+            if not is_feasible(best):
+                continue
+            if abs(other - one) <= CLOSE * max(one, other):
+                if is_feasible(without_simulation(self._problem(other))):
+                    return one, other
+                continue
+            middle = math.sqrt(one * other)
+            ranges += [(middle, other), (one, middle)]
+        return None
+
+    def _by_shares(self, start: float, end: float) -> tuple[float, float]:
+        """(last value that fails, first that holds) on a coarse grid; both fail where none does."""
+        last = start
+        for share in SHARES:
+            value = start * share if end < start else start / share
+            if (value - end) * (start - end) < 0:
+                break
+            if self._holds(value):
+                return last, value
+            last = value
+        return last, last
+
+    def _edge(self, fails: float, works: float) -> float:
+        """The value nearest to one that fails that holds, to 1e-4."""
+        close = CLOSE if self._problem(works).judge is None else SIMULATED_CLOSE
+        while abs(works - fails) > close * abs(works):
+            middle = 0.5 * (works + fails)
+            works, fails = (middle, fails) if self._holds(middle) else (works, middle)
+        return works
+
+    def _rounded(self, value: float, end: float) -> Quantity | None:
+        """The value as it would be written, with as many figures as its window asks for."""
+        for digits in range(DIGITS, MOST_DIGITS + 1):
+            shown = in_unit_of(
+                self.written, Fraction(value), self.dimension, up=end > value, digits=digits
+            )
+            if is_feasible(self.build(self._changed(shown))):
+                return shown
+        return None
+
+
+def better_of(one: Problem, other: Problem) -> Problem:
+    """A problem that has a design wherever one of two, or any between them, has.
+
+    For figures that move steadily from one to the other: each option takes the smaller error for
+    the total, the larger noise against its timestamps, the smaller tau and rate.
+    """
+    first, second = (_open(problem) for problem in (one, other))
+    limit = one.limits.sync
+    roles = tuple(_better_role(a, b, limit) for a, b in zip(first.roles, second.roles, strict=True))
+    rate = min(one.sync_rate(), other.sync_rate())
+    fixed = min(one.fixed_error(), other.fixed_error())
+    pairs = tuple(_slower(a, b) for a, b in zip(one.pairs, other.pairs, strict=True))
+    return replace(
+        one,
+        roles=roles,
+        pairs=pairs,
+        sync_rate_mps=float(rate),
+        exact_sync_rate_mps=rate,
+        fixed_error_m=float(fixed),
+        exact_fixed_error_m=fixed,
+        judge=None,
+    )
+
+
+def _open(problem: Problem) -> Problem:
+    return with_limits(problem, replace(problem.limits, sync=math.inf))
+
+
+def _slower(one: Pair, other: Pair) -> Pair:
+    rate = min(one.rate(), other.rate())
+    return replace(one, rate_mps=float(rate), exact_rate_mps=rate)
+
+
+def _better_role(one: RoleTable, other: RoleTable, limit: float) -> RoleTable:
+    options = []
+    for a, b in zip(one.options, other.options, strict=True):
+        if min(sync_ratio(a), sync_ratio(b)) < limit:
+            options.append(_better_option(a, b))
+    return replace(one, options=tuple(options), excluded=())
+
+
+def _better_option(one: Option, other: Option) -> Option:
+    noise = max(one.error(), other.error())
+    added = min(one.error() + one.systematic(), other.error() + other.systematic())
+    tau = min(one.tau(), other.tau())
+    return replace(
+        one,
+        sensor_error_m=float(noise),
+        exact_error_m=noise,
+        systematic_m=float(added - noise),
+        exact_systematic_m=added - noise,
+        tau_s=float(tau),
+        exact_tau_s=tau,
+        tau_crit_s=math.inf,
+        own_rate_mps=None,
+    )

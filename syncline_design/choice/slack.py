@@ -1,0 +1,370 @@
+"""How far each term of the Syncline may grow before the verdict, or the payload, changes.
+
+For sensor errors and timestamp bounds the verdict's threshold has a closed form: the total grows
+by the error itself, or by rate * tau once a pair is the largest; platform figures are bisected.
+The payload changes when the choice, made anew, names another sensor or method.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+from syncline_design.choice.acceptable import judgement
+from syncline_design.choice.decide import choose
+from syncline_design.choice.evaluate import broken, chosen_options, evaluate, pair_bound
+from syncline_design.choice.narrowed import narrowed
+from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime, Unfinished
+from syncline_design.choice.partition import best_of
+from syncline_design.choice.problem import build_problem
+from syncline_design.choice.table import Design, Option, Problem, RoleTable
+from syncline_design.choice.variations import (
+    PLATFORM_FIGURES,
+    Build,
+    PlatformFigure,
+    platform_figure,
+    quantity,
+    with_platform_figure,
+)
+from syncline_design.machine.deadline import in_force
+from syncline_design.spec.load import LoadedSpec
+
+# Values tried, over the term's own: from a nudge that only settles ties to a million times.
+GROWTHS = (1.0 + 1e-9, 1.0001, 1.01, 1.05, *(1.3**k for k in range(1, 53)), 1e6)
+COARSE = (1.0 + 1e-9, 1.1, 1.5, 2.0, 4.0, 10.0, 30.0, 100.0)  # where each try is a simulation
+BISECTIONS = 60
+CLOSE = 1e-6
+SIMULATED_CLOSE = 1e-2  # simulation tells values apart no better at a bearable number of samples
+
+
+@dataclass(frozen=True, slots=True)
+class Slack:
+    """One term: its value, and the values at which verdict and payload change.
+
+    None: not up to searched_to (None: no value was left out).  limited_by: kind of the requirement
+    that then breaks.  unit: of all four figures.  never: which of the two is proven never to come,
+    `verdict` or `payload`.
+    """
+
+    term: str
+    stage: str
+    value: float
+    unit: str
+    fails_at: float | None
+    limited_by: str | None
+    payload_changes_at: float | None
+    searched_to: float | None = None
+    never: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry under `slack`."""
+        return {
+            "term": self.term,
+            "stage": self.stage,
+            "value": self.value,
+            "unit": self.unit,
+            "fails_at": self.fails_at,
+            "limited_by": self.limited_by,
+            "payload_changes_at": self.payload_changes_at,
+            "searched_to": self.searched_to,
+            "never": list(self.never),
+        }
+
+
+def slack_ledger(
+    loaded: LoadedSpec, problem: Problem, design: Design, build: Build = build_problem
+) -> tuple[Slack, ...]:
+    """Slack of every sensor error, timestamp bound and platform figure of a chosen design.
+
+    A sensor whose noise enters no error (the attitude of a stage without ranging) has no such row.
+    """
+    rows: list[Slack] = []
+    for index, stage in enumerate(loaded.spec.stages):
+        for r, table in enumerate(problem.roles):
+            if table.stage == index:
+                if chosen_options(problem, design)[r].error() > 0:
+                    rows.append(_error_slack(problem, design, r))
+                rows.append(_tau_slack(problem, design, r))
+        for figure in PLATFORM_FIGURES:
+            row = _platform_slack(loaded, problem, design, build, index, figure)
+            rows += [replace(row, stage=stage.name)] if row else []
+    return tuple(rows)
+
+
+Limit = tuple[Fraction, str]  # value at which a requirement of a kind breaks
+
+
+def _error_slack(problem: Problem, design: Design, r: int) -> Slack:
+    """A sensor error may grow by what is left of the accuracy limit; sync only gains from it.
+
+    What known effects add in proportion to the noise grows with it.
+    """
+    table, own = problem.roles[r], chosen_options(problem, design)[r]
+    limit, fails = problem.limits.accuracy_m, None
+    if limit is not None:
+        total = evaluate(problem, design).total_m
+        slope = 1 + own.noise_systematic_m / own.error()
+        fails = float(own.error() + (Fraction(limit) - total) / slope)
+
+    def changed(value: float) -> Problem:
+        return _with_sensor(problem, r, own.sensor, Fraction(value))
+
+    row = Slack(f"{table.role} sensor error", table.stage_name, own.sensor_error_m, "m", fails,
+                None if fails is None else "accuracy", None)  # fmt: skip
+    sure = limit is None and problem.judge is None
+    return _with_payload(row, problem, design, changed, fails_never=sure)
+
+
+def _with_sensor(problem: Problem, r: int, sensor: str, error_m: Fraction) -> Problem:
+    """The problem with one sensor's error in one role set; its exclusions are judged anew."""
+
+    def grown(option: Option) -> Option:
+        if option.sensor != sensor:
+            return option
+        ratio = error_m / option.error()
+        crit = option.tau_crit_s
+        crit = float(Fraction(crit) * ratio) if math.isfinite(crit) else crit
+        added = option.systematic() + option.noise_systematic_m * (ratio - 1)
+        return replace(
+            option,
+            sensor_error_m=float(error_m),
+            exact_error_m=error_m,
+            tau_crit_s=crit,
+            systematic_m=float(added),
+            exact_systematic_m=added if added else None,
+            noise_systematic_m=option.noise_systematic_m * ratio,
+        )
+
+    return _with_options(problem, grown, {r})
+
+
+def _with_options(problem: Problem, change: Callable[[Option], Option], rows: set[int]) -> Problem:
+    """The problem with options changed; those that now keep or break their tau_crit move over."""
+    from syncline_design.choice.table import with_limits
+
+    def pooled(table: RoleTable) -> RoleTable:
+        back = tuple(one.option for one in table.excluded if one.option is not None)
+        options = tuple(change(option) for option in (*table.options, *back))
+        rest = tuple(one for one in table.excluded if one.option is None)
+        return replace(table, options=options, excluded=rest)
+
+    roles = tuple(pooled(t) if r in rows else t for r, t in enumerate(problem.roles))
+    open_limits = replace(problem.limits, sync=math.inf)
+    return with_limits(replace(problem, roles=roles, limits=open_limits), problem.limits)
+
+
+def _tau_slack(problem: Problem, design: Design, r: int) -> Slack:
+    """A timestamp bound may grow until its own tau_crit, the system's, or the accuracy is met."""
+    table, own = problem.roles[r], chosen_options(problem, design)[r]
+    limits = list(_tau_limits(problem, design, r))
+    fails, kind = min(limits) if limits else (None, None)
+    row = Slack(f"{table.role} timestamp error", table.stage_name, own.tau_s, "s",
+                None if fails is None else float(fails), kind, None)  # fmt: skip
+
+    def changed(value: float) -> Problem:
+        return _with_method(problem, r, own.method, Fraction(value))
+
+    sure = not limits and problem.judge is None
+    return _with_payload(row, problem, design, changed, fails_never=sure)
+
+
+def _with_method(problem: Problem, r: int, method: str, tau_s: Fraction) -> Problem:
+    """The problem with the error of one method in one role set, whatever primitive it stamps."""
+
+    def grown(option: Option) -> Option:
+        if option.method != method:
+            return option
+        return replace(option, tau_s=float(tau_s), exact_tau_s=tau_s)
+
+    return _with_options(problem, grown, {r})
+
+
+def _tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
+    """Values of one tau at which a requirement breaks."""
+    options, found = chosen_options(problem, design), evaluate(problem, design)
+    own, limits = options[r], problem.limits
+    if math.isfinite(own.tau_crit_s) and math.isfinite(limits.sync):
+        yield Fraction(own.tau_crit_s) * Fraction(limits.sync), "sync"
+    rate = problem.sync_rate()
+    others = {
+        pair: pair_bound(problem, design, options, pair) - own.tau()
+        for pair in problem.pairs
+        if r in (pair.role, pair.reference)
+    }
+    if not others or rate == 0:
+        return
+    if math.isfinite(limits.sync):
+        allowed = Fraction(limits.sync) * found.sensor_error_m / rate
+        yield min(allowed - other for other in others.values()), "sync"
+    if limits.accuracy_m is None:
+        return
+    left = Fraction(limits.accuracy_m) - found.total_m
+    if problem.sync_model == "per_sensor":
+        moving = sum((pair.rate() for pair in others), Fraction(0))
+        if moving > 0:
+            yield own.tau() + left / moving, "accuracy"
+        return
+    allowed = found.tau_sys_s + left / rate
+    yield min(allowed - other for other in others.values()), "accuracy"
+
+
+def _platform_slack(
+    loaded: LoadedSpec,
+    problem: Problem,
+    design: Design,
+    build: Build,
+    stage: int,
+    figure: PlatformFigure,
+) -> Slack | None:
+    """Growth of a platform figure: the same design evaluated, and the choice made, anew."""
+    words, dimension = PLATFORM_FIGURES[figure]
+    value = float(platform_figure(loaded, stage, figure))
+    if value <= 0.0:
+        return None
+
+    def changed(at: float) -> Problem:
+        return build(with_platform_figure(loaded, stage, figure, quantity(at, dimension)))
+
+    def kinds_broken(at: float) -> tuple[str, ...]:
+        other = changed(at)
+        same = same_design(problem, design, other)
+        return ("sync",) if same is None else broken(other, evaluate(other, same))
+
+    fails = _first(lambda at: not kinds_broken(at), _tried(value, GROWTHS))
+    unit = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}[figure]
+    kind = None if fails is None else next(iter(kinds_broken(fails)), None)
+    row = Slack(words, "", value, unit, fails, kind, None)
+    return _with_payload(row, problem, design, changed, fails_never=False)
+
+
+def same_design(problem: Problem, design: Design, other: Problem) -> Design | None:
+    """The design of the same names in another problem; None where an option is gone."""
+    places = []
+    for table, option in zip(other.roles, chosen_options(problem, design), strict=True):
+        names = [one.names for one in table.options]
+        if option.names not in names:
+            return None
+        places.append(names.index(option.names))
+    return Design(tuple(places), design.clocks)
+
+
+def payload(problem: Problem, design: Design) -> tuple[tuple[str, str], ...]:
+    """What a payload is told by: sensor and timestamping method of every role."""
+    return tuple((option.sensor, option.method) for option in chosen_options(problem, design))
+
+
+def _with_payload(
+    row: Slack,
+    problem: Problem,
+    design: Design,
+    changed: Callable[[float], Problem],
+    *,
+    fails_never: bool,
+) -> Slack:
+    """The row with the least value at which the choice, made anew, names another payload.
+
+    Every value is solved again: a term that grows can lose a tie of price long before a limit, and
+    a worse sensor can make a cheaper design keep its sync limit.
+    """
+    row = _simulated(row, problem, design, changed)
+    never = ("verdict",) if fails_never else ()
+    if fails_never and _is_sole(problem):
+        return replace(row, never=(*never, "payload"))
+    now = payload(problem, design)
+
+    def same(at: float) -> bool:
+        other = changed(at)
+        found = _chosen(other)
+        return found is not None and payload(other, found) == now
+
+    values = _tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
+    try:
+        at = _first(same, values, row.value, CLOSE if problem.judge is None else SIMULATED_CLOSE)
+    except OutOfTime:
+        raise
+    except NoVerdict:  # what cannot be proven is not claimed
+        return replace(row, searched_to=row.value, never=never)
+    if at is not None and row.fails_at is not None and abs(at - row.fails_at) <= 1e-6 * at:
+        at = row.fails_at
+    return replace(row, payload_changes_at=at, searched_to=values[-1], never=never)
+
+
+def _simulated(
+    row: Slack, problem: Problem, design: Design, changed: Callable[[float], Problem]
+) -> Slack:
+    """The row with the value at which the design fails in simulation, where that comes first."""
+    if problem.judge is None or not row.value > 0.0:
+        return row
+
+    def holds(at: float) -> bool:
+        other = changed(at)
+        same = same_design(problem, design, other)
+        return same is None or not judgement(other, same).failed
+
+    works, fails = row.value, row.fails_at or row.value * COARSE[-1]
+    try:
+        if fails <= works or holds(fails):
+            return row
+        at = _edge(holds, works, fails, SIMULATED_CLOSE)
+    except Unfinished:
+        return row
+    return replace(row, fails_at=at, limited_by="monte_carlo")
+
+
+def _chosen(problem: Problem) -> Design | None:
+    """The choice of a changed problem; None where nothing meets it."""
+    if problem.judge is None:
+        whole = narrowed(
+            problem,
+            [range(len(table.options)) for table in problem.roles],
+            [range(len(table.clocks)) for table in problem.vehicles],
+        )
+        return best_of(whole, in_force())
+    found = choose(problem, "front")
+    return found.design if isinstance(found, Choice) else None
+
+
+def _is_sole(problem: Problem) -> bool:
+    """Whether there is one payload only, sync limit or not."""
+    for table in problem.roles:
+        pool = [*table.options, *(o.option for o in table.excluded if o.option is not None)]
+        if len({(option.sensor, option.method) for option in pool}) > 1:
+            return False
+    return True
+
+
+def _tried(value: float, growths: Sequence[float], fails_at: float | None = None) -> list[float]:
+    """Values to try, rising; just above the one at which the verdict fails is one of them."""
+    scale = value or (fails_at or 1.0) * 1e-6
+    values = {scale * growth for growth in growths}
+    if fails_at is not None:
+        edge = max(fails_at, value)
+        values |= {edge * (1.0 + 1e-9) or 1e-12, max(value, edge * (1.0 - CLOSE))}
+    return sorted(values)
+
+
+def _first(
+    holds: Callable[[float], bool],
+    values: Sequence[float],
+    start: float | None = None,
+    close: float = CLOSE,
+) -> float | None:
+    """Least of the values (and between them, to `close`) at which something no longer holds."""
+    last = values[0] if start is None else start
+    for value in values:
+        if not holds(value):
+            return _edge(holds, last, value, close)
+        last = value
+    return None
+
+
+def _edge(holds: Callable[[float], bool], works: float, fails: float, close: float) -> float:
+    for _ in range(BISECTIONS):
+        if fails - works <= close * abs(fails):
+            break
+        middle = 0.5 * (works + fails)
+        works, fails = (middle, fails) if holds(middle) else (works, middle)
+    return fails

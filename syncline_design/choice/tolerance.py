@@ -1,0 +1,275 @@
+"""The verdict under datasheet tolerances, and which figure to measure next.
+
+A sensor's error lies between its values at both ends of its figures' tolerances.  Accuracy is
+worst at the upper ends; sync is worst at the lower ones, because a better sensor has a smaller
+tau_crit.  So a design passes always, sometimes or never:
+always: sum of upper errors + sync error <= limit, and every lower error keeps its tau_crit;
+never: no errors between the ends satisfy both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+from syncline_design.choice.acceptable import judgement
+from syncline_design.choice.decide import choose
+from syncline_design.choice.evaluate import chosen_options, evaluate
+from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
+from syncline_design.choice.problem import build_problem, selection_of, with_everything
+from syncline_design.choice.slack import payload
+from syncline_design.choice.table import RESOURCES, Design, Problem
+from syncline_design.choice.variations import Build, Figure, quantity, sigma_figures, with_figure
+from syncline_design.model.quantity import format_like
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.selection import RoleSelection
+
+Word = Literal["always", "sometimes", "never"]
+ASSUMED_SPREAD = Fraction(1, 5)  # where a datasheet gives no tolerance, for `measure_next` only
+
+
+@dataclass(frozen=True, slots=True)
+class ToleranceVerdict:
+    """Whether a design passes for every, some or no value within the datasheet tolerances.
+
+    deciding: the figures that decide; alone: the first of them settles it once it is known to be
+    nominal, otherwise they decide together, the widest first.
+    """
+
+    word: Word
+    figures: tuple[str, ...]
+    deciding: tuple[str, ...]
+    alone: bool
+
+    def to_json(self) -> dict[str, Any]:
+        """The value of `tolerances`."""
+        return {
+            "passes": self.word,
+            "figures": list(self.figures),
+            "deciding": list(self.deciding),
+            "alone": self.alone,
+        }
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        if not self.figures:
+            return "No datasheet figure of this design carries a tolerance."
+        out = f"Within the datasheet tolerances the design {self.word} passes"
+        if not self.deciding:
+            return out + "."
+        names = ", ".join(self.deciding)
+        return out + (f"; {names} decides it." if self.alone else f"; {names} decide it together.")
+
+
+def tolerance_verdict(
+    loaded: LoadedSpec, problem: Problem, design: Design, build: Build = build_problem
+) -> ToleranceVerdict:
+    """The verdict on one design under the tolerances of its own sensors' figures."""
+    selected = selection_of(problem, design).roles
+    used = {(one.sensor, one.role) for one in selected}
+    sensors = {sensor for sensor, _ in used}
+    figures = [f for f in sigma_figures(loaded) if f.sensor in sensors and f.quantity.has_tolerance]
+    names = tuple(figure.name for figure in figures)
+    word = _word(loaded, selected, design, figures, build)
+    if word != "sometimes":
+        return ToleranceVerdict(word, names, (), False)
+    settles = []
+    for figure in figures:
+        rest = [other for other in figures if other != figure]
+        if _word(loaded, selected, design, rest, build) != "sometimes":
+            settles.append(figure.name)
+    if settles:
+        return ToleranceVerdict(word, names, tuple(settles[:1]), True)
+    widest = sorted(figures, key=lambda f: (-_span(loaded, selected, f, build), f.name))
+    return ToleranceVerdict(word, names, tuple(f.name for f in widest), False)
+
+
+def _errors(
+    loaded: LoadedSpec, selected: Sequence[RoleSelection], build: Build
+) -> tuple[Problem, Design, list[Fraction]]:
+    """Exact errors of a selection under a changed spec, sync limit or not."""
+    everything = with_everything(build(loaded))
+    places = []
+    for table, one in zip(everything.roles, selected, strict=True):
+        names = [option.names for option in table.options]
+        places.append(names.index((one.sensor, one.primitive, one.method)))
+    design = Design(tuple(places), (0,) * len(everything.vehicles))
+    return everything, design, [o.error() for o in chosen_options(everything, design)]
+
+
+def _at(loaded: LoadedSpec, figures: Iterable[Figure], end: Literal["low", "high"]) -> LoadedSpec:
+    for figure in figures:
+        value = getattr(figure.quantity, end)
+        loaded = with_figure(loaded, figure, quantity(value, figure.dimension))
+    return loaded
+
+
+def _word(
+    loaded: LoadedSpec,
+    selected: Sequence[RoleSelection],
+    design: Design,
+    figures: Sequence[Figure],
+    build: Build,
+) -> Word:
+    """Always, sometimes or never, by the ends of every sensor's error.
+
+    Always asks simulation too, at the upper ends: what it leaves open is not said to pass always.
+    """
+    better, best_case, low = _errors(_at(loaded, figures, "low"), selected, build)
+    problem, plain, high = _errors(_at(loaded, figures, "high"), selected, build)
+    found = evaluate(problem, Design(plain.options, design.clocks))
+    strict, limits = build(loaded).limits, problem.limits
+    others = found.total_m - found.sensor_error_m
+    room = math.inf if limits.accuracy_m is None else Fraction(limits.accuracy_m) - others
+    least = [Fraction(0)] * len(low)
+    demand = Fraction(0)
+    if math.isfinite(strict.sync):
+        demand = found.sync_rate_mps * found.tau_sys_s / Fraction(strict.sync)
+        least = [_least_error(problem, plain, r, strict.sync) for r in range(len(low))]
+    if any(amount in _budgets_broken(problem, design, plain) for amount in RESOURCES):
+        return "never"
+    keeps = all(e > bound for e, bound in zip(low, least, strict=True))
+    if keeps and _fits(sum(high, Fraction(0)), room) and sum(low, Fraction(0)) > demand:
+        noisiest = Design(plain.options, design.clocks)
+        return "always" if judgement(problem, noisiest).passed else "sometimes"
+    reachable = all(e > bound for e, bound in zip(high, least, strict=True))
+    lowest = sum(map(max, low, least), Fraction(0))
+    best_found = evaluate(better, Design(best_case.options, design.clocks))
+    most = room + others - (best_found.total_m - best_found.sensor_error_m)
+    feasible = reachable and _fits(lowest, most) and sum(high, Fraction(0)) > demand
+    return "sometimes" if feasible and demand < most else "never"
+
+
+def _fits(error: Fraction, room: Fraction | float) -> bool:
+    return float(error) <= float(room)
+
+
+def _least_error(problem: Problem, design: Design, r: int, limit: float) -> Fraction:
+    """Sensor error that a role's own tau demands: tau_i < limit * tau_crit_i."""
+    option = chosen_options(problem, design)[r]
+    if not math.isfinite(option.tau_crit_s) or option.tau_crit_s == 0.0:
+        return Fraction(-1)
+    rate = option.error() / Fraction(option.tau_crit_s)
+    return option.tau() * rate / Fraction(limit)
+
+
+def _budgets_broken(problem: Problem, design: Design, plain: Design) -> tuple[str, ...]:
+    from syncline_design.choice.evaluate import broken
+
+    return broken(problem, evaluate(problem, Design(plain.options, design.clocks)), accuracy=False)
+
+
+def _span(
+    loaded: LoadedSpec, selected: Sequence[RoleSelection], figure: Figure, build: Build
+) -> float:
+    """How much a figure's tolerance moves the sensor error [m]."""
+    ends = [sum(_errors(_at(loaded, [figure], end), selected, build)[2]) for end in ("low", "high")]
+    return float(ends[1] - ends[0])
+
+
+@dataclass(frozen=True, slots=True)
+class Measurement:
+    """A datasheet figure that alone changes the choice when it lies at one end of its range.
+
+    value and at are in SI; value_text is the figure as written, at_text the other end in its unit.
+    assumed: the datasheet gives no tolerance and 20 % to either side was tried.
+    """
+
+    figure: str
+    value: float
+    at: float
+    assumed: bool
+    becomes: str
+    objective_change: float | None
+    value_text: str
+    at_text: str
+
+    def to_json(self) -> dict[str, Any]:
+        """The entry under `measure_next`."""
+        return {
+            "figure": self.figure,
+            "value": self.value,
+            "at": self.at,
+            "value_text": self.value_text,
+            "at_text": self.at_text,
+            "assumed_tolerance": self.assumed,
+            "becomes": self.becomes,
+            "objective_change": self.objective_change,
+        }
+
+
+def measure_next(
+    loaded: LoadedSpec, problem: Problem, design: Design, build: Build = build_problem
+) -> tuple[Measurement, ...]:
+    """Figures that alone flip the choice, the dearest flip first.
+
+    Tried are the ends of every tolerance; where no figure has one, 20 % to either side of each.
+    """
+    figures = list(sigma_figures(loaded))
+    given = [figure for figure in figures if figure.quantity.has_tolerance]
+    found: list[Measurement] = []
+    for figure in given or figures:
+        try:
+            found += _flips(loaded, problem, design, build, figure, assumed=not given)
+        except OutOfTime:
+            raise
+        except NoVerdict:  # what cannot be proven is not claimed
+            continue
+    return tuple(sorted(found, key=lambda m: (-_weight(m), m.figure, m.at)))
+
+
+def _weight(one: Measurement) -> float:
+    return math.inf if one.objective_change is None else abs(one.objective_change)
+
+
+def _flips(
+    loaded: LoadedSpec,
+    problem: Problem,
+    design: Design,
+    build: Build,
+    figure: Figure,
+    *,
+    assumed: bool,
+) -> Iterator[Measurement]:
+    now = payload(problem, design)
+    value = figure.quantity
+    ends = (value.low, value.high)
+    if assumed:
+        spread = value.exact * ASSUMED_SPREAD
+        ends = (float(value.exact - spread), float(value.exact + spread))
+    for end in ends:
+        other = build(with_figure(loaded, figure, quantity(end, figure.dimension)))
+        outcome = choose(other, "front")
+        if not isinstance(outcome, Choice):
+            yield _measurement(figure, end, assumed, "infeasible", None)
+            continue
+        then = payload(other, outcome.design)
+        if then != now:
+            changes = [
+                f"{table.role} of {table.stage_name}: {sensor} stamped by {method}"
+                for table, (sensor, method), before in zip(other.roles, then, now, strict=True)
+                if (sensor, method) != before
+            ]
+            change = _objective(other, outcome.design) - _objective(problem, design)
+            yield _measurement(figure, end, assumed, "; ".join(changes), change)
+
+
+def _measurement(
+    figure: Figure, end: float, assumed: bool, becomes: str, change: float | None
+) -> Measurement:
+    value = figure.quantity
+    return Measurement(
+        figure.name, float(value), end, assumed, becomes, change, value.text,
+        format_like(value.text, end),
+    )  # fmt: skip
+
+
+def _objective(problem: Problem, design: Design) -> float:
+    found = evaluate(problem, design)
+    if problem.objective == "error":
+        return found.error_m
+    return float(found.amount(problem.objective) or 0)

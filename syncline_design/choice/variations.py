@@ -1,0 +1,150 @@
+"""A spec with one thing changed: what-if questions are answered by building and solving anew."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any, Literal
+
+from syncline_design.choice.table import Problem
+from syncline_design.machine.deadline import in_force
+from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.spec.catalog import SensorEntry
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.resolve import candidate_sensors, platform_of
+from syncline_design.spec.spec import MethodChoice, Role, StageChoice
+
+Build = Callable[[LoadedSpec], Problem]
+PlatformFigure = Literal["v_max", "distance", "omega_max"]
+PLATFORM_FIGURES: dict[PlatformFigure, tuple[str, Dimension]] = {
+    "v_max": ("speed v_max", Dimension.SPEED),
+    "distance": ("distance", Dimension.LENGTH),
+    "omega_max": ("turn rate omega_max", Dimension.ANGULAR_RATE),
+}
+SIGMA_DIMENSIONS = {
+    "sigma_position": Dimension.LENGTH,
+    "sigma_attitude": Dimension.ANGLE,
+    "sigma_range": Dimension.LENGTH,
+    "sigma_bearing": Dimension.ANGLE,
+}
+
+
+def quantity(value: float | Fraction, dimension: Dimension) -> Quantity:
+    """A figure of our own making as the spec would hold it."""
+    exact = Fraction(value)
+    return Quantity(exact, format_quantity(float(exact), dimension))
+
+
+def with_stage(loaded: LoadedSpec, index: int, **changes: Any) -> LoadedSpec:
+    """The spec with some keys of one stage changed; every what-if asks for time first."""
+    in_force().check()
+    stages = list(loaded.spec.stages)
+    stages[index] = stages[index].model_copy(update=changes)
+    spec = loaded.spec.model_copy(update={"stages": tuple(stages)})
+    return replace(loaded, spec=spec)
+
+
+def with_platform_figure(
+    loaded: LoadedSpec, stage: int, figure: PlatformFigure, value: Quantity
+) -> LoadedSpec:
+    """The spec with one figure of a stage's platform changed."""
+    platform = loaded.spec.stages[stage].platform.model_copy(update={figure: value})
+    return with_stage(loaded, stage, platform=platform)
+
+
+def platform_figure(loaded: LoadedSpec, stage: int, figure: PlatformFigure) -> float:
+    """One figure of a stage's platform [SI], as written."""
+    entry = platform_of(loaded.spec.stages[stage].platform, loaded.catalog)
+    value: float = getattr(entry, figure)
+    return value
+
+
+def with_methods(
+    loaded: LoadedSpec, stage: int, role: Role, methods: tuple[str, ...]
+) -> LoadedSpec:
+    """The spec with other timestamping methods open to one role."""
+    choice = loaded.spec.stages[stage].role(role)
+    assert choice is not None
+    opened = MethodChoice.model_construct(candidates=methods)
+    return with_stage(loaded, stage, **{role: choice.model_copy(update={"timestamping": opened})})
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """One datasheet figure of a sensor: `figure` of axis `axis` (None: the one for all axes).
+
+    stage, role: where a sensor given in place stands; None: an entry of the catalogs.
+    """
+
+    sensor: str
+    figure: str
+    axis: int | None
+    quantity: Quantity
+    place: tuple[int, Role] | None = None
+
+    @property
+    def dimension(self) -> Dimension:
+        """What it measures."""
+        return SIGMA_DIMENSIONS[self.figure]
+
+    @property
+    def name(self) -> str:
+        """`ublox_f9p_rtk sigma_position`, with the axis where there are several."""
+        axis = "" if self.axis is None else f"[{self.axis}]"
+        return f"{self.sensor} {self.figure}{axis}"
+
+
+def sigma_figures(loaded: LoadedSpec) -> Iterator[Figure]:
+    """Every datasheet figure of every sensor that the spec may use, once."""
+    seen: set[tuple[str, str, int | None]] = set()
+    for index, stage in enumerate(loaded.spec.stages):
+        for role in ("position", "attitude", "ranging"):
+            own = _own_sensor(stage, role)
+            for name, entry in candidate_sensors(loaded.spec, stage, role, loaded.catalog):
+                for figure in _figures(name, entry, (index, role) if own else None):
+                    key = (figure.sensor, figure.figure, figure.axis)
+                    if key not in seen:
+                        seen.add(key)
+                        yield figure
+
+
+def _own_sensor(stage: StageChoice, role: Role) -> bool:
+    choice = stage.role(role)
+    return choice is not None and isinstance(choice.sensor, SensorEntry)
+
+
+def _figures(name: str, entry: SensorEntry, place: tuple[int, Role] | None) -> Iterator[Figure]:
+    for figure in SIGMA_DIMENSIONS:
+        value = getattr(entry, figure)
+        if isinstance(value, Quantity):
+            yield Figure(name, figure, None, value, place)
+        elif isinstance(value, tuple):
+            for axis, one in enumerate(value):
+                if isinstance(one, Quantity):
+                    yield Figure(name, figure, axis, one, place)
+
+
+def with_figure(loaded: LoadedSpec, figure: Figure, value: Quantity) -> LoadedSpec:
+    """The spec and catalogs with one datasheet figure changed; OutOfTime after the deadline."""
+    in_force().check()
+    if figure.place is not None:
+        stage, role = figure.place
+        choice = loaded.spec.stages[stage].role(role)
+        assert choice is not None
+        assert isinstance(choice.sensor, SensorEntry)
+        sensor = _changed(choice.sensor, figure, value)
+        return with_stage(loaded, stage, **{role: choice.model_copy(update={"sensor": sensor})})
+    sensors = dict(loaded.catalog.sensors)
+    sensors[figure.sensor] = _changed(sensors[figure.sensor], figure, value)
+    catalog = loaded.catalog.model_copy(update={"sensors": sensors})
+    return replace(loaded, catalog=catalog)
+
+
+def _changed(entry: SensorEntry, figure: Figure, value: Quantity) -> SensorEntry:
+    new: Any = value
+    if figure.axis is not None:
+        axes = list(getattr(entry, figure.figure))
+        axes[figure.axis] = value
+        new = tuple(axes)
+    return entry.model_copy(update={figure.figure: new})

@@ -1,0 +1,98 @@
+"""The command line: parse, call, print, exit.
+
+Exit codes: 0 meets, 1 does not meet (infeasible included), 2 bad spec or usage, 3 no verdict.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from syncline_design import __version__
+from syncline_design.cli import design, evidence, library
+from syncline_design.cli.shared import NO_VERDICT
+from syncline_design.machine.processes import forget_working_folder
+from syncline_design.machine.streams import say, secure_streams
+
+
+class _Commands(TyperGroup):
+    """The commands; an empty argument (an unset variable, say) is not the working folder."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        for argument in args:
+            if not argument or (argument.startswith("--") and argument.endswith("=")):
+                shown = argument or '""'
+                ctx.fail(f"an empty argument ({shown}); expected a path or a value")
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    name="syncline-design",
+    cls=_Commands,
+    help="Choose, verify and diagnose sensor payloads and their time synchronisation.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+catalog = typer.Typer(help="Look into the built-in catalogs.", no_args_is_help=True)
+app.add_typer(catalog, name="catalog")
+
+app.command("check")(design.check)
+app.command("optimize")(design.optimize)
+app.command("simulate")(evidence.simulate)
+app.command("diagnose")(evidence.diagnose)
+app.command("study")(design.study)
+app.command("diff")(design.diff)
+app.command("reproduce")(evidence.reproduce)
+catalog.command("list")(library.catalog_list)
+catalog.command("show")(library.catalog_show)
+app.command("schema")(library.schema)
+app.command("init")(library.init)
+
+
+def _print_version(value: bool) -> None:
+    if value:
+        print(f"syncline-design {__version__}")
+        raise typer.Exit(0)
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", callback=_print_version, is_eager=True, help="Print the version."
+        ),
+    ] = False,
+) -> None:
+    """Nothing to set up: every command stands alone."""
+
+
+def main() -> None:
+    """Entry point of the `syncline-design` command."""
+    secure_streams()
+    forget_working_folder()
+    _start_quickly()
+    try:
+        app()
+    except OSError as error:  # help, or the version, to a standard output that takes nothing
+        say(f"syncline-design: standard output: cannot write: {error.strerror or error}")
+        raise SystemExit(NO_VERDICT) from None
+
+
+def _start_quickly() -> None:
+    """Spare a short command what only long ones need; commands import their parts after this.
+
+    While it imports, a command makes many lasting objects and little garbage: looking for cycles as
+    often as Python does by default costs a tenth of its time.  Looking for validation plugins among
+    all installed packages costs about as much, and there are none.  Matrices are small and many:
+    threads of the linear algebra library slow them down, and could change the last bits.
+    """
+    gc.set_threshold(50_000, 20, 20)
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+    for name in ("OMP", "OPENBLAS", "MKL"):
+        os.environ.setdefault(f"{name}_NUM_THREADS", "1")

@@ -1,0 +1,194 @@
+"""Commands that judge and choose designs: check, optimize, study, diff."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import typer
+
+from syncline_design.cli.shared import (
+    CheckOutput,
+    DiffOutput,
+    MethodOption,
+    OptimizeOutput,
+    QuietOption,
+    SeedOption,
+    SpecArgument,
+    StudyOutput,
+    TimeLimitOption,
+    deadline_of,
+    emit,
+    guarded,
+    output_targets,
+    refuse,
+    road,
+    watched,
+)
+from syncline_design.machine.streams import say
+
+
+@guarded
+def check(
+    spec: Annotated[list[Path], typer.Argument(help="Specs; of a folder, the specs in it.")],
+    output: CheckOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    method: MethodOption = "auto",
+    time_limit: TimeLimitOption = None,
+    skip_others: Annotated[
+        bool, typer.Option("--skip-others", help="Pass over named files that are no specs too.")
+    ] = False,
+) -> int:
+    """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
+    deadline = deadline_of(time_limit)
+    from syncline_design.report.checks import CHECK_FORMATS, render_checks
+    from syncline_design.report.console import verdict_text
+    from syncline_design.report.several import skipped_text, summary_line
+    from syncline_design.report.write import STDOUT
+    from syncline_design.spec.folders import spec_files
+    from syncline_design.verdict.verify import CheckSettings, check_files, exit_code
+
+    found = spec_files(spec, skip_others=skip_others)
+    targets = output_targets(output, CHECK_FORMATS, found.files)
+    settings = CheckSettings(seed=seed, method=road(method))
+    with watched(deadline, targets, quiet=quiet):
+        verdicts = check_files(found.files, settings)
+    refused = [verdict for verdict in verdicts if verdict["verdict"] == "refused"]
+    for verdict in refused:
+        say(verdict["text"])
+    if refused:  # no file is written; what goes to standard output may say so
+        targets = [target for target in targets if target.path == STDOUT]
+    text = "\n".join(verdict_text(v) for v in verdicts if v not in refused)
+    if len(found.files) != 1 or any(path.is_dir() for path in spec):
+        summary = summary_line(verdicts)
+        text = f"{text}\n{summary}\n" if text else f"{summary}\n"
+    if found.skipped and not quiet:
+        say(skipped_text(found.skipped))
+    emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
+    return max((exit_code(verdict) for verdict in verdicts), default=0)
+
+
+@guarded
+def optimize(
+    spec: SpecArgument,
+    output: OptimizeOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    method: MethodOption = "auto",
+    time_limit: TimeLimitOption = None,
+    best: Annotated[int, typer.Option(min=1, help="How many designs that differ in a sensor.")] = 1,
+    every: Annotated[
+        bool, typer.Option("--every", help="Of --best: rank every design, whatever differs.")
+    ] = False,
+    pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
+    resource: Annotated[
+        Literal["cost", "mass", "power"], typer.Option(help="What the front sets against error.")
+    ] = "cost",
+    write_design: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")
+    ] = None,
+) -> int:
+    """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
+    deadline = deadline_of(time_limit)
+    from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
+    from syncline_design.spec.load import load
+    from syncline_design.verdict.optimise import OptimizeSettings, optimisation_text, optimize
+
+    targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
+    loaded = load(spec)
+    for name in loaded.spec.catalogs if write_design is not None else ():
+        if write_design is not None and not (write_design.parent / name).exists():
+            refuse(
+                f"syncline-design: --write-design {write_design}: the spec draws in {name}, which "
+                "is not in that folder; write the design beside the spec"
+            )
+    settings = OptimizeSettings(
+        best, pareto, resource, road(method), seed=seed,
+        every=every,
+        report=any(target.format == "html" for target in targets),
+    )  # fmt: skip
+    with watched(deadline, targets, quiet=quiet):
+        found = optimize(loaded, settings)
+    if write_design is not None and found.exit_code == 0:
+        _write_design(found, write_design)
+    emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
+    return found.exit_code
+
+
+def _write_design(found: Any, path: Path) -> None:
+    from syncline_design.spec.edit import write_spec
+    from syncline_design.verdict.optimise import pinned_text
+
+    write_spec(pinned_text(found.loaded, found.problem, found.designs[0]), path)
+    say(f"design written to {path}")
+
+
+@guarded
+def study(
+    study_file: Annotated[
+        Path, typer.Argument(metavar="STUDY", help="Study (YAML).", show_default=False)
+    ],
+    output: StudyOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    output_format: Annotated[
+        str | None,
+        typer.Option(
+            "--format", metavar="FORMAT", help="Print this format (as --output) to standard output."
+        ),
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Local worker processes.")] = 2,
+    store: Annotated[
+        Path | None, typer.Option(help="Folder of the case files; default: beside the study.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on this Dask scheduler.")
+    ] = None,
+    dask: Annotated[bool, typer.Option("--dask", help="Run on a local Dask cluster.")] = False,
+    fresh: Annotated[
+        bool, typer.Option("--fresh", help="Believe no case file that is there: compute all anew.")
+    ] = False,
+) -> int:
+    """Sweep specs over grids or samples of their keys; a stopped study resumes."""
+    from syncline_design.report.progress_line import ProgressLine
+    from syncline_design.report.studies import STUDY_FORMATS, render_study
+    from syncline_design.report.study_words import study_text
+    from syncline_design.studies import StudySettings, run_study
+    from syncline_design.studies.store import FOLDER
+
+    wanted = [*(output or ()), *([f"{output_format}:-"] if output_format else ())]
+    targets = output_targets(wanted, STUDY_FORMATS, [study_file])
+    _keep_cases([Path(t.path) for t in targets], store or study_file.parent / FOLDER)
+    settings = StudySettings(seed, workers, store, scheduler, dask, fresh=fresh)
+    result = run_study(study_file, settings, None if quiet else ProgressLine())
+    emit(study_text(result), targets, lambda name: render_study(name, result), quiet=quiet)
+    return result.exit_code
+
+
+def _keep_cases(outputs: list[Path], store: Path) -> None:
+    """Refuse a result that would lie among the files of cases."""
+    for path in outputs:
+        inside = Path(os.path.realpath(path)).parent
+        if inside.parent == Path(os.path.realpath(store)) and len(inside.name) == 2:
+            refuse(f"syncline-design: {path}: lies among the files of cases; write it elsewhere")
+
+
+@guarded
+def diff(
+    old: Annotated[Path, typer.Argument(help="Spec, or verdict written as JSON.")],
+    new: Annotated[Path, typer.Argument(help="Spec, or verdict written as JSON.")],
+    output: DiffOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+) -> int:
+    """Say in words what changed between two specs or verdicts; the exit code is the new one's."""
+    from syncline_design.comparison.diff import diff as compare
+    from syncline_design.report.on_difference import DIFF_FORMATS, diff_text, render_diff
+    from syncline_design.verdict.verify import CheckSettings
+
+    targets = output_targets(output, DIFF_FORMATS, [old, new])
+    data = compare(old, new, CheckSettings(seed=seed))
+    emit(diff_text(data), targets, lambda name: render_diff(name, data), quiet=quiet)
+    return int(data["exit_code"])

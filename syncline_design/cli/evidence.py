@@ -1,0 +1,139 @@
+"""Commands that show evidence: simulate, diagnose, reproduce."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from syncline_design.cli.shared import (
+    DiagnoseOutput,
+    QuietOption,
+    ReproduceOutput,
+    SeedOption,
+    SimulateOutput,
+    SpecArgument,
+    emit,
+    guarded,
+    output_targets,
+)
+from syncline_design.machine.streams import say
+
+
+@guarded
+def simulate(
+    spec: SpecArgument,
+    output: SimulateOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    samples: Annotated[
+        int | None, typer.Option(help="Monte Carlo samples; default: the spec's.")
+    ] = None,
+    workers: Annotated[
+        int | None, typer.Option(min=1, help="Processes for long runs; the result is the same.")
+    ] = None,
+) -> int:
+    """Simulate the nonlinear chain against the Syncline over a grid of tau."""
+    from syncline_design.report.simulations import SIMULATE_FORMATS, render_simulate
+    from syncline_design.report.text import visible
+    from syncline_design.simulation.summary import summary_text
+    from syncline_design.spec.load import load
+    from syncline_design.verdict.simulated_spec import simulate_spec
+
+    targets = output_targets(output, SIMULATE_FORMATS, [spec])
+    loaded = load(spec)
+    run = simulate_spec(loaded, seed=seed, samples=samples, workers=workers)
+    head = f"{visible(loaded.spec.name)} ({visible(spec)})"
+    text = f"{head}\n\n{summary_text(run.result, run.system)}"
+    emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
+    return 0
+
+
+@guarded
+def diagnose(
+    spec: SpecArgument,
+    log: Annotated[
+        list[Path] | None,
+        typer.Argument(help="Measured logs (CSV, Parquet); default: the spec's `log: files:`."),
+    ] = None,
+    output: DiagnoseOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    write_spec: Annotated[
+        Path | None, typer.Option(metavar="PATH", help="Write the spec with the findings in it.")
+    ] = None,
+    false_alarm_rate: Annotated[
+        float, typer.Option(min=0.0005, max=0.5, help="Chance that a clean log is found at fault.")
+    ] = 0.05,
+    max_effects: Annotated[int, typer.Option(min=0, max=20, help="Effects named at most.")] = 4,
+) -> int:
+    """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
+    from syncline_design.comparison.meaning import as_measured, meaning
+    from syncline_design.diagnosis import DiagnosisSettings, summary_text
+    from syncline_design.diagnosis import diagnose as diagnose_log
+    from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
+    from syncline_design.report.text import visible
+    from syncline_design.spec.load import load
+
+    targets = output_targets(output, DIAGNOSE_FORMATS, [spec, *(log or ())], [write_spec])
+    loaded = load(spec)
+    settings = DiagnosisSettings(
+        seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects
+    )
+    with _progress(quiet) as progress:
+        found = diagnose_log(as_measured(loaded), log or (), settings, progress)
+        means = meaning(loaded, found, seed)
+    data = found.to_json()
+    text = f"{visible(loaded.spec.name)} ({visible(spec)})\n\n{summary_text(found)}"
+    if means is not None:
+        data["design"] = means.to_json()
+        text += f"\nWhat it means for the design:\n{means.text()}"
+    if write_spec is not None and means is not None:
+        from syncline_design.spec.edit import write_spec as write_checked
+
+        write_checked(means.spec_text, write_spec)
+        say(f"spec with the findings written to {write_spec}")
+    elif write_spec is not None:
+        say("nothing was found: no spec written")
+    emit(text, targets, lambda name: render_diagnose(name, data), quiet=quiet)
+    return found.exit_code
+
+
+@contextmanager
+def _progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error where that is a terminal; otherwise nothing."""
+    if quiet or not sys.stderr.isatty():
+        yield lambda _, __: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda words, share: bar.update(task, description=words, completed=share)
+
+
+@guarded
+def reproduce(
+    output: ReproduceOutput = None, seed: SeedOption = 0, quiet: QuietOption = False
+) -> int:
+    """Compute every table and figure of the paper and compare it with what is printed."""
+    from syncline_design.paper import reproduce as paper
+    from syncline_design.report.formats import REPRODUCE_FORMATS
+
+    targets = output_targets(output, REPRODUCE_FORMATS)
+    data = paper.reproduce(seed=seed)
+    emit(paper.text(data), targets, lambda name: _reproduction(name, data), quiet=quiet)
+    return 0 if data.ok else 1
+
+
+def _reproduction(name: str, data: Any) -> str:
+    from syncline_design.report.json_out import json_text
+    from syncline_design.report.pages import render_reproduction
+
+    return json_text(data.to_json()) if name == "json" else render_reproduction(data.to_json())

@@ -1,0 +1,205 @@
+"""What every command shares: options, refusals, where results go."""
+
+from __future__ import annotations
+
+import functools
+import os
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
+
+import typer
+
+from syncline_design.machine.streams import say, without_commands
+from syncline_design.report import formats
+
+if TYPE_CHECKING:
+    from syncline_design.machine.deadline import Deadline
+    from syncline_design.report.write import Target
+
+PAGE_S = 1.0  # what drawing a page takes
+BAD_INPUT, NO_VERDICT, INTERRUPTED = 2, 3, 130
+DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal error
+
+P = ParamSpec("P")
+
+SpecArgument = Annotated[Path, typer.Argument(help="System spec (YAML).", show_default=False)]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of every random number.")]
+QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No text, only the exit code.")]
+MethodOption = Annotated[str, typer.Option(help="auto, front, milp or enumerate.")]
+TimeLimitOption = Annotated[
+    float | None,
+    typer.Option(min=0.0, help="Seconds for the whole command; then what is known."),
+]
+
+
+def output_option(formats: tuple[str, ...]) -> Any:
+    """`--output` of a command, its help naming the formats that it knows."""
+    return typer.Option(
+        "--output",
+        "-o",
+        metavar="FORMAT:PATH",
+        help=f"Write the result too; formats: {', '.join(formats)}; repeatable; path `-` is "
+        "standard output.",
+    )
+
+
+CheckOutput = Annotated[list[str] | None, output_option(formats.CHECK_FORMATS)]
+OptimizeOutput = Annotated[list[str] | None, output_option(formats.OPTIMIZE_FORMATS)]
+SimulateOutput = Annotated[list[str] | None, output_option(formats.SIMULATE_FORMATS)]
+DiagnoseOutput = Annotated[list[str] | None, output_option(formats.DIAGNOSE_FORMATS)]
+StudyOutput = Annotated[list[str] | None, output_option(formats.STUDY_FORMATS)]
+DiffOutput = Annotated[list[str] | None, output_option(formats.DIFF_FORMATS)]
+ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FORMATS)]
+
+
+def refuse(message: str, code: int = BAD_INPUT) -> NoReturn:
+    say(message)
+    raise typer.Exit(code)
+
+
+def guarded(command: Callable[P, int]) -> Callable[P, None]:
+    """Turn what can go wrong into a message and an exit code; never a traceback for a user."""
+
+    @functools.wraps(command)
+    def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        from syncline_design.machine.input_files import ReplacedInputError, noting
+        from syncline_design.machine.result_files import OutputError
+        from syncline_design.spec.load import BadInput
+
+        try:
+            with noting():
+                code = command(*args, **kwargs)
+        except typer.Exit:
+            raise
+        except BadInput as error:
+            refuse(str(error))
+        except ReplacedInputError as error:
+            refuse(f"syncline-design: {error}")
+        except OutputError as error:
+            refuse(f"syncline-design: {error}", NO_VERDICT)
+        except KeyboardInterrupt:
+            _end_quietly()
+            refuse("syncline-design: interrupted", INTERRUPTED)
+        except MemoryError:
+            refuse("syncline-design: out of memory; no verdict", NO_VERDICT)
+        except Exception as error:
+            if DEBUG_VARIABLE in os.environ:
+                raise
+            refuse_unexpected(error)
+        raise typer.Exit(code)
+
+    return run
+
+
+def _end_quietly() -> None:
+    """After an interrupt, what a library fails to tidy up at exit is nobody's concern."""
+    if not hasattr(sys, "ps1"):
+        sys.unraisablehook = lambda _: None
+
+
+def show(text: str) -> None:
+    """Print a text that is the whole result."""
+    from syncline_design.report.write import STDOUT, Target, write_outputs
+
+    write_outputs([(Target("text", STDOUT), text)])
+
+
+def refuse_unexpected(error: Exception) -> NoReturn:
+    """Known errors speak for themselves; unknown ones are ours."""
+    codes: dict[str, int] = {
+        "NoVerdict": NO_VERDICT,
+        "SimulationError": BAD_INPUT,
+        "DiagnosisError": BAD_INPUT,
+        "StudyError": BAD_INPUT,
+    }
+    names = [c.__name__ for c in type(error).__mro__]
+    for name, code in codes.items():
+        if name in names:
+            refuse(f"syncline-design: {error}", code)
+    refuse(
+        f"syncline-design: internal error, no verdict: {type(error).__name__}: {error}\n"
+        f"Please report it with the spec; {DEBUG_VARIABLE}=1 shows where it happened.",
+        NO_VERDICT,
+    )
+
+
+def output_targets(
+    output: list[str] | None,
+    formats: tuple[str, ...],
+    reads: Sequence[Path] = (),
+    writes: Sequence[Path | None] = (),
+) -> list[Target]:
+    """Where results go; refused where one would overwrite a file that the command reads.
+
+    reads: files named on the command line; what these name in turn is held against the targets
+    when it is opened.  writes: specs that are written besides.
+    """
+    from syncline_design.machine.input_files import ReplacedInputError, claim_outputs, note_read
+    from syncline_design.report.write import (
+        STDOUT,
+        OutputError,
+        check_targets,
+        check_writable,
+        parse_target,
+    )
+
+    specs = [path for path in writes if path is not None]
+    try:
+        targets = [parse_target(text, formats) for text in output or ()]
+        for path in specs:
+            check_writable(path)
+        check_targets(targets, [*reads, *specs])
+        for path in reads:
+            note_read(path)
+        claim_outputs([*specs, *(Path(t.path) for t in targets if t.path != STDOUT)])
+    except (OutputError, ReplacedInputError) as error:
+        refuse(f"syncline-design: {error}")
+    return targets
+
+
+def emit(
+    text: str, targets: list[Target], render: Callable[[str], str | bytes], *, quiet: bool
+) -> None:
+    """Write every target, then the text unless something else already claims standard output."""
+    from syncline_design.report.write import STDOUT, Target, write_outputs
+
+    rendered: list[tuple[Target, str | bytes]] = [
+        (target, render(target.format)) for target in targets
+    ]
+    if text and not quiet and not any(target.path == STDOUT for target in targets):
+        rendered.append((Target("text", STDOUT), without_commands(text)))
+    write_outputs(rendered)
+
+
+def deadline_of(time_limit_s: float | None) -> Deadline:
+    """The command's time limit, which begins now: before anything slow is imported."""
+    from syncline_design.machine.deadline import Deadline
+
+    return Deadline(time_limit_s)
+
+
+@contextmanager
+def watched(deadline: Deadline, targets: Sequence[Target], *, quiet: bool) -> Iterator[None]:
+    """The time limit put in force, with time kept back for pages and signs of progress."""
+    from syncline_design.machine.deadline import within
+    from syncline_design.report.progress_line import StepLine
+
+    if any(target.format == "html" for target in targets):
+        deadline.keep_back(PAGE_S)
+    line = StepLine(quiet=quiet)
+    deadline.tick = line
+    try:
+        with within(deadline):
+            yield
+    finally:
+        line.clear()
+
+
+def road(name: str) -> Any:
+    known = ("auto", "front", "milp", "enumerate")
+    if name not in known:
+        refuse(f"syncline-design: --method {name}: expected one of {', '.join(known)}")
+    return name

@@ -1,0 +1,338 @@
+"""What changed between two specs, or two verdict files: causes, payload, price, margins.
+
+Causes are what the files say differently.  Where both are specs and several things differ, each
+change is also put into the old spec alone and chosen anew, so that the report can say which of
+them moves the payload and the price.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from syncline_design.comparison.verdict_file import read_verdict, text_of
+from syncline_design.spec.catalog import SECTIONS
+from syncline_design.spec.factors import label
+from syncline_design.spec.keys import PLATFORM_KEYS, put
+from syncline_design.spec.load import (
+    BadInput,
+    LoadedSpec,
+    catalogs_of,
+    load_document,
+    without_simulated,
+)
+from syncline_design.spec.resolve import platform_of
+from syncline_design.spec.yaml_text import Document, KeyPath, parse
+from syncline_design.verdict.verify import CheckSettings, check_loaded, exit_code
+
+Json = dict[str, Any]
+SCHEMA = "syncline-design/diff/v1"
+MOST_TRIED = 8  # changes that are also tried one by one
+_ABSENT = object()
+_NAMED = {"stages": "name", "requirements": "id"}
+_SILENT_KEYS = {"note", "name", "source"}  # words about things, not things
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One of the two files: its verdict, and the spec where it is one."""
+
+    file: str
+    verdict: Json
+    loaded: LoadedSpec | None = None
+    document: Document | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """One thing that the files say differently; None: not there.
+
+    effect: what this change alone does to the old spec, where it was tried.
+    """
+
+    key: str
+    old: str | None
+    new: str | None
+    path: KeyPath | None = None
+    effect: Json | None = None
+
+    def to_json(self) -> Json:
+        """The entry under `causes`."""
+        return {"key": self.key, "old": self.old, "new": self.new, "effect": self.effect}
+
+
+def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None) -> Json:
+    """The difference of two specs or verdict files (schema syncline-design/diff/v1)."""
+    chosen = settings or CheckSettings()
+    before, after = read_side(Path(old), chosen), read_side(Path(new), chosen)
+    causes = list(_causes(before, after))
+    if before.loaded is not None and after.loaded is not None and 1 < len(causes) <= MOST_TRIED:
+        causes = [_tried(cause, before, after, chosen) for cause in causes]
+    return {
+        "schema": SCHEMA,
+        "old": {"file": before.file, "verdict": before.verdict["verdict"]},
+        "new": {"file": after.file, "verdict": after.verdict["verdict"]},
+        "causes": [cause.to_json() for cause in causes],
+        **changes(before.verdict, after.verdict),
+        "exit_code": exit_code(after.verdict),
+    }
+
+
+def read_side(path: Path, settings: CheckSettings) -> Side:
+    """A verdict file as it is; a spec is checked."""
+    if path.suffix == ".json":
+        return Side(str(path), read_verdict(path))
+    document = parse(text_of(path), str(path))
+    if document.data is None:
+        raise BadInput(document.problems)
+    loaded = load_document(document, path, catalogs_of(document, path))
+    return Side(str(path), check_loaded(loaded, settings), loaded, document)
+
+
+def _causes(before: Side, after: Side) -> Iterator[Cause]:
+    if before.loaded is not None and after.loaded is not None:
+        yield from _spec_causes(_expanded(before), _expanded(after), (), "")
+    else:
+        yield from _verdict_causes(before.verdict, after.verdict)
+    if before.loaded is not None and after.loaded is not None:
+        yield from _catalog_causes(before.loaded, after.loaded)
+    else:
+        yield from _provenance_causes(before.verdict, after.verdict)
+
+
+def _expanded(side: Side) -> Any:
+    """A spec's data with every platform written out, so that its figures can be compared."""
+    assert side.document is not None
+    assert side.loaded is not None
+    stages = []
+    for stage, chosen in zip(side.document.data["stages"], side.loaded.spec.stages, strict=True):
+        entry = platform_of(chosen.platform, side.loaded.catalog)
+        figures = {key: _figure(getattr(entry, key)) for key in PLATFORM_KEYS}
+        stages.append({**stage, "platform": {"use": chosen.platform.use or "", **figures}})
+    return {**side.document.data, "stages": tuple(stages)}
+
+
+def _platform_causes(old: Json, new: Json, path: KeyPath, shown: str) -> Iterator[Cause]:
+    if old["use"] != new["use"]:
+        yield Cause(shown, old["use"] or "in place", new["use"] or "in place", path)
+        return
+    stage = shown.removesuffix(".platform")
+    for key in PLATFORM_KEYS:
+        if old[key] != new[key]:
+            yield Cause(f"{stage}.{key}", old[key], new[key], (*path, key))
+
+
+def _spec_causes(old: Any, new: Any, path: KeyPath, shown: str) -> Iterator[Cause]:
+    """Every place at which two specs' data differ; stages and requirements by their names."""
+    if _same(old, new):
+        return
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        if path[:1] == ("stages",) and path[2:] == ("platform",):
+            yield from _platform_causes(dict(old), dict(new), path, shown)
+            return
+        for key in dict.fromkeys((*old, *new)):
+            if key in _SILENT_KEYS:
+                continue
+            below = f"{shown}.{key}" if shown else str(key)
+            one, other = old.get(key, _ABSENT), new.get(key, _ABSENT)
+            yield from _spec_causes(one, other, (*path, key), below)
+        return
+    section = str(path[-1]) if path else ""
+    name = _NAMED.get(section)
+    if name is not None and isinstance(old, tuple) and isinstance(new, tuple):
+        yield from _named_causes(old, new, path, shown, name)
+        return
+    tried = None if new is _ABSENT else path
+    yield Cause(shown, _text(old), _text(new), tried)
+
+
+def _named_causes(
+    old: tuple[Any, ...], new: tuple[Any, ...], path: KeyPath, shown: str, key: str
+) -> Iterator[Cause]:
+    before = {str(item.get(key)): (i, item) for i, item in enumerate(old)}
+    after = {str(item.get(key)): item for item in new}
+    for identity in dict.fromkeys((*before, *after)):
+        below = f"{shown}[{identity}]"
+        if identity in before and identity in after:
+            index, item = before[identity]
+            yield from _spec_causes(item, after[identity], (*path, index), below)
+        else:
+            one = before[identity][1] if identity in before else _ABSENT
+            yield Cause(below, _text(one), _text(after.get(identity, _ABSENT)))
+
+
+def _same(old: Any, new: Any) -> bool:
+    return old is not _ABSENT and new is not _ABSENT and bool(old == new)
+
+
+def _text(value: Any) -> str | None:
+    return None if value is _ABSENT else label(value)
+
+
+def _verdict_causes(old: Json, new: Json) -> Iterator[Cause]:
+    """What two verdicts say about their inputs: motion, models, limits."""
+    before, after = old.get("spec") or {}, new.get("spec") or {}
+    for key in ("sync_model", "objective", "coverage_factor", "currency"):
+        if before.get(key) != after.get(key):
+            yield Cause(key, label(before.get(key)), label(after.get(key)))
+    stages = {s["name"]: s["platform"] for s in before.get("stages") or ()}
+    for stage in after.get("stages") or ():
+        platform = stages.get(stage["name"], {})
+        for key, value in stage["platform"].items():
+            if platform.get(key) != value and key != "name":
+                one = label(platform[key]) if key in platform else None
+                yield Cause(f"stages[{stage['name']}].{key}", one, label(value))
+    limits = {r["id"]: r.get("limit") for r in old["requirements"]}
+    for row in new["requirements"]:
+        if row["id"] in limits and limits[row["id"]] != row.get("limit"):
+            key = f"requirements[{row['id']}].limit"
+            yield Cause(key, label(limits[row["id"]]), label(row.get("limit")))
+
+
+def _provenance_causes(old: Json, new: Json) -> Iterator[Cause]:
+    before, after = old.get("provenance") or {}, new.get("provenance") or {}
+    words = {"version": "version", "catalogs_sha256": "catalogs (hash)", "seed": "seed"}
+    for key, word in words.items():
+        if before.get(key) != after.get(key):
+            yield Cause(word, label(before.get(key)), label(after.get(key)))
+
+
+def _catalog_causes(old: LoadedSpec, new: LoadedSpec) -> Iterator[Cause]:
+    """Catalog entries that both specs can see and that differ."""
+    if old.catalogs_sha256 == new.catalogs_sha256:
+        return
+    for section in SECTIONS:
+        before, after = getattr(old.catalog, section), getattr(new.catalog, section)
+        for identity in before:
+            if identity not in after:
+                continue
+            one, other = before[identity], after[identity]
+            for key in type(one).model_fields:
+                first, second = getattr(one, key), getattr(other, key)
+                if first != second and key not in _SILENT_KEYS:
+                    name = f"catalog.{section}[{identity}].{key}"
+                    yield Cause(name, _figure(first), _figure(second))
+
+
+def _figure(value: Any) -> str | None:
+    """A catalog figure as it was written."""
+    if value is None:
+        return None
+    if isinstance(value, tuple):
+        return "[" + ", ".join(str(_figure(item)) for item in value) + "]"
+    return str(getattr(value, "text", None) or value)
+
+
+def _tried(cause: Cause, before: Side, after: Side, settings: CheckSettings) -> Cause:
+    """The cause with what it does alone; nothing where it cannot stand alone."""
+    if cause.path is None or before.loaded is None or after.document is None:
+        return cause
+    assert before.document is not None
+    original = before.document.data
+    whole = cause.path[2:] == ("platform",)
+    there = after.document.data if whole else _expanded(after)
+    value = _value_there(there, cause.path, original)
+    if value is _ABSENT:
+        return cause
+    plain = replace(settings, monte_carlo=False)
+    try:
+        data = put(original, cause.path, value)
+        document = replace(before.document, data=data)
+        path = before.loaded.path
+        alone = load_document(document, path, catalogs_of(document, path))
+        verdict = check_loaded(without_simulated(alone), plain)
+        start = check_loaded(without_simulated(before.loaded), plain)
+    except Exception:  # a change that needs the others; the whole difference stands without it
+        return cause
+    return replace(cause, effect=changes(start, verdict))
+
+
+def _value_there(new: Any, path: KeyPath, old: Any) -> Any:
+    """The new value at a place of the old spec, list entries found again by their names."""
+    for index, step in enumerate(path):
+        if isinstance(step, int):
+            key = _NAMED[str(path[index - 1])]
+            identity = old[step].get(key)
+            old = old[step]
+            new = next((item for item in new if item.get(key) == identity), _ABSENT)
+        else:
+            old = old.get(step, {}) if isinstance(old, Mapping) else {}
+            new = new.get(step, _ABSENT) if isinstance(new, Mapping) else _ABSENT
+        if new is _ABSENT:
+            return _ABSENT
+    return new
+
+
+def changes(old: Json, new: Json) -> Json:
+    """Verdict, payload, sums, error and margins of two verdicts, side by side."""
+    currency = (new.get("spec") or old.get("spec") or {}).get("currency", "EUR")
+    return {
+        "verdict": {"old": old["verdict"], "new": new["verdict"]},
+        "currency": currency,
+        "payload": list(_payload(old, new)),
+        "sums": [
+            _pair(name, unit, _design(old, name), _design(new, name))
+            for name, unit in (("cost", currency), ("mass", "kg"), ("power", "W"))
+        ],
+        "error": _pair("error", "m", _total(old), _total(new)),
+        "requirements": list(_requirements(old, new)),
+    }
+
+
+def _design(verdict: Json, key: str) -> float | None:
+    value = (verdict.get("design") or {}).get(key)
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _total(verdict: Json) -> float | None:
+    value = (verdict.get("syncline") or {}).get("total_m")
+    return float(value) if isinstance(value, int | float) else None
+
+
+def _pair(name: str, unit: str, old: float | None, new: float | None) -> Json:
+    change = None if old is None or new is None else new - old
+    return {"name": name, "unit": unit, "old": old, "new": new, "change": change}
+
+
+def _picks(verdict: Json) -> dict[str, Json]:
+    stages = (verdict.get("design") or {}).get("stages") or ()
+    return {f"{s['name']}.{role}": entry for s in stages for role, entry in s["roles"].items()}
+
+
+def _payload(old: Json, new: Json) -> Iterator[Json]:
+    """Roles whose sensor or timestamping is another one."""
+    before, after = _picks(old), _picks(new)
+    for role in dict.fromkeys((*before, *after)):
+        one, other = _pick(before.get(role)), _pick(after.get(role))
+        if one != other:
+            yield {"role": role, "old": one, "new": other}
+
+
+def _pick(entry: Json | None) -> Json | None:
+    if entry is None:
+        return None
+    keys = ("sensor", "name", "primitive", "timestamping")
+    return {key: entry.get(key) for key in keys}
+
+
+def _requirements(old: Json, new: Json) -> Iterator[Json]:
+    before = {row["id"]: row for row in old["requirements"]}
+    after = {row["id"]: row for row in new["requirements"]}
+    for identity in dict.fromkeys((*before, *after)):
+        one, other = before.get(identity), after.get(identity)
+        any_row = other or one or {}
+        yield {
+            "id": identity,
+            "kind": any_row.get("kind"),
+            "unit": any_row.get("unit"),
+            "old": _standing(one),
+            "new": _standing(other),
+        }
+
+
+def _standing(row: Json | None) -> Json | None:
+    if row is None:
+        return None
+    return {key: row.get(key) for key in ("status", "value", "limit", "margin", "line", "column")}

@@ -1,0 +1,284 @@
+"""Do motion columns agree with the poses they are the derivative of?
+
+Over windows the integral D of a column (velocity, body rate) and the change P of the pose (place,
+attitude) must be the same vector.  The column's principal directions v_k are mapped by P to
+w_k = P' u_k / s_k (D = U S V'), with a standard error from what is left; v_k itself is wanted.
+A delay between the two is allowed for, it is an effect of its own.  What a regression of P on D
+cannot see is asked for on its own: motion of the pose in which the column has no part (a column of
+zeros), and a constant part of a velocity that the places do not follow.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.effects.kinematics import rotate
+from syncline_design.effects.record import Array
+from syncline_design.logs.log import GAP_FACTOR
+from syncline_design.model.estimates import figure
+
+LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+LEAST_STEPS = 4  # rows in a window
+LEAST_WINDOWS = 8
+CLEAR = 20.0  # times the noise of a displacement: windows need not be longer
+MOST_TURN_RAD = 0.7  # in one window: rotation vectors add up only while they are small
+LAGS_S = np.linspace(-1.0, 1.0, 41)
+MOVES = 10.0  # times its own noise: a direction that moves less is nothing but that noise
+ERRORS = 4.0  # standard errors that a disagreement must have on top of the tolerance
+LEAST_PART = 0.5  # of a clear motion of the pose that a column must show
+ARM_M = 1.0  # by which places may be off in a turn: a wrong lever arm
+SHIFT_S = 1.0  # by which stamps may step within a log
+FITS = 0.1  # share of the motion that a named relation may leave
+AXES = ("first", "second", "third")
+UNITS = {3.6: "km/h", 1.943844: "knots", 3.28084: "ft/s", 1e3: "mm/s", 100.0: "cm/s"}
+TURNS = {180.0 / np.pi: "degrees for radians", np.pi / 180.0: "radians for degrees"}
+WORDS = {
+    "velocity_columns": ("velocity columns", "its positions"),
+    "rate_columns": ("rate columns", "its attitudes"),
+}
+
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Spans:
+    """Windows of a log: first and last row of each, and their lengths [s]."""
+
+    time_s: Array
+    rows: Index  # of the log, one per stamp
+    first: Index
+    last: Index
+
+    @property
+    def length_s(self) -> Array:
+        length: Array = self.time_s[self.last] - self.time_s[self.first]
+        return length
+
+    def integral(self, series: Array, lag_s: float = 0.0) -> Array:
+        """Integral of a series (n, 3) of the log over every window, `lag_s` later."""
+        values = series[self.rows]
+        steps = 0.5 * (values[1:] + values[:-1]) * np.diff(self.time_s)[:, None]
+        total = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+        if lag_s == 0.0:
+            return np.asarray(total[self.last] - total[self.first])
+        ends = [
+            np.stack([np.interp(at, self.time_s, total[:, k]) for k in range(3)], axis=1)
+            for at in (self.time_s[self.last] + lag_s, self.time_s[self.first] + lag_s)
+        ]
+        return np.asarray(ends[0] - ends[1])
+
+    def noise(self, series: Array) -> float:
+        """Standard deviation that white noise of a series gives its integral over a window.
+
+        From second differences, in which smooth motion cancels: their variance is six times.
+        """
+        values, step = series[self.rows], float(np.median(np.diff(self.time_s)))
+        rough = np.median(np.abs(np.diff(values, 2, axis=0))) / 0.6745 / np.sqrt(6.0)
+        return float(rough * step * np.sqrt(np.median(self.last - self.first)))
+
+
+def windows_of(time_s: Array, length_s: float) -> Spans | None:
+    """Windows side by side of about one length, none over a gap; None where there are too few."""
+    stamps, rows = np.unique(time_s, return_index=True)
+    step = np.diff(stamps)
+    usual = float(np.median(step))
+    stride = max(LEAST_STEPS, round(length_s / usual))
+    first = np.arange(0, stamps.shape[0] - stride, stride)
+    last = first + stride
+    gaps = np.concatenate([[0], np.cumsum(step > GAP_FACTOR * usual)])
+    whole = gaps[first] == gaps[last]
+    if int(np.sum(whole)) < LEAST_WINDOWS:
+        return None
+    return Spans(stamps, rows, first[whole], last[whole])
+
+
+@dataclass(frozen=True, slots=True)
+class Disagreement:
+    """factor: size of the column over that of the pose's motion; words: what it looks like."""
+
+    factor: float
+    words: str
+
+
+def disagreement(
+    time_s: Array,
+    place_m: Array | None,
+    column: Array,
+    rotation: Array,
+    sigma: float,
+    tolerance: float,
+) -> Disagreement | None:
+    """How a motion column contradicts places, or attitudes where no place is given.
+
+    sigma: of a place [m], or of an attitude [rad].
+    """
+    found = _chosen(time_s, place_m, column, rotation, sigma)
+    if found is None:
+        return None
+    spans, moved = found
+    lag = max(LAGS_S, key=lambda at: (_likeness(moved, spans.integral(column, at)), -abs(at)))
+    own = spans.integral(column, float(lag))
+    places, words = place_m is not None, ""
+    if not _differs(moved, own, spans.noise(column), tolerance):
+        words = _missing(moved, own, sigma)
+        if not words and places and _drifts(spans, moved, own, sigma, tolerance):
+            words = _offset_words(spans, moved, own)
+        return Disagreement(_ratio(moved, own), words) if words else None
+    if places and _is_offset(spans, moved, own):
+        return Disagreement(_ratio(moved, own), _offset_words(spans, moved, own))
+    body = None
+    if place_m is not None:
+        body = spans.integral(rotate(rotation, column), float(lag))
+    return _described(moved, own, body, UNITS if place_m is not None else TURNS)
+
+
+def _chosen(
+    time_s: Array, place_m: Array | None, column: Array, rotation: Array, sigma_m: float
+) -> tuple[Spans, Array] | None:
+    """Windows in which there is motion to compare, and the pose's motion in them."""
+    chosen = None
+    for length_s in LENGTHS_S:
+        spans = windows_of(time_s, length_s)
+        if spans is None:
+            break
+        moved = _motion(spans, place_m, rotation)
+        size = float(np.sqrt(np.mean(np.sum(moved**2, axis=1))))
+        if place_m is None and chosen is not None and size > MOST_TURN_RAD:
+            break
+        chosen = spans, moved
+        if place_m is not None and size > CLEAR * np.sqrt(2.0) * sigma_m:
+            break
+    return chosen
+
+
+def _motion(spans: Spans, place_m: Array | None, rotation: Array) -> Array:
+    """Change of place [m], or of attitude [rad, body axes], over every window."""
+    if place_m is not None:
+        place = place_m[spans.rows]
+        return np.asarray(place[spans.last] - place[spans.first])
+    from scipy.spatial.transform import Rotation
+
+    pose = Rotation.from_matrix(rotation[spans.rows])
+    return np.asarray((pose[spans.first].inv() * pose[spans.last]).as_rotvec())
+
+
+def _likeness(moved: Array, own: Array) -> float:
+    """Share of the pose's motion that the column explains, up to one factor."""
+    size = float(np.sum(own**2))
+    return float(np.sum(moved * own)) ** 2 / size if size > 0.0 else 0.0
+
+
+def _differs(moved: Array, own: Array, noise: float, tolerance: float) -> bool:
+    """Whether any direction in which the column really moves comes out as another vector."""
+    left, size, right = np.linalg.svd(own, full_matrices=False)
+    least = MOVES * noise * np.sqrt(own.shape[0])
+    kept = size > max(1e-9 * float(size[0]), least, 1e-300)
+    if not np.any(kept):
+        return False
+    seen = (left[:, kept].T @ moved) / size[kept, None]
+    rest = moved - own @ (right[kept].T @ seen)
+    count = max(3 * (moved.shape[0] - int(np.sum(kept))), 1)
+    error = np.sqrt(float(np.sum(rest**2)) / count) / size[kept]
+    off = np.linalg.norm(seen - right[kept], axis=1)
+    return bool(np.any(off > tolerance + ERRORS * np.sqrt(3.0) * error))
+
+
+def _size(series: Array) -> float:
+    """Root mean square length."""
+    return float(np.sqrt(np.mean(np.sum(series**2, axis=1))))
+
+
+def _ratio(moved: Array, own: Array) -> float:
+    return _size(own) / max(_size(moved), 1e-300)
+
+
+def _is_offset(spans: Spans, moved: Array, own: Array) -> bool:
+    """Whether a constant accounts for the disagreement, and better than a factor does."""
+    left = float(
+        np.sum((own - _constant(spans, moved, own) * spans.length_s[:, None] - moved) ** 2)
+    )
+    scale = float(np.sum(moved * own)) / max(float(np.sum(own**2)), 1e-300)
+    scaled = float(np.sum((moved - scale * own) ** 2))
+    return left < min(scaled, FITS * float(np.sum(moved**2)))
+
+
+def _missing(moved: Array, own: Array, sigma: float) -> str:
+    """Says in which direction the pose clearly moves while the column shows less than half of it.
+
+    The median decides what is clear, so that a jump of the pose is not taken for motion.
+    """
+    right = np.linalg.svd(moved, full_matrices=False)[2]
+    along = moved @ right.T
+    for k in range(right.shape[0]):
+        if float(np.median(np.abs(along[:, k]))) <= max(CLEAR * np.sqrt(2.0) * sigma, 1e-9):
+            continue
+        part = float(np.sum(along[:, k] * (own @ right[k]))) / float(np.sum(along[:, k] ** 2))
+        if abs(part) < LEAST_PART:
+            axis = AXES[int(np.argmax(np.abs(right[k])))]
+            return f"they show {100.0 * max(part, 0.0):.0f} % of the motion along the {axis} axis"
+    return ""
+
+
+def _constant(spans: Spans, moved: Array, own: Array) -> Array:
+    """Constant part of the column that the pose does not follow, over the whole log."""
+    return np.asarray(np.sum(own - moved, axis=0) / float(np.sum(spans.length_s)))
+
+
+def _offset_words(spans: Spans, moved: Array, own: Array) -> str:
+    mean = _constant(spans, moved, own)
+    k = int(np.argmax(np.abs(mean)))
+    return f"they hold a constant {figure(float(mean[k]), None, 'm/s')} along the {AXES[k]} axis"
+
+
+def _drifts(spans: Spans, moved: Array, own: Array, sigma_m: float, tolerance: float) -> bool:
+    """Whether a constant part is larger than the places may be off by.
+
+    They may at both ends of every unbroken stretch: by noise, by a wrong lever arm, and by what the
+    vehicle moves while its stamps step.
+    """
+    speed = _size(moved / spans.length_s[:, None])
+    stretches = 1 + int(np.sum(spans.first[1:] != spans.last[:-1]))
+    ends_m = 2.0 * ARM_M + ERRORS * np.sqrt(2.0) * sigma_m + SHIFT_S * speed
+    allowed = tolerance * speed + stretches * ends_m / float(np.sum(spans.length_s))
+    return bool(np.linalg.norm(_constant(spans, moved, own)) > allowed)
+
+
+def _described(
+    moved: Array, own: Array, body: Array | None, units: dict[float, str]
+) -> Disagreement:
+    """The simplest relation that fits: a factor, other axes or signs, body axes; else none."""
+    whole = float(np.sum(moved**2))
+    factor = float(np.sqrt(np.sum(own**2) / max(whole, 1e-300)))
+    scale = float(np.sum(moved * own)) / max(float(np.sum(own**2)), 1e-300)
+    if float(np.sum((moved - scale * own) ** 2)) < FITS * whole and scale != 0.0:
+        return Disagreement(1.0 / scale, _factor_words(1.0 / scale, units))
+    if body is not None and float(np.sum((moved - body) ** 2)) < FITS * whole:
+        return Disagreement(factor, "they look like body axes")
+    for order in itertools.permutations(range(3)):
+        turned = own[:, order]
+        signs = np.sign(np.sum(moved * turned, axis=0))
+        if float(np.sum((moved - signs * turned) ** 2)) < FITS * whole:
+            return Disagreement(factor, f"axes or signs: {_axes_words(order, signs)}")
+    return Disagreement(factor, f"{factor:.3g} times in size, and in another direction")
+
+
+def _factor_words(factor: float, units: dict[float, str]) -> str:
+    words = f"{factor:.4g} times what these say"
+    for known, name in units.items():
+        if abs(abs(factor) / known - 1.0) < 0.03:
+            words += f" ({name}?)"
+    return words
+
+
+def _axes_words(order: tuple[int, ...], signs: Array) -> str:
+    """`first from -second`: which column, with which sign, is the motion along each axis."""
+    parts = [
+        f"{AXES[k]} is {'-' if signs[k] < 0 else ''}{AXES[source]}"
+        for k, source in enumerate(order)
+        if source != k or signs[k] < 0
+    ]
+    return ", ".join(parts) or "small turns"

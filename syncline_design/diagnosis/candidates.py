@@ -1,0 +1,164 @@
+"""Which effects of the dictionary a log can show, and how they would look in it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.diagnosis.noise import Directed
+from syncline_design.diagnosis.scene import Acting, Scene
+from syncline_design.effects import registry
+from syncline_design.effects.record import Array, Effect, Target
+
+STEP_TIMES = 24  # places along the log where a step is looked for at first
+EDGE = 0.15  # share of the rows at either end where a step is not looked for: it would be a latency
+
+
+# Where two effects fit equally well, the one that is met more often is named and the other listed
+# as its alias.  The order is ours, by judgement.
+COMMONEST = (
+    "latency",
+    "lever_arm",
+    "boresight",
+    "range_bias",
+    "heading_bias",
+    "datum_offset",
+    "range_scale",
+    "mounting",
+    "azimuth_bias",
+    "elevation_bias",
+    "sound_speed",
+    "turnaround_delay",
+    "timestamp_jitter",
+    "noise_understated",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """An effect at one place of the system."""
+
+    effect: Effect
+    sensor: Target
+    stage: int
+
+    @property
+    def label(self) -> tuple[str, str, int]:
+        return self.effect.name, self.sensor, self.stage
+
+    @property
+    def key(self) -> str:
+        """The label as one text."""
+        return "/".join(map(str, self.label))
+
+    def acting(self, values: dict[str, float]) -> Acting:
+        return Acting(self.effect, self.sensor, self.stage, values)
+
+
+@dataclass(frozen=True, slots=True)
+class Signature:
+    """Columns (n, 3, p) [m per unit] that a candidate adds to the error, located at `at`."""
+
+    candidate: Candidate
+    at: dict[str, float]
+    columns: Array
+
+
+def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...]:
+    """Every effect that this kind of log and this system can show."""
+    stages = view.system.stages
+    found = []
+    for effect in registry().values():
+        if effect.name in exclude:
+            continue
+        for sensor in effect.sensors:
+            for k, stage in enumerate(stages):
+                if sensor == "target" and k != len(stages) - 1:
+                    continue
+                if view.log.kind == "position" and sensor not in ("position", "target"):
+                    continue  # attitude and rates are the better system's
+                if effect.applies(stage, sensor):
+                    found.append(Candidate(effect, sensor, k))
+    return tuple(found)
+
+
+def commonness(label: tuple[str, str, int]) -> tuple[int, int]:
+    """Place among the commonest; sensors in the order position, attitude, ranging, target."""
+    name, sensor, _ = label
+    place = COMMONEST.index(name) if name in COMMONEST else len(COMMONEST)
+    return place, ("position", "attitude", "ranging", "target").index(sensor)
+
+
+def zero_values(effect: Effect, at: dict[str, float] | None = None) -> dict[str, float]:
+    """All parameters at zero, located ones where they are."""
+    return {p.name: (at or {}).get(p.name, 0.0) for p in effect.parameters}
+
+
+def signatures(view: Scene, found: Sequence[Candidate]) -> tuple[Signature, ...]:
+    """Signatures of all candidates whose mean error moves; a step at several times."""
+    return tuple(
+        Signature(candidate, at, signature(view, candidate, at))
+        for candidate in found
+        if candidate.effect.sensitivity is not None
+        for at in _locations(view, candidate.effect)
+    )
+
+
+def _locations(view: Scene, effect: Effect) -> list[dict[str, float]]:
+    located = [p.name for p in effect.parameters if p.located]
+    if not located:
+        return [{}]
+    since = view.log.time_s - view.log.time_s[0]
+    times = np.quantile(since, np.linspace(EDGE, 1.0 - EDGE, STEP_TIMES))
+    return [{located[0]: float(t)} for t in times]
+
+
+def signature(view: Scene, candidate: Candidate, at: dict[str, float]) -> Array:
+    """Slope (n, 3, p) of the error by the candidate's parameters.
+
+    The effect's own sensitivity, except for a ranging sensor that carries another stage: what it
+    does to the next stage's position is found by re-simulation.
+    """
+    effect, k = candidate.effect, candidate.stage
+    values = zero_values(effect, at)
+    if candidate.sensor == "ranging" and k + 1 < len(view.system.stages):
+        return slopes(view, [candidate.acting(values)])
+    assert effect.sensitivity is not None
+    return effect.sensitivity(view.rows[k], values, candidate.sensor)
+
+
+def slopes(view: Scene, acting: Sequence[Acting]) -> Array:
+    """Slope (n, 3, P) of the error by all continuous parameters, by central differences.
+
+    Columns in the order of the effects and their `slopes()`; the sign is that of the error of an
+    uncorrected log, so minus the slope of `Scene.error`.
+    """
+    columns = []
+    for i, one in enumerate(acting):
+        for p in one.effect.slopes():
+            step = max(0.1 * p.low, 1e-3 * abs(one.values[p.name]))
+            ends = []
+            for sign in (1.0, -1.0):
+                moved = {**one.values, p.name: one.values[p.name] + sign * step}
+                changed = [*acting]
+                changed[i] = Acting(one.effect, one.sensor, one.stage, moved)
+                ends.append(view.error(changed))
+            columns.append((ends[1] - ends[0]) / (2.0 * step))
+    if not columns:
+        return np.zeros((len(view), 3, 0))
+    return np.stack(columns, axis=-1)
+
+
+def directed_parts(view: Scene, found: Sequence[Candidate]) -> tuple[Directed, ...]:
+    """White noise along the motion of every candidate that has it, per unit of its parameter."""
+    parts = []
+    for one in found:
+        names = [p.name for p in one.effect.parameters]
+        if one.effect.spread is None or len(names) != 1:
+            continue
+        spread = one.effect.spread(view.rows[one.stage], {names[0]: 1.0}, one.sensor)
+        if spread.directions is not None:
+            parts.append(Directed(one.key, spread.directions))
+    return tuple(parts)

@@ -1,0 +1,123 @@
+"""Checks before names: does the log stay within the platform's limits, and agree with itself?
+
+Every name rests on the logged motion.  Velocity columns that are not the derivative of the
+positions turn a delay of 50 ms into another one, and a log at nine times v_max says nothing about
+the platform in the spec.  Rules in docs/diagnosis.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from syncline_design.diagnosis.agreement import WORDS, disagreement, windows_of
+from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects.record import Array
+from syncline_design.logs.log import StageLog
+from syncline_design.model.estimates import figure
+from syncline_design.model.system import Stage
+
+Severity = Literal["contradiction", "caution"]
+USUAL, RARE = 0.95, 0.99  # quantiles that decide on a contradiction and on a caution
+BEYOND = {"speed": 1.25, "turn_rate": 1.25, "range": 2.0}  # times the limit: a contradiction
+NEAR = {"speed": 1.1, "turn_rate": 1.1, "range": 1.5}  # times the limit: a caution
+MEAN_S = {"speed": 2.0, "turn_rate": 1.0}  # motion is averaged over this long
+NOISE = 2.0 * np.sqrt(2.0)  # standard deviations of the difference of two readings
+TOLERANCE = {"velocity": 0.05, "rate": 0.08}
+NAMES = {"speed": ("speed", "v_max"), "turn_rate": ("turn rate", "omega_max"),
+         "range": ("range", "distance")}  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that is wrong with a log before anything is named.
+
+    code: speed, turn_rate, range, velocity_columns or rate_columns.  value, limit: a quantile
+    against the platform's figure (SI), or the factor between columns and its 1; share: of rows
+    beyond the limit.
+    """
+
+    code: str
+    stage: str
+    severity: Severity
+    message: str
+    value: float
+    limit: float
+    unit: str
+    share: float
+
+
+def log_checks(view: Scene) -> tuple[Check, ...]:
+    """Everything that is wrong, contradictions first."""
+    found: list[Check] = []
+    for index, (stage, logged) in enumerate(zip(view.system.stages, view.log.stages, strict=True)):
+        found += _limits(view, stage, logged)
+        found += _columns(view, index, stage, logged)
+    return tuple(sorted(found, key=lambda c: c.severity != "contradiction"))
+
+
+def _limits(view: Scene, stage: Stage, logged: StageLog) -> Iterator[Check]:
+    platform = stage.platform
+    time_s = view.log.time_s
+    place_m = 0.0 if stage.position is None else max(stage.position.sigma)
+    angle_rad = 0.0 if stage.attitude is None else max(stage.attitude.sigma)
+    motion = (
+        ("speed", logged.velocity_mps, platform.v_max_mps, place_m, "m/s"),
+        ("turn_rate", logged.rate_radps, platform.omega_max_radps, angle_rad, "rad/s"),
+    )
+    for code, series, limit, sigma, unit in motion:
+        spans = windows_of(time_s, MEAN_S[code])
+        if spans is None:
+            continue
+        size = np.linalg.norm(spans.integral(series), axis=1) / spans.length_s
+        yield from _limit(code, stage.name, size, limit, NOISE * sigma / MEAN_S[code], unit)
+    if logged.range_m is not None:
+        yield from _limit("range", stage.name, logged.range_m, platform.distance_m, 0.0, "m")
+
+
+def _limit(
+    code: str, stage: str, size: Array, limit: float, noise: float, unit: str
+) -> Iterator[Check]:
+    """A contradiction where the usual value is far beyond the limit, else a caution."""
+    usual, rare = (float(np.quantile(size, q)) for q in (USUAL, RARE))
+    severity: Severity
+    if usual > BEYOND[code] * limit + noise:
+        severity, value = "contradiction", usual
+    elif rare > NEAR[code] * limit + noise:
+        severity, value = "caution", rare
+    else:
+        return
+    share = float(np.mean(size > limit))
+    word, key = NAMES[code]
+    reached = USUAL if severity == "contradiction" else RARE
+    message = (
+        f"{word} of {stage} reaches {figure(value, None, unit)} ({100.0 * reached:.0f} % of the "
+        f"log is below), the spec's {key} is {figure(limit, None, unit)}; "
+        f"{100.0 * share:.0f} % of the log is beyond it"
+    )
+    yield Check(code, stage, severity, message, value, limit, unit, share)
+
+
+def _columns(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterator[Check]:
+    """Velocity columns against the positions' motion, rates against the attitudes' turns."""
+    rows = view.rows[index]
+    place = rows.position_m
+    if view.log.kind == "position" and bool(np.all(np.isfinite(view.log.truth_m))):
+        place = view.log.truth_m  # the velocity is that of the better system
+    sigma_m = 0.0 if stage.position is None else float(np.max(stage.position.sigma))
+    angle_rad = 0.0 if stage.attitude is None else float(np.max(stage.attitude.sigma))
+    time_s = view.log.time_s
+    moved = disagreement(
+        time_s, place, logged.velocity_mps, rows.rotation, sigma_m, TOLERANCE["velocity"]
+    )
+    turned = disagreement(
+        time_s, None, logged.rate_radps, rows.rotation, angle_rad, TOLERANCE["rate"]
+    )
+    for code, found in (("velocity_columns", moved), ("rate_columns", turned)):
+        if found is not None:
+            subject, own = WORDS[code]
+            message = f"{subject} of {stage.name} contradict {own}: {found.words}"
+            yield Check(code, stage.name, "contradiction", message, found.factor, 1.0, "", 1.0)

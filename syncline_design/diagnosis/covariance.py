@@ -1,0 +1,139 @@
+"""Covariance of an error series: white noise per row plus Gauss-Markov processes, solved in O(n).
+
+C = Sigma + B K B', Sigma block diagonal (n blocks of 3 x 3), K the covariance of m independent
+unit-variance first-order Gauss-Markov processes, B (n, 3, m) their loadings.  The precision of the
+processes is banded, so by the matrix inversion lemma
+    C^-1 = Sigma^-1 - Sigma^-1 B P^-1 B' Sigma^-1,   P = K^-1 + B' Sigma^-1 B  (banded),
+    log|C| = log|Sigma| + log|P| - log|K^-1|.
+Uneven stamps and gaps need no care: correlation over dt is exp(-dt / T).  Rows of one stamp share
+its states, so B' Sigma^-1 B is summed over them; T = 0 is noise that is new at every stamp and
+common to its rows.
+Source: Rue and Held, Gaussian Markov Random Fields (2005), ch. 2; Woodbury's identity.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
+
+from syncline_design.effects.record import Array
+from syncline_design.logs.stamps import Index, groups, repeated, starts, summed
+
+_LEAST_STEP = 1e-9  # least dt / T: keeps 1 - phi^2 above rounding
+
+
+def inverse_3x3(matrix: Array) -> tuple[Array, Array]:
+    """Inverse (n, 3, 3) and determinant (n,) of symmetric positive 3 x 3 blocks.
+
+    By L D L': cofactors cancel where a row's sizes are very unlike, elimination does not.
+    Determinants that are not positive tell of blocks that are not.
+    """
+    a, d, f = matrix[:, 0, 0], matrix[:, 1, 1], matrix[:, 2, 2]
+    with np.errstate(all="ignore"):
+        l10, l20 = matrix[:, 0, 1] / a, matrix[:, 0, 2] / a
+        second = d - l10 * matrix[:, 0, 1]
+        mixed = matrix[:, 1, 2] - l10 * matrix[:, 0, 2]
+        l21 = mixed / second
+        third = f - l20 * matrix[:, 0, 2] - l21 * mixed
+        zero, one = np.zeros_like(a), np.ones_like(a)
+        rows = [[one, zero, zero], [-l10, one, zero], [l10 * l21 - l20, -l21, one]]
+        lower = np.moveaxis(np.array(rows), -1, 0)  # L^-1
+        pivots = np.stack([a, second, third], axis=1)
+        inverse = np.swapaxes(lower, 1, 2) @ (lower / pivots[:, :, None])
+        positive = np.all(pivots > 0.0, axis=1)
+        determinant = np.where(positive, np.prod(pivots, axis=1), -1.0)
+    return inverse, determinant
+
+
+@dataclass(frozen=True, slots=True)
+class Precision:
+    """The factored covariance of one series."""
+
+    white_inverse: Array  # (n, 3, 3) Sigma^-1
+    loading: Array  # (n, 3, m) B
+    factor: Array  # (m + 1, k m) banded Cholesky factor of P over k stamps, lower form
+    log_determinant: float
+    slow: NDArray[np.bool_]  # (m,) which processes last from stamp to stamp
+    first: Index | None = None  # first row of every stamp, where rows share stamps
+    group: Index | None = None  # (n,) the stamp of every row
+
+    def solve(self, series: Array) -> Array:
+        """C^-1 Y, Y (n, 3, c)."""
+        weighted: Array = self.white_inverse @ series
+        if self.loading.shape[2] == 0:
+            return weighted
+        inside: Array = self.loading @ self._states(weighted)
+        return weighted - self.white_inverse @ inside
+
+    def _states(self, weighted: Array) -> Array:
+        """P^-1 B' Sigma^-1 Y at every row, (n, m, c)."""
+        m, c = self.loading.shape[2], weighted.shape[2]
+        right = np.swapaxes(self.loading, 1, 2) @ weighted
+        if self.first is not None:
+            right = summed(self.first, right)
+        states: Array = cho_solve_banded((self.factor, True), right.reshape(-1, c))
+        states = states.reshape(-1, m, c)
+        return states if self.group is None else states[self.group]
+
+    def slow_part(self, error: Array) -> Array:
+        """B x of the lasting processes, x their posterior mean given the series (n, 3); (n, 3)."""
+        if not np.any(self.slow):
+            return np.zeros_like(error)
+        states = self._states(self.white_inverse @ error[:, :, None])
+        slow: Array = (self.loading[:, :, self.slow] @ states[:, self.slow])[:, :, 0]
+        return slow
+
+    def negative_log_likelihood(self, error: Array) -> float:
+        """-log N(e; 0, C) [nat], e (n, 3)."""
+        squares = float(np.sum(error * self.solve(error[:, :, None])[:, :, 0]))
+        return 0.5 * (squares + self.log_determinant + error.size * math.log(2.0 * math.pi))
+
+
+def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array) -> Precision:
+    """Factor C for white (n, 3, 3), loading (n, 3, m) with std in it, T (m,) [s], 0 for none."""
+    inverse, determinant = inverse_3x3(white)
+    if np.any(~(determinant > 0.0)):
+        raise LinAlgError("covariance of a row is not positive definite")
+    log_det = float(np.sum(np.log(determinant)))
+    m = loading.shape[2]
+    slow = time_constant_s > 0.0
+    if m == 0:
+        return Precision(inverse, loading, np.zeros((1, 0)), log_det, slow)
+    inner = np.swapaxes(loading, 1, 2) @ inverse @ loading
+    first = group = None
+    if repeated(time_s):
+        first, group = starts(time_s), groups(time_s)
+        time_s, inner = time_s[first], summed(first, inner)
+    band, log_prior = _markov_precision(time_s, time_constant_s)
+    for k in range(m):
+        # column j of the lower band holds A[j + k, j]; inside a block only while j % m + k < m
+        diagonal = np.zeros((inner.shape[0], m))
+        diagonal[:, : m - k] = np.diagonal(inner, offset=-k, axis1=1, axis2=2)
+        band[k] += diagonal.ravel()
+    factor = cholesky_banded(band, lower=True, overwrite_ab=True, check_finite=False)
+    log_det += 2.0 * float(np.sum(np.log(factor[0]))) - log_prior
+    return Precision(inverse, loading, factor, log_det, slow, first, group)
+
+
+def _markov_precision(time_s: Array, time_constant_s: Array) -> tuple[Array, float]:
+    """K^-1 of m unit Gauss-Markov processes as a lower band (m + 1, n m), and its log determinant.
+
+    Tridiagonal per process: with phi_i over step i and g_i = 1 / (1 - phi_i^2), the diagonal is
+    g_{i-1} + phi_i^2 g_i (1 + phi_0^2 g_0 at the start) and the off-diagonal -phi_i g_i.
+    """
+    n, m = time_s.shape[0], time_constant_s.shape[0]
+    with np.errstate(divide="ignore"):
+        ratio = np.maximum(np.diff(time_s)[:, None] / time_constant_s, _LEAST_STEP)
+    fresh = -np.expm1(-2.0 * ratio)  # 1 - phi^2
+    phi = np.exp(-ratio)
+    band = np.zeros((m + 1, n * m))
+    diagonal = np.ones((n, m))
+    diagonal[1:] = 1.0 / fresh
+    diagonal[:-1] += phi * phi / fresh
+    band[0] = diagonal.ravel()
+    band[m, : (n - 1) * m] = (-phi / fresh).ravel()
+    return band, -float(np.sum(np.log(fresh)))

@@ -1,0 +1,256 @@
+"""Fit effects and noise together: generalised least squares on the re-simulated error.
+
+Gauss-Newton with step halving, on the scene itself and not on its linearisation; the noise is
+fitted again after every change of the effects, as what it absorbs depends on what is removed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.diagnosis.axes import Axes, varying_axes
+from syncline_design.diagnosis.candidates import Candidate, slopes
+from syncline_design.diagnosis.covariance import Precision
+from syncline_design.diagnosis.noise import (
+    Bounds,
+    NoiseLevel,
+    Structure,
+    first_guess,
+    fit_noise,
+    precision,
+    spec_bounds,
+)
+from syncline_design.diagnosis.scene import Acting, Scene
+from syncline_design.effects.record import Array
+
+NOISE_ROWS = 800  # rows on which the noise is fitted; stretches spread over the whole log
+POLISH_ROWS = 3000
+STRETCH = 80
+WINDOW = 500
+FIRST_TIMES_S = (None, 3.0, 30.0)
+LONG, SHORT = 25, 10  # iterations of a noise fit from scratch, and from a good start
+
+
+@dataclass(frozen=True, slots=True)
+class Data:
+    """A scene with its noise structure, the rows the noise is fitted on, and the axes compared."""
+
+    view: Scene
+    structure: Structure
+    noise_rows: NDArray[np.int64]
+    noise_structure: Structure
+    axes: Axes
+
+    def error(self, acting: Sequence[Acting]) -> Array:
+        """Corrected error with unknown components at zero (they have a huge variance)."""
+        return np.nan_to_num(self.view.error(acting))
+
+
+def data_of(view: Scene, structure: Structure) -> Data:
+    """A scene ready for fitting."""
+    index = windows(len(view), NOISE_ROWS, STRETCH)
+    axes = varying_axes(view.error(), structure)
+    return Data(view, structure, index, structure.rows(index), axes)
+
+
+def windows(rows: int, most: int, length: int) -> NDArray[np.int64]:
+    """Contiguous windows of rows spread evenly over a log, the first row among them."""
+    if rows <= most:
+        return np.arange(rows)
+    count = max(most // length, 1)
+    starts = np.linspace(0, rows - length, count).astype(np.int64)
+    return np.unique((starts[:, None] + np.arange(length)).ravel())
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A stochastic effect that is part of the model: what it lets the noise do.
+
+    what: "factor", "tails", "slow" or "down" of a sensor, or "size" of a directed part.
+    """
+
+    candidate: Candidate
+    what: str
+    directed: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """Effects and noise fitted to a log.
+
+    nll: of all rows in use [nat]; covariance (P, P) of the continuous parameters of `acting`, in
+    their order; error (n, 3) what is left [m].
+    """
+
+    acting: tuple[Acting, ...]
+    opened: tuple[Opened, ...]
+    bounds: Bounds
+    level: NoiseLevel
+    nll: float
+    covariance: Array
+    error: Array
+    precision: Precision
+
+    @property
+    def labels(self) -> tuple[tuple[str, str, int], ...]:
+        """Everything named, each once, in order: effects that move the mean first."""
+        moved = [a.label for a in self.acting]
+        return tuple(dict.fromkeys([*moved, *(o.candidate.label for o in self.opened)]))
+
+    @property
+    def free_sizes(self) -> tuple[int, ...]:
+        return tuple(o.directed for o in self.opened if o.directed >= 0)
+
+
+def bounds_of(data: Data, opened: Sequence[Opened]) -> Bounds:
+    """What the noise may be once some effects open it."""
+    bounds = spec_bounds(data.structure)
+    for one in opened:
+        if one.what != "size":
+            stage = data.view.system.stages[one.candidate.stage].name
+            bounds = bounds.opened(data.structure, (stage, one.candidate.sensor), one.what)
+    return bounds
+
+
+def fit(
+    data: Data,
+    acting: Sequence[Acting] = (),
+    opened: Sequence[Opened] = (),
+    start: NoiseLevel | None = None,
+    passes: int = 1,
+) -> Model:
+    """Fit the parameters of the effects and the noise, in turn.
+
+    Without a start the noise is fitted from the spec's; with one, the effects are adjusted at that
+    noise first, so that what they explain is not taken for noise.
+    """
+    bounds = bounds_of(data, opened)
+    sizes = tuple(o.directed for o in opened if o.directed >= 0)
+    level = start or first_guess(data.structure)
+    now = tuple(acting)
+    error = data.error(now)
+    iterations = LONG if start is None else SHORT
+    for _ in range(passes):
+        if now:
+            now, error, _ = adjusted(data, now, precision(data.structure, level), error)
+        starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
+        fits = [
+            fit_noise(data.noise_structure, error[data.noise_rows], bounds, s, sizes, iterations)
+            for s in starts
+        ]
+        level, _ = min(fits, key=lambda found: found[1])
+    if now:
+        now, error, _ = adjusted(data, now, precision(data.structure, level), error)
+    factored = precision(data.structure, level)
+    _, _, covariance = adjusted(data, now, factored, error, steps=0)
+    nll = factored.negative_log_likelihood(error)
+    return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
+
+
+def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:
+    """Data and model on windows of the rows, for tests with many regressors."""
+    index = windows(len(data.view), most, WINDOW)
+    if index.shape[0] == len(data.view):
+        return data, model
+    structure = data.structure.rows(index)
+    fewer = data_of(data.view.part(index), structure)
+    known = precision(structure, model.level)
+    return fewer, replace(model, error=model.error[index], precision=known)
+
+
+def finely(data: Data) -> Data:
+    """The data with the noise fitted on POLISH_ROWS rows, for the final figures."""
+    index = windows(len(data.view), POLISH_ROWS, STRETCH)
+    return replace(data, noise_rows=index, noise_structure=data.structure.rows(index))
+
+
+def slow_guess(level: NoiseLevel, time_s: float | None) -> NoiseLevel:
+    """The level with half of the variance slow, of one time constant; None leaves it as it is.
+
+    The likelihood has several peaks in the time constant, so a fit from scratch starts at each.
+    """
+    if time_s is None:
+        return level
+    return replace(
+        level,
+        factor=tuple(0.75 for _ in level.factor),
+        slow=tuple(tuple(0.4 for _ in own) for own in level.slow),
+        time_constant_s=tuple(tuple(time_s for _ in own) for own in level.time_constant_s),
+    )
+
+
+def adjusted(
+    data: Data, acting: tuple[Acting, ...], known: Precision, error: Array, steps: int = 3
+) -> tuple[tuple[Acting, ...], Array, Array]:
+    """Parameters of least e' C^-1 e at a known C; (effects, their error, covariance (P, P))."""
+    if not acting:
+        return acting, error, np.zeros((0, 0))
+    for _ in range(steps):
+        columns = np.nan_to_num(slopes(data.view, acting))
+        weighted = known.solve(columns)
+        normal, right = inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0]
+        change = solve_scaled(normal, right)
+        acting, error, moved = _stepped(data, acting, change, known, error)
+        if moved * moved * float(change @ normal @ change) < 1e-4:
+            break
+    columns = np.nan_to_num(slopes(data.view, acting))
+    return acting, error, inverse_scaled(inner(columns, known.solve(columns)))
+
+
+def inner(first: Array, second: Array) -> Array:
+    """Sum over rows and components of first (n, 3, p) times second (n, 3, q); (p, q)."""
+    product: Array = first.reshape(-1, first.shape[2]).T @ second.reshape(-1, second.shape[2])
+    return product
+
+
+def _stepped(
+    data: Data, acting: tuple[Acting, ...], change: Array, known: Precision, error: Array
+) -> tuple[tuple[Acting, ...], Array, float]:
+    """The longest of the full step and its halves that lowers the weighted squares."""
+    before = _squares(known, error)
+    for share in (1.0, 0.5, 0.25, 0.1):
+        trial = _moved(acting, share * change)
+        left = data.error(trial)
+        if _squares(known, left) <= before:
+            return trial, left, share
+    return acting, error, 0.0
+
+
+def _squares(known: Precision, error: Array) -> float:
+    return float(np.sum(error * known.solve(error[:, :, None])[:, :, 0]))
+
+
+def _moved(acting: Sequence[Acting], change: Array) -> tuple[Acting, ...]:
+    at, result = 0, []
+    for one in acting:
+        names = [p.name for p in one.effect.slopes()]
+        added = {n: one.values[n] + float(change[at + i]) for i, n in enumerate(names)}
+        at += len(names)
+        result.append(replace(one, values={**one.values, **added}))
+    return tuple(result)
+
+
+def solve_scaled(normal: Array, right: Array) -> Array:
+    """Solve normal x = right with columns scaled alike; directions the log cannot see stay put."""
+    scale = _scale(normal)
+    scaled = normal / scale[:, None] / scale
+    solution: Array = np.asarray(np.linalg.lstsq(scaled, right / scale, rcond=1e-10)[0]) / scale
+    return solution
+
+
+def _scale(normal: Array) -> Array:
+    scale: Array = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    scale[scale == 0.0] = 1.0
+    return scale
+
+
+def inverse_scaled(normal: Array) -> Array:
+    """Inverse of the normal matrix, columns scaled alike first."""
+    scale = _scale(normal)
+    scaled = normal / scale[:, None] / scale
+    inverse: Array = np.asarray(np.linalg.pinv(scaled, rcond=1e-12)) / scale[:, None] / scale
+    return inverse

@@ -1,0 +1,209 @@
+"""What a log cannot tell apart: other effects whose signature lies along the named one's.
+
+All members of a class are fitted in the place of the named one, on the same rows, from the same
+noise, and the best of them is named.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, slopes
+from syncline_design.diagnosis.fitting import Data, Model, fit, inner, inverse_scaled
+from syncline_design.diagnosis.trials import freedom_of, plausible, with_effect
+from syncline_design.effects.record import Array, Effect
+
+Label = tuple[str, str, int]
+SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
+CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
+MOST_REFITTED = 8
+RIVAL_COSINE = 0.7  # from which a rival that fits as well is said not to be told apart
+RIVAL_NATS = 3.0  # a rival that fits worse by less than this is not excluded by the data
+AS_GOOD_NATS = 2.0  # within which the commoner of two effects is named
+
+
+@dataclass(frozen=True, slots=True)
+class Alias:
+    """Another effect beside the named one.
+
+    cosine: of the whitened angle between the named signature and the span of the other's.
+    fit: how much worse the other fits [nat]; loss: the same with what each pays for its freedom.
+    possible: whether it fits with values that the effect can have.
+    """
+
+    candidate: Candidate
+    cosine: float
+    fit: float
+    loss: float
+    possible: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """All other effects against a named one, nearest first.
+
+    aliases: cannot be told apart.  lookalikes: the same signature to first order, but re-simulation
+    fits worse, or one that fits as well only with impossible values or another signature.
+    excluded: another signature that does not fit.
+    """
+
+    aliases: tuple[Alias, ...] = ()
+    lookalikes: tuple[Alias, ...] = ()
+    excluded: tuple[Alias, ...] = ()
+
+
+def without(model: Model, label: Label) -> Model:
+    """The model less one effect, not fitted again; its noise within what is left open."""
+    acting = tuple(a for a in model.acting if a.label != label)
+    opened = tuple(o for o in model.opened if o.candidate.label != label)
+    return replace(model, acting=acting, opened=opened)
+
+
+def competed(
+    data: Data, model: Model, label: Label, others: Sequence[Signature], again: int = 2
+) -> tuple[Model, Comparison]:
+    """The model with the best effect in a named one's place, and the rest against that one.
+
+    Its class competes, and whatever fits as well to first order: with the other effects of the
+    model fitted again, an effect of quite another signature may be the better one by far.
+    """
+    named = fit(data, model.acting, model.opened, start=model.level)
+    screened, found = _screened(data, named, label, others)
+    near = [a for a in screened if a.cosine > SAME or a.fit < RIVAL_NATS]
+    near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]
+    rest = without(named, label)
+    fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)
+            for a in near}  # fmt: skip
+    best = _best(data, named, label, fits)
+    if best != label and again:
+        return competed(data, fits[best], best, others, again - 1)
+    return named, _sorted_out(data, named, label, screened, fits)
+
+
+def _price(data: Data, effect: Effect) -> float:
+    """What an effect pays for its freedom [nat]: half of log N a figure (Schwarz 1978)."""
+    return 0.5 * math.log(max(len(data.view) * len(data.axes), 2)) * freedom_of(effect)
+
+
+def _best(data: Data, named: Model, label: Label, fits: Mapping[Label, Model]) -> Label:
+    """The likeliest member of a class; among those that are as good, the commonest in practice."""
+    scores = {label: named.nll + _price(data, effect_of(named, label))}
+    for other, model in fits.items():
+        if plausible(model):
+            scores[other] = model.nll + _price(data, effect_of(model, other))
+    least = min(scores.values())
+    close = [one for one, score in scores.items() if score <= least + AS_GOOD_NATS]
+    return min(close, key=lambda one: (commonness(one), scores[one], one))
+
+
+def effect_of(model: Model, label: Label) -> Effect:
+    """The effect of a label that the model holds."""
+    acting = {a.label: a.effect for a in model.acting}
+    return acting.get(label) or {o.candidate.label: o.candidate.effect for o in model.opened}[label]
+
+
+def _sorted_out(
+    data: Data, named: Model, label: Label, screened: Sequence[Alias], fits: Mapping[Label, Model]
+) -> Comparison:
+    """Aliases, lookalikes and what is excluded, with the losses of the refits where there are."""
+    own = _price(data, effect_of(named, label))
+    lists: tuple[list[Alias], list[Alias], list[Alias]] = ([], [], [])
+    for one in screened:
+        model = fits.get(one.candidate.label)
+        if model is not None:
+            worse = model.nll - named.nll
+            loss = worse + _price(data, one.candidate.effect) - own
+            one = replace(one, fit=worse, loss=loss, possible=plausible(model))
+        lists[_place(one)].append(one)
+    aliases, lookalikes, excluded = lists
+    return Comparison(tuple(aliases), tuple(lookalikes), tuple(excluded))
+
+
+def _place(one: Alias) -> int:
+    """Which list an effect belongs to: 0 aliases, 1 lookalikes, 2 excluded."""
+    same = one.cosine > SAME
+    if one.possible and (_rivals(one) or (same and one.fit < CLASS_NATS)):
+        return 0
+    return 1 if same or one.fit < RIVAL_NATS else 2
+
+
+def _rivals(alias: Alias) -> bool:
+    return alias.fit < RIVAL_NATS and alias.cosine > RIVAL_COSINE
+
+
+def _screened(
+    data: Data, model: Model, label: Label, others: Sequence[Signature]
+) -> tuple[list[Alias], dict[Label, Signature]]:
+    """Every other effect to first order, nearest first, and its best signature."""
+    index = [a.label for a in model.acting].index(label)
+    named = model.acting[index]
+    rest = tuple(a for k, a in enumerate(model.acting) if k != index)
+    own = np.nan_to_num(slopes(data.view, (named,)))
+    base = np.nan_to_num(slopes(data.view, rest))
+    values = np.array([named.values[p.name] for p in named.effect.slopes()])
+    added = (own @ values)[:, :, None]
+    free = [s for s in others if s.candidate.label not in model.labels]
+    columns = np.concatenate([base, added, *(np.nan_to_num(s.columns) for s in free)], axis=2)
+    weighted = model.precision.solve(columns)
+    normal = inner(columns, weighted)
+    score = inner(weighted, (model.error + added[:, :, 0])[:, :, None])[:, 0]
+    normal, score = _without(normal, score, base.shape[2])
+    best: dict[Label, Alias] = {}
+    found: dict[Label, Signature] = {}
+    at = 1
+    for s in free:
+        group = slice(at, at + s.columns.shape[2])
+        at = group.stop
+        alias = _first_order(s.candidate, normal, score, group)
+        if s.candidate.label not in best or best[s.candidate.label].fit > alias.fit:
+            best[s.candidate.label] = alias
+            found[s.candidate.label] = s
+    ranked = sorted(best.values(), key=lambda a: (-a.cosine, a.candidate.label))
+    return ranked, found
+
+
+def _first_order(candidate: Candidate, normal: Array, score: Array, group: slice) -> Alias:
+    """Cosine and loss of one effect by its linear signature."""
+    inverse = inverse_scaled(normal[group, group])
+    cross = normal[0, group]
+    inside = max(float(cross @ inverse @ cross), 0.0)
+    cosine = math.sqrt(inside / max(float(normal[0, 0]), 1e-300))
+    loss = _gain_of_named(score, normal) - 0.5 * float(score[group] @ inverse @ score[group])
+    return Alias(candidate, min(cosine, 1.0), loss, loss)
+
+
+def _gain_of_named(score: Array, normal: Array) -> float:
+    return 0.5 * float(score[0] ** 2 / max(normal[0, 0], 1e-300))
+
+
+def _without(normal: Array, score: Array, width: int) -> tuple[Array, Array]:
+    """Normal matrix and scores freed of the first `width` columns."""
+    if not width:
+        return normal, score
+    inverse = inverse_scaled(normal[:width, :width])
+    cross = normal[:width, width:]
+    return (
+        normal[width:, width:] - cross.T @ inverse @ cross,
+        score[width:] - cross.T @ inverse @ score[:width],
+    )
+
+
+def unseen(data: Data, model: Model, others: Sequence[Signature]) -> tuple[str, ...]:
+    """What this log could not show: parameters that at their plausible most stay below 3 sigma."""
+    hidden = []
+    for s in others:
+        if s.at:
+            continue
+        columns = np.nan_to_num(s.columns)
+        own = np.sqrt(np.maximum(np.diag(inner(columns, model.precision.solve(columns))), 0.0))
+        slopes_of = s.candidate.effect.slopes()
+        names = [p.name for k, p in enumerate(slopes_of) if p.high * own[k] < 3.0]
+        if names:
+            which = "" if len(names) == len(slopes_of) else f": {', '.join(names)}"
+            name, sensor, _ = s.candidate.label
+            hidden.append(f"{name} ({sensor}){which}")
+    return tuple(hidden)

@@ -1,0 +1,374 @@
+"""Noise of the error series: what the spec says, how much and how slow it may be, and the fit.
+
+Per sensor: white noise of the spec's covariance times factor^2; per axis of position and attitude
+a first-order Gauss-Markov process.  Within `Bounds` such noise is what the spec allows; beyond, it
+is a finding.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import LinAlgError
+
+from syncline_design.diagnosis.covariance import Precision, factored
+from syncline_design.effects.record import Array
+from syncline_design.logs.log import Rows
+from syncline_design.logs.stamps import repeated
+
+Sensor = tuple[str, str]  # (stage, role)
+
+FACTOR_LIMIT = 1.1  # white noise up to this factor of the spec's is the spec's
+SLOW_LIMIT = 1.2  # slow variance over the spec's that still is of the spec's size
+FACTOR_LEAST = 0.05
+SLOW_LEAST = 1e-4
+OPEN = 1e6
+RELATIVE_FLOOR = 1e-12  # of a row's variances: keeps them invertible whatever sizes meet in a row
+TIME_LEAST_S = 0.2
+TIME_MOST_S = 120.0
+TIME_USUAL_S = 25.0  # centre of the weak prior on time constants: minutes or fractions of one
+FACTOR_SPREAD = 0.15  # of the prior on log factor, below the limit
+TIME_SPREAD = 1.0  # its standard deviation in log T
+
+
+@dataclass(frozen=True, slots=True)
+class White:
+    """White noise of one sensor as the spec has it: covariance (n, 3, 3) [m2] of the error.
+
+    loading (n, 3, k) with loading loading' = covariance for a sensor that reads once a stamp: its
+    noise is common to the rows of the stamp.  None where every row is a reading of its own.
+    """
+
+    sensor: Sensor
+    covariance: Array
+    loading: Array | None = None
+
+    def rows(self, index: Rows) -> White:
+        """The same noise on some of the rows."""
+        loading = None if self.loading is None else self.loading[index]
+        return White(self.sensor, self.covariance[index], loading)
+
+
+@dataclass(frozen=True, slots=True)
+class Slow:
+    """Gauss-Markov noise of one sensor: loading (n, 3, m) [m] per unit of the spec's std."""
+
+    sensor: Sensor
+    loading: Array
+    shared_time: bool  # one time constant for all columns
+
+    @property
+    def columns(self) -> int:
+        return int(self.loading.shape[2])
+
+
+@dataclass(frozen=True, slots=True)
+class Directed:
+    """White noise along the motion: covariance size^2 direction direction' per row (n, 3, k).
+
+    It comes from errors of stamps, so the rows of one stamp share it.
+    """
+
+    key: str
+    direction: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Structure:
+    """All parts that the covariance of a series can be made of, on its rows.
+
+    fixed (n, 3, 3) [m2]: what is known and not fitted, each row's own.  stamped (n, 3, k) [m]: the
+    same, common to the rows of a stamp: the spec's timing errors.
+    """
+
+    time_s: Array
+    white: tuple[White, ...]
+    slow: tuple[Slow, ...]
+    fixed: Array
+    directed: tuple[Directed, ...] = ()
+    stamped: Array | None = None
+    one_reading: bool = True  # of the vehicle for all rows of a stamp
+
+    @property
+    def shared(self) -> bool:
+        """Whether rows share stamps, and with them the vehicle's noise."""
+        return self.one_reading and repeated(self.time_s)
+
+    def rows(self, index: Rows) -> Structure:
+        """The same structure on some of the rows."""
+        return Structure(
+            self.time_s[index],
+            tuple(w.rows(index) for w in self.white),
+            tuple(Slow(s.sensor, s.loading[index], s.shared_time) for s in self.slow),
+            self.fixed[index],
+            tuple(Directed(d.key, d.direction[index]) for d in self.directed),
+            None if self.stamped is None else self.stamped[index],
+            self.one_reading,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseLevel:
+    """Fitted noise.
+
+    factor: per white part; slow: per slow part the variances over the spec's, per column;
+    time_constant_s: per slow part, per column; size: per directed part [its unit].
+    """
+
+    factor: tuple[float, ...]
+    slow: tuple[tuple[float, ...], ...]
+    time_constant_s: tuple[tuple[float, ...], ...]
+    size: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """Upper limits of the fit; an effect that is part of the model opens some of them."""
+
+    factor: tuple[float, ...]
+    slow: tuple[tuple[float, ...], ...]
+
+    def opened(self, structure: Structure, sensor: Sensor, what: str) -> Bounds:
+        """Open the factor ("factor", "tails"), all slow variances ("slow") or one ("down")."""
+        factor = tuple(
+            OPEN if what in ("factor", "tails") and w.sensor == sensor else limit
+            for w, limit in zip(structure.white, self.factor, strict=True)
+        )
+        slow = tuple(
+            tuple(
+                OPEN if part.sensor == sensor and (what == "slow" or _is_down(what, k)) else limit
+                for k, limit in enumerate(limits)
+            )
+            for part, limits in zip(structure.slow, self.slow, strict=True)
+        )
+        return Bounds(factor, slow)
+
+
+def _is_down(what: str, axis: int) -> bool:
+    return what == "down" and axis == 2
+
+
+def spec_bounds(structure: Structure) -> Bounds:
+    """What the spec allows."""
+    return Bounds(
+        tuple(FACTOR_LIMIT for _ in structure.white),
+        tuple(tuple(SLOW_LIMIT for _ in range(s.columns)) for s in structure.slow),
+    )
+
+
+def first_guess(structure: Structure) -> NoiseLevel:
+    """White noise of nearly the spec's size, and some slow noise."""
+    return NoiseLevel(
+        tuple(0.9 for _ in structure.white),
+        tuple(tuple(0.05 for _ in range(s.columns)) for s in structure.slow),
+        tuple(tuple(TIME_USUAL_S for _ in range(s.columns)) for s in structure.slow),
+        tuple(0.0 for _ in structure.directed),
+    )
+
+
+def as_specified(structure: Structure) -> NoiseLevel:
+    """The spec's white noise and nothing else."""
+    guess = first_guess(structure)
+    return replace(
+        guess,
+        factor=tuple(1.0 for _ in structure.white),
+        slow=tuple(tuple(SLOW_LEAST for _ in range(s.columns)) for s in structure.slow),
+    )
+
+
+def clipped(level: NoiseLevel, bounds: Bounds) -> NoiseLevel:
+    """The level brought within bounds, with no directed part: the noise without its findings."""
+    return replace(
+        level,
+        factor=tuple(min(f, b) for f, b in zip(level.factor, bounds.factor, strict=True)),
+        slow=tuple(
+            tuple(min(v, b) for v, b in zip(vs, bs, strict=True))
+            for vs, bs in zip(level.slow, bounds.slow, strict=True)
+        ),
+        size=tuple(0.0 for _ in level.size),
+    )
+
+
+def white_covariance(structure: Structure, level: NoiseLevel) -> Array:
+    """Covariance of every row's white noise (n, 3, 3) [m2], whatever it shares with others."""
+    total = structure.fixed.copy()
+    if structure.stamped is not None:
+        total += structure.stamped @ np.swapaxes(structure.stamped, 1, 2)
+    for part, factor in zip(structure.white, level.factor, strict=True):
+        total += factor**2 * part.covariance
+    for directed, size in zip(structure.directed, level.size, strict=True):
+        if size > 0.0:
+            total += size**2 * (directed.direction @ np.swapaxes(directed.direction, 1, 2))
+    diagonal = np.einsum("nii->ni", total)
+    diagonal *= 1.0 + RELATIVE_FLOOR
+    return total
+
+
+def row_covariance(structure: Structure, level: NoiseLevel) -> Array:
+    """Sigma (n, 3, 3) [m2]: the white noise that a row has for itself."""
+    total = structure.fixed.copy()
+    for part, factor in zip(structure.white, level.factor, strict=True):
+        if part.loading is None:
+            total += factor**2 * part.covariance
+    return total
+
+
+def common_loading(structure: Structure, level: NoiseLevel) -> Array:
+    """White noise that is new at every stamp and common to its rows, (n, 3, k) [m]."""
+    columns = [np.zeros((structure.time_s.shape[0], 3, 0))]
+    if structure.stamped is not None:
+        columns.append(structure.stamped)
+    for part, factor in zip(structure.white, level.factor, strict=True):
+        if part.loading is not None:
+            columns.append(factor * part.loading)
+    for directed, size in zip(structure.directed, level.size, strict=True):
+        if size > 0.0:
+            columns.append(size * directed.direction)
+    return np.concatenate(columns, axis=2)
+
+
+def loadings(structure: Structure, level: NoiseLevel) -> tuple[Array, Array]:
+    """B (n, 3, m) [m] and time constants (m,) [s]; a slow part grows with an understated factor."""
+    columns: list[Array] = [np.zeros((structure.time_s.shape[0], 3, 0))]
+    times: list[float] = []
+    factors = {w.sensor: max(f, 1.0) for w, f in zip(structure.white, level.factor, strict=True)}
+    for part, slow, time_s in zip(structure.slow, level.slow, level.time_constant_s, strict=True):
+        scale = np.sqrt(np.array(slow)) * factors.get(part.sensor, 1.0)
+        columns.append(part.loading * scale)
+        times.extend(time_s)
+    return np.concatenate(columns, axis=2), np.array(times)
+
+
+def precision(structure: Structure, level: NoiseLevel) -> Precision:
+    """The factored covariance of the structure at a noise level."""
+    loading, times = loadings(structure, level)
+    if not structure.shared:
+        return factored(white_covariance(structure, level), loading, structure.time_s, times)
+    common = common_loading(structure, level)
+    columns = np.concatenate([loading, common], axis=2)
+    times = np.concatenate([times, np.zeros(common.shape[2])])
+    return factored(row_covariance(structure, level), columns, structure.time_s, times)
+
+
+def marginal_variance(structure: Structure, level: NoiseLevel) -> Array:
+    """Variance of every component [m2], (n, 3)."""
+    loading, _ = loadings(structure, level)
+    white = white_covariance(structure, level)
+    total: Array = np.einsum("nii->ni", white) + np.sum(loading**2, axis=2)
+    return total
+
+
+class _Packing:
+    """Noise level <-> vector of logarithms, with bounds."""
+
+    def __init__(self, structure: Structure, bounds: Bounds, free_sizes: tuple[int, ...]) -> None:
+        self.structure = structure
+        self.bounds = bounds
+        self.free_sizes = free_sizes
+
+    def pack(self, level: NoiseLevel) -> Array:
+        values = [*level.factor]
+        for slow in level.slow:
+            values += [max(v, 10 * SLOW_LEAST) for v in slow]
+        for part, times in zip(self.structure.slow, level.time_constant_s, strict=True):
+            values += times[:1] if part.shared_time else times
+        values += [max(level.size[i], 1e-6) for i in self.free_sizes]
+        logs = np.log(np.array(values))
+        low, high = np.array(self.limits()).T
+        packed: Array = np.clip(logs, low, high)
+        return packed
+
+    def limits(self) -> list[tuple[float, float]]:
+        limits = [(np.log(FACTOR_LEAST), np.log(b)) for b in self.bounds.factor]
+        for slow in self.bounds.slow:
+            limits += [(np.log(SLOW_LEAST), np.log(b)) for b in slow]
+        for part in self.structure.slow:
+            count = 1 if part.shared_time else part.columns
+            limits += [(np.log(TIME_LEAST_S), np.log(TIME_MOST_S))] * count
+        limits += [(np.log(1e-7), np.log(10.0))] * len(self.free_sizes)
+        return limits
+
+    def unpack(self, vector: Array) -> NoiseLevel:
+        values = [float(v) for v in np.exp(vector)]
+        factor = tuple(values[: len(self.structure.white)])
+        at = len(factor)
+        slow: list[tuple[float, ...]] = []
+        times: list[tuple[float, ...]] = []
+        for part in self.structure.slow:
+            slow.append(tuple(values[at : at + part.columns]))
+            at += part.columns
+        for part in self.structure.slow:
+            count = 1 if part.shared_time else part.columns
+            own = values[at : at + count]
+            times.append(tuple(own * part.columns if part.shared_time else own))
+            at += count
+        size = [0.0] * len(self.structure.directed)
+        for i, value in zip(self.free_sizes, values[at:], strict=True):
+            size[i] = value
+        return NoiseLevel(factor, tuple(slow), tuple(times), tuple(size))
+
+    def prior(self, level: NoiseLevel) -> float:
+        """Weak prior [nat]: where the log does not tell, factors are 1 and time constants usual."""
+        logs = [np.log(min(f, FACTOR_LIMIT)) for f in level.factor]
+        total = float(sum(0.5 * (value / FACTOR_SPREAD) ** 2 for value in logs))
+        for part, times in zip(self.structure.slow, level.time_constant_s, strict=True):
+            used = times[:1] if part.shared_time else times
+            total += sum(0.5 * (np.log(t / TIME_USUAL_S) / TIME_SPREAD) ** 2 for t in used)
+        return total
+
+
+def fit_noise(
+    structure: Structure,
+    error: Array,
+    bounds: Bounds,
+    start: NoiseLevel,
+    free_sizes: tuple[int, ...] = (),
+    iterations: int = 30,
+) -> tuple[NoiseLevel, float]:
+    """Noise level of largest likelihood within bounds, and the NLL [nat] reached (no prior in it).
+
+    error (n, 3) [m] on the structure's rows; free_sizes: which directed parts are fitted.
+    """
+    from scipy.optimize import minimize
+
+    packing = _Packing(structure, bounds, free_sizes)
+
+    def cost(vector: Array) -> float:
+        level = packing.unpack(vector)
+        try:
+            found = precision(structure, level).negative_log_likelihood(error)
+        except LinAlgError:
+            return 1e15
+        return found + packing.prior(level)
+
+    limits = packing.limits()
+    result = minimize(
+        cost,
+        packing.pack(start),
+        jac=_forward_slopes(cost, limits),
+        method="L-BFGS-B",
+        bounds=limits,
+        options={"maxiter": iterations, "ftol": 5e-6, "gtol": 0.05, "maxls": 10},
+    )
+    level = packing.unpack(result.x)
+    return level, float(result.fun) - packing.prior(level)
+
+
+def _forward_slopes(
+    cost: Callable[[Array], float], limits: list[tuple[float, float]]
+) -> Callable[[Array], Array]:
+    """One-sided slopes that stay within the limits; pinned coordinates keep their slope."""
+
+    def slopes(vector: Array) -> Array:
+        base = cost(vector)
+        result = np.empty_like(vector)
+        for k, (_, high) in enumerate(limits):
+            step = 1e-4 if vector[k] + 1e-4 <= high else -1e-4
+            moved = vector.copy()
+            moved[k] += step
+            result[k] = (cost(moved) - base) / step
+        return result
+
+    return slopes

@@ -1,0 +1,234 @@
+"""The whole diagnosis, step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from syncline_design import __version__
+from syncline_design.diagnosis.axes import without_still_axes
+from syncline_design.diagnosis.candidates import candidates, directed_parts
+from syncline_design.diagnosis.checks import log_checks
+from syncline_design.diagnosis.expected_noise import structure_of
+from syncline_design.diagnosis.figures_data import plots
+from syncline_design.diagnosis.findings import findings
+from syncline_design.diagnosis.fitting import WINDOW, Data, data_of, windows
+from syncline_design.diagnosis.gap import Gap, block_folds, gap, regime_fold
+from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
+from syncline_design.diagnosis.identify import unseen
+from syncline_design.diagnosis.linear_algebra import one_thread
+from syncline_design.diagnosis.regimes import covariates, first_disagreement_s, strongest, where_map
+from syncline_design.diagnosis.remainder import remainder
+from syncline_design.diagnosis.result import Diagnosis, Json, Stairs, Verdict
+from syncline_design.diagnosis.scene import Acting, scene
+from syncline_design.diagnosis.search import Search, SearchResult, start_search
+from syncline_design.diagnosis.settings import DiagnosisSettings, Progress, silent
+from syncline_design.diagnosis.system import Measured, measured
+from syncline_design.logs.log import Log
+from syncline_design.spec.load import LoadedSpec, load
+
+MOST_ROWS = 20_000  # of a longer log, windows spread over it are worked on
+REMAINDER_SHARE = 0.2  # of the false-alarm rate: for the test of what remains
+
+
+def diagnose(
+    spec: LoadedSpec | Path | str,
+    log_paths: Sequence[Path | str] = (),
+    settings: DiagnosisSettings | None = None,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """Find where a log disagrees with its spec, name what is missing, and show the gap shrink.
+
+    Raises BadInput for a spec or log that cannot be used.
+    """
+    loaded = spec if isinstance(spec, LoadedSpec) else load(spec)
+    progress("reading the log", 0.0)
+    with one_thread():
+        inputs = measured(loaded, [Path(p) for p in log_paths])
+        return diagnose_measured(inputs, settings or DiagnosisSettings(), loaded, progress)
+
+
+def diagnose_measured(
+    inputs: Measured,
+    settings: DiagnosisSettings,
+    loaded: LoadedSpec | None = None,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """The diagnosis of a system and a log that are already in memory."""
+    progress("looking for gross faults", 0.05)
+    faults, log = gross_faults(
+        inputs.system,
+        inputs.log,
+        inputs.known,
+        expected_size(inputs),
+        settings.exclude_effects,
+        inputs.reread,
+    )
+    data, search, result = _searched(inputs, log, settings, progress)
+    slip = _slip(result)
+    if slip is not None and slip.effect.name not in settings.exclude_effects:
+        before = usual_size(result.base.error)
+        faults = (*faults, Gross(slip, before / max(usual_size(result.model.error), 1e-300)))
+        log = mended(log, slip, inputs.reread)
+        data, search, result = _searched(inputs, log, settings, progress)
+    view = data.view
+    progress("testing what remains", 0.7)
+    rest = remainder(data, result.model, search.rng)
+    named = bool(result.model.labels or faults)
+    left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
+    checks = log_checks(view)
+    sound = all(c.severity != "contradiction" for c in checks)
+    verdict: Verdict = "unexplained"
+    if sound and not left:
+        verdict = "explained" if named else "agrees"
+    progress("measuring the gap", 0.8)
+    shown = findings(result.final, faults)
+    cells = where_map(view, result.base.error, result.model.precision)
+    cells_after = where_map(view, result.model.error, result.model.precision)
+    folds = block_folds(data)
+    regime_name, regime = regime_fold(data)
+    return Diagnosis(
+        verdict=verdict,
+        checks=checks,
+        findings=shown,
+        remaining=rest,
+        where_before=strongest(cells),
+        where_after=strongest(cells_after),
+        first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
+        gap=gap(data, result.model, folds),
+        regime=(regime_name, gap(data, result.model, regime)),
+        placebo=_placebo(data, search, result),
+        steps=_stairs(data, result),
+        unseen=_unseen(data, search, result),
+        log=log_json(replace(inputs.log, notes=view.log.notes))
+        | {"fitted": len(view), "motion": _motion_json(data)},
+        noise=_noise_json(data, result),
+        plots=plots(data, result, cells),
+        spec=None if loaded is None else {"name": loaded.spec.name, "file": str(loaded.path)},
+        log_files=tuple(inputs.files),
+        provenance=_provenance(settings, loaded),
+    )
+
+
+def _searched(
+    inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress
+) -> tuple[Data, Search, SearchResult]:
+    """The search over one log; of a long one, over windows of it."""
+    log = log.rows(windows(len(log), MOST_ROWS, WINDOW))
+    plain = structure_of(scene(inputs.system, log, inputs.known))
+    log = without_still_axes(inputs.system, log, inputs.known, plain)
+    view = scene(inputs.system, log, inputs.known)
+    parts = directed_parts(view, candidates(view, settings.exclude_effects))
+    data = data_of(view, structure_of(view, parts))
+    progress("searching", 0.15)
+    search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
+    return data, search, search.run()
+
+
+def _slip(result: SearchResult) -> Acting | None:
+    """A position latency of whole seconds: the rows are paired anew, which is more exact."""
+    at = 0
+    for one in result.model.acting:
+        if one.label == ("latency", "position", 0):
+            spread = float(np.sqrt(max(result.model.covariance[at, at], 0.0)))
+            return whole_seconds(float(one.values["latency_s"]), spread)
+        at += len(one.effect.slopes())
+    return None
+
+
+def expected_size(inputs: Measured) -> float:
+    """Usual length of the error vector [m] that the spec's noise makes."""
+    view = scene(inputs.system, inputs.log.rows(slice(0, None, max(1, len(inputs.log) // 500))))
+    structure = structure_of(view)
+    variance = sum(np.einsum("nii->ni", w.covariance) for w in structure.white)
+    visible = np.isfinite(view.log.truth_m)
+    return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
+
+
+def _stairs(data: Data, result: SearchResult) -> tuple[Stairs, ...]:
+    folds = block_folds(data)
+    stairs = []
+    for label, model in result.final.stairs:
+        found = gap(data, model, folds)
+        if found is not None:
+            name, sensor, _ = label
+            stairs.append(Stairs(f"{name} ({sensor})", found))
+    return tuple(stairs)
+
+
+def _placebo(data: Data, search: Search, result: SearchResult) -> tuple[str, Gap | None]:
+    """The gap with one more effect, drawn from those that were not chosen."""
+    free = [s for s in search.free_signatures(result.model) if not s.at]
+    if not free or not result.model.labels:
+        return "", None
+    chosen = free[int(search.rng.integers(len(free)))]
+    name, sensor, _ = chosen.candidate.label
+    columns = np.nan_to_num(chosen.columns)
+    found = gap(data, result.model, block_folds(data), columns)
+    return f"{name} ({sensor})", found
+
+
+def _unseen(data: Data, search: Search, result: SearchResult) -> tuple[str, ...]:
+    return unseen(data, result.model, search.free_signatures(result.model))
+
+
+def log_json(log: Log) -> Json:
+    """What was read and what was left out: rows = used + thinned + all that was rejected."""
+    return {
+        "kind": log.kind,
+        "rows": log.rows_read,
+        "used": len(log),
+        "rejected": dict(log.rejected),
+        "thinned": log.thinned,
+        "notes": list(log.notes),
+        "duration_s": log.duration_s,
+        "interval_s": log.interval_s,
+    }
+
+
+def _motion_json(data: Data) -> Json:
+    """How the log moves: 5 and 95 % quantile of every covariate but time and angles."""
+    return {
+        c.name: {"low": float(low), "high": float(high), "unit": c.unit}
+        for c in covariates(data.view)
+        if c.name in ("speed", "turn_rate", "range")
+        for low, high in [np.quantile(c.values, [0.05, 0.95])]
+    }
+
+
+def _noise_json(data: Data, result: SearchResult) -> Json:
+    level = result.model.level
+    return {
+        "white_factor": {
+            "/".join(w.sensor): f for w, f in zip(data.structure.white, level.factor, strict=True)
+        },
+        "slow": {
+            "/".join(s.sensor): {"variance_over_spec": list(v), "time_constant_s": list(t)[:1]}
+            for s, v, t in zip(data.structure.slow, level.slow, level.time_constant_s, strict=True)
+        },
+        "rows_fitted": len(data.noise_rows),
+        "remainder": asdict(result_remainder(result)),
+    }
+
+
+def result_remainder(result: SearchResult) -> Any:
+    """The negative log likelihoods before and after [nat]."""
+    from syncline_design.diagnosis.figures_data import Likelihoods
+
+    return Likelihoods(result.base.nll, result.model.nll)
+
+
+def _provenance(settings: DiagnosisSettings, loaded: LoadedSpec | None) -> Json:
+    return {
+        "version": __version__,
+        "seed": settings.seed,
+        "false_alarm_rate": settings.false_alarm_rate,
+        "max_effects": settings.max_effects,
+        "exclude_effects": list(settings.exclude_effects),
+        "spec_sha256": loaded.spec_sha256 if loaded else None,
+        "catalogs_sha256": loaded.catalogs_sha256 if loaded else None,
+    }

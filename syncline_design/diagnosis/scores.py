@@ -1,0 +1,118 @@
+"""Scores of whole effects against what is left of a log, and what clean logs reach by chance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from scipy.stats import chi2
+
+from syncline_design.diagnosis.candidates import Signature, slopes
+from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled, solve_scaled
+from syncline_design.diagnosis.noise import NoiseLevel, precision
+from syncline_design.effects.record import Array
+
+DRAWS = 3000  # clean scores drawn for the distribution of the largest
+RIDGE = 1e-8
+LOST = 1e-7  # share of a signature's information below which the model's own effects hold it all
+
+
+@dataclass(frozen=True, slots=True)
+class Gram:
+    """Scores of all signatures: g = X' C^-1 e and M = X' C^-1 X, freed of the model's effects."""
+
+    score: Array
+    normal: Array
+    groups: tuple[slice, ...]
+    nll: float
+
+    def gains(self) -> list[tuple[float, Array]]:
+        """NLL saved [nat] by each signature alone, and its parameters, to first order."""
+        result = []
+        for g in self.groups:
+            values = solve_scaled(self.normal[g, g], self.score[g])
+            result.append((0.5 * float(self.score[g] @ values), values))
+        return result
+
+
+def possible(found: Signature, values: Array) -> bool:
+    """Whether first-order parameters are at most twice what the effect can have."""
+    slopes_of = found.candidate.effect.slopes()
+    return all(abs(v) <= 2.0 * p.high for v, p in zip(values, slopes_of, strict=True))
+
+
+def gram(data: Data, model: Model, found: Sequence[Signature], level: NoiseLevel) -> Gram:
+    """Scores of signatures under a noise level."""
+    own = np.nan_to_num(slopes(data.view, model.acting))
+    width = own.shape[2]
+    groups, at = [], 0
+    for s in found:
+        groups.append(slice(at, at + s.columns.shape[2]))
+        at = groups[-1].stop
+    columns = np.concatenate([own, *(np.nan_to_num(s.columns) for s in found)], axis=2)
+    known = model.precision if level is model.level else precision(data.structure, level)
+    weighted = known.solve(columns)
+    normal = inner(columns, weighted)
+    score = inner(weighted, model.error[:, :, None])[:, 0]
+    if width:
+        inverse = inverse_scaled(normal[:width, :width])
+        cross = normal[:width, width:]
+        score = score[width:] - cross.T @ inverse @ score[:width]
+        whole = np.diag(normal)[width:]
+        normal = normal[width:, width:] - cross.T @ inverse @ cross
+        lost = np.diag(normal) < LOST * whole  # the model's own effects can do all of it
+        score[lost], normal[lost], normal[:, lost] = 0.0, 0.0, 0.0
+    nll = known.negative_log_likelihood(model.error)
+    return Gram(score, normal, tuple(groups), nll)
+
+
+def clean_threshold(scores: Gram, rate: float, rng: np.random.Generator) -> float:
+    """Quantile of the least log p over all signatures when there is nothing but noise."""
+    return float(np.quantile(clean_least(scores, rng), rate))
+
+
+def clean_least(scores: Gram, rng: np.random.Generator) -> Array:
+    """Draws of the least log p over all signatures when there is nothing but noise.
+
+    g is normal with covariance M when the model is right, so the least p over all (correlated)
+    candidates is drawn without simulating a log.
+    """
+    scale = np.sqrt(np.diag(scores.normal))
+    scale[scale == 0.0] = 1.0
+    correlation = scores.normal / scale[:, None] / scale
+    values, vectors = np.linalg.eigh(correlation)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = root @ rng.standard_normal((root.shape[1], DRAWS))
+    least = np.zeros(DRAWS)
+    for g in scores.groups:
+        inverse = np.linalg.pinv(correlation[g, g], rcond=RIDGE)
+        squares = np.sum(draws[g] * (inverse @ draws[g]), axis=0)
+        least = np.minimum(least, _log_p(squares, g.stop - g.start))
+    return least
+
+
+_GRID = np.linspace(0.0, 80.0, 401)
+
+
+@cache
+def _log_p_grid(freedom: int) -> Array:
+    grid: Array = chi2.logsf(_GRID, freedom)
+    return grid
+
+
+def _log_p(squares: Array, freedom: int) -> Array:
+    """log of the upper tail of chi-square, by interpolation (it is nearly straight)."""
+    log_p: Array = np.interp(squares, _GRID, _log_p_grid(freedom))
+    return log_p
+
+
+def log_p_of(statistic: float, freedom: int) -> float:
+    """log of the upper tail of chi-square, by its asymptote where the library's underflows."""
+    found = float(chi2.logsf(max(statistic, 0.0), freedom))
+    if math.isfinite(found):
+        return found
+    half = 0.5 * statistic
+    return -half + (0.5 * freedom - 1.0) * math.log(half) - math.lgamma(0.5 * freedom)

@@ -1,0 +1,260 @@
+"""Which effects are missing: forward and backward search over whole effects.
+
+Each candidate is scored as a whole (all its parameters at once) under a ladder of noise models, the
+best few are fitted with the noise fitted anew, and the best of these is accepted if it beats what
+the largest of all candidates' scores reaches by chance on this very trajectory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.diagnosis.calibration import refit_factor
+from syncline_design.diagnosis.candidates import (
+    Candidate,
+    Signature,
+    candidates,
+    commonness,
+    signatures,
+)
+from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
+from syncline_design.diagnosis.noise import NoiseLevel, as_specified
+from syncline_design.diagnosis.scatter import scatter_candidates
+from syncline_design.diagnosis.scores import (
+    Gram,
+    clean_least,
+    clean_threshold,
+    gram,
+    log_p_of,
+    possible,
+)
+from syncline_design.diagnosis.settings import DiagnosisSettings
+from syncline_design.diagnosis.settling import Settled, settle
+from syncline_design.diagnosis.tails import tails_in
+from syncline_design.diagnosis.trials import freedom_of, log_chance, plausible, with_effect
+
+TRIED = 4  # candidates fitted with their own noise per step
+SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
+WITHIN_NATS, WITHIN_SHARE = 12.0, 0.35  # how far behind the best a candidate may be to be fitted
+MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
+SCATTER_SHARE = 0.2  # for effects that only scatter; the rest is the remainder test's
+WANDERING = frozenset({"correlated_noise", "height_drift"})
+WANDER_NATS = (
+    15.0  # slow noise can take the shape of anything slow, so it has to be that much better
+)
+TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
+NEAR = 2.0  # log p within this factor of the threshold is checked on simulated logs
+AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
+SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
+AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it
+RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A model with one more effect."""
+
+    candidate: Candidate
+    model: Model
+    gain: float  # NLL saved [nat]
+    freedom: int
+
+    @property
+    def log_p(self) -> float:
+        """log of the chance that noise alone saves as much in this one candidate.
+
+        A step is charged for the places at which it was looked for.
+        """
+        return log_chance(self.candidate.effect, self.gain, self.freedom)
+
+
+@dataclass(frozen=True, slots=True)
+class SearchResult:
+    """The model without effects, and what was found."""
+
+    base: Model
+    final: Settled
+
+    @property
+    def model(self) -> Model:
+        return self.final.model
+
+
+@dataclass(slots=True)
+class Search:
+    """A running search over one log."""
+
+    data: Data
+    settings: DiagnosisSettings
+    rng: np.random.Generator
+    candidates: tuple[Candidate, ...]
+    signatures: tuple[Signature, ...]
+    progress: Callable[[float], None]
+
+    def run(self) -> SearchResult:
+        """Add effects while they beat chance; then take out what is no longer needed."""
+        base = fit(self.data)
+        model = base
+        while len(model.labels) < self.settings.max_effects:
+            scores = gram(self.data, model, self.free_signatures(model), model.level)
+            threshold = self.threshold(scores)
+            trial = self.best(model, scores)
+            if trial is None or trial.log_p > threshold:
+                break
+            if trial.log_p > NEAR * threshold:
+                threshold *= self.refit_factor(model, scores)
+                if trial.log_p > threshold:
+                    break
+            model = self.exchanged(trial.model)
+            self.progress(len(model.labels) / self.settings.max_effects)
+        return SearchResult(base, self.settled(model))
+
+    def settled(self, model: Model) -> Settled:
+        """The final model: its classes decided, its evidence counted, needless effects gone."""
+        fine = finely(self.data)
+        start = fit(fine, model.acting, model.opened, start=model.level)
+
+        def threshold(less: Model) -> float:
+            return self.threshold(gram(fine, less, self.free_signatures(less), less.level))
+
+        return settle(fine, start, self.signatures, threshold)
+
+    def threshold(self, scores: Gram) -> float:
+        """log p that the best candidate of a clean log falls below at the stated rate."""
+        return clean_threshold(scores, MEAN_SHARE * self.settings.false_alarm_rate, self.rng)
+
+    def refit_factor(self, model: Model, scores: Gram) -> float:
+        """By how much refitted noise moves the threshold, from simulated clean logs."""
+        free = self.free_signatures(model)
+
+        def gains(clean: Model) -> list[float]:
+            return [g for g, _ in gram(self.data, clean, free, clean.level).gains()]
+
+        expected = float(np.mean(clean_least(scores, self.rng)))
+        return refit_factor(self.data, model, free, self.rng, gains, log_p_of, expected)
+
+    def free_signatures(self, model: Model) -> list[Signature]:
+        """Signatures of what the model does not hold yet."""
+        return [s for s in self.signatures if s.candidate.label not in model.labels]
+
+    def best(self, model: Model, scores: Gram) -> Trial | None:
+        """The candidate that best explains what is left, its noise fitted anew."""
+        trials = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
+        most = max((t.gain for t in trials), default=0.0)
+        trials += self.scatter_trials(model, SCATTER_WITHIN * most)
+        kept = [t for t in trials if plausible(t.model)]
+        return preferred(kept)
+
+    def screened(self, model: Model, scores: Gram) -> list[tuple[Signature, NoiseLevel]]:
+        """Signatures that gain most under any noise of the ladder, one per candidate."""
+        free = self.free_signatures(model)
+        best: dict[tuple[str, str, int], tuple[float, Signature, NoiseLevel]] = {}
+        for level in ladder(self.data, model):
+            seen = scores if level is model.level else gram(self.data, model, free, level)
+            for s, (gain, values) in zip(free, seen.gains(), strict=True):
+                if not possible(s, values):
+                    continue
+                total = gain - seen.nll - 2.0 * s.columns.shape[2] - 4.0 * len(s.at)
+                known = best.get(s.candidate.label)
+                if gain > SCREENED_OUT and (known is None or known[0] < total):
+                    best[s.candidate.label] = (total, s, level)
+        ranked = sorted(best.values(), key=lambda entry: -entry[0])
+        if not ranked:
+            return []
+        reach = max(WITHIN_NATS, WITHIN_SHARE * (ranked[0][0] + model.nll))
+        close = [entry for entry in ranked if entry[0] > ranked[0][0] - reach]
+        return [(s, level) for _, s, level in close[:TRIED]]
+
+    def trial(self, model: Model, found: Signature, level: NoiseLevel) -> Trial:
+        """The model with this candidate, fitted by re-simulation."""
+        fitted = with_effect(self.data, model, found, level)
+        freedom = freedom_of(found.candidate.effect)
+        return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
+
+    def scatter_trials(self, model: Model, least: float) -> list[Trial]:
+        """Candidates that only change the covariance, if a rough guess gains `least` [nat]."""
+        trials = []
+        for one, level in scatter_candidates(self.data, self.candidates, model, least):
+            fitted = fit(self.data, model.acting, (*model.opened, one), start=level)
+            gain = model.nll - fitted.nll
+            if gain > 2.0:
+                trials.append(Trial(one.candidate, fitted, gain, 2 if one.what == "slow" else 1))
+                trials += self.tails_trial(trials[-1])
+        return trials
+
+    def tails_trial(self, understated: Trial) -> list[Trial]:
+        """Heavy tails, where the scatter is too large and Student's t describes it much better."""
+        name, sensor, _ = understated.candidate.label
+        tails = [c for c in self.candidates if c.effect.name == "heavy_tails"]
+        if (name, sensor) != ("noise_understated", "position") or not tails:
+            return []
+        model = understated.model
+        if tails[0].label in model.labels:
+            return []
+        gain = tails_in(self.data, model).gain
+        if gain < TAILS_NATS:
+            return []
+        opened = (*model.opened[:-1], Opened(tails[0], "tails"))
+        return [Trial(tails[0], replace(model, opened=opened), understated.gain + gain, 2)]
+
+    def exchanged(self, model: Model) -> Model:
+        """Try every earlier effect's rivals in its place now that there is company."""
+        if len(model.acting) < 2:
+            return model
+        for k, one in enumerate(model.acting[:-1]):
+            rest = tuple(a for i, a in enumerate(model.acting) if i != k)
+            without = fit(self.data, rest, model.opened, start=model.level)
+            scores = gram(self.data, without, self.free_signatures(without), without.level)
+            for s, level in self.screened(without, scores):
+                if s.candidate.label == one.label or s.candidate.effect.kind == "stochastic":
+                    continue
+                trial = self.trial(without, s, level)
+                if plausible(trial.model) and clearly_better(trial.model, model):
+                    model = trial.model
+                    break
+        return model
+
+
+def clearly_better(new: Model, old: Model) -> bool:
+    """Whether another effect in the place of one fits better by more than its freedom and luck."""
+    extra = len(new.covariance) - len(old.covariance)
+    return old.nll - new.nll > RIVAL_NATS * (1 + max(extra, 0))
+
+
+def ladder(data: Data, model: Model) -> list[NoiseLevel]:
+    """Noise models to screen under: as fitted, and with the slow part as small as can be.
+
+    Slow noise fitted while an effect is missing has swallowed part of it.
+    """
+    spec = as_specified(data.structure)
+    kept = replace(
+        spec,
+        size=model.level.size,
+        factor=tuple(max(f, 0.3) for f in model.level.factor),
+    )
+    return [model.level, kept]
+
+
+def preferred(trials: Sequence[Trial]) -> Trial | None:
+    """The least likely by chance; among those that are as good, the commonest in practice."""
+    if not trials:
+        return None
+    lasting = [t for t in trials if t.candidate.effect.name not in WANDERING]
+    least = min(t.log_p for t in trials)
+    if lasting and min(t.log_p for t in lasting) <= least + WANDER_NATS:
+        trials, least = lasting, min(t.log_p for t in lasting)
+    close = [t for t in trials if t.log_p <= least + AS_GOOD_NATS]
+    return min(close, key=lambda t: (commonness(t.candidate.label), t.log_p, t.candidate.label))
+
+
+def start_search(
+    data: Data, settings: DiagnosisSettings, progress: Callable[[float], None]
+) -> Search:
+    """Candidates and signatures of a log."""
+    found = candidates(data.view, settings.exclude_effects)
+    rng = np.random.Generator(np.random.Philox(settings.seed))
+    shown = signatures(data.view, found)
+    return Search(data, settings, rng, found, shown, progress)

@@ -1,0 +1,106 @@
+"""Settle the final model: the best of every class is named, and what is needless goes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+from syncline_design.diagnosis.candidates import Signature
+from syncline_design.diagnosis.fitting import Data, Model, fit
+from syncline_design.diagnosis.identify import Comparison, Label, competed, effect_of, without
+from syncline_design.diagnosis.tails import tails_in
+from syncline_design.diagnosis.trials import freedom_of, log_chance
+
+ROUNDS = 3  # in which exchanging one effect may make another one of its class the better one
+
+
+@dataclass(frozen=True, slots=True)
+class Evidence:
+    """What leaving an effect out of the final model costs [nat], the others and the noise refitted.
+
+    log_p: log of the chance that noise alone gains as much from this one effect.
+    """
+
+    gain: float
+    log_p: float
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """The final model on its data, with the evidence of each effect and the rest of its class.
+
+    stairs: the model with the strongest effect alone, the strongest two, ... , all of them.
+    """
+
+    data: Data
+    model: Model
+    evidence: Mapping[Label, Evidence]
+    classes: Mapping[Label, Comparison]
+    stairs: tuple[tuple[Label, Model], ...]
+
+
+def settle(
+    data: Data, model: Model, others: Sequence[Signature], threshold: Callable[[Model], float]
+) -> Settled:
+    """Let every class compete, then drop the weakest effect while chance does as well.
+
+    threshold: log p that the best candidate of a clean log falls below at the stated rate, given
+    the model without the effect.
+    """
+    while True:
+        model, classes = _decided(data, model, others)
+        less = {label: refitted_without(data, model, label) for label in model.labels}
+        evidence = {label: _evidence(data, model, label, one) for label, one in less.items()}
+        weakest = max(evidence, key=lambda label: (evidence[label].log_p, label), default=None)
+        if weakest is None or len(model.labels) < 2:
+            break
+        if evidence[weakest].log_p <= threshold(less[weakest]):
+            break
+        model = less[weakest]
+    return Settled(data, model, evidence, classes, _stairs(data, model, evidence))
+
+
+def _decided(
+    data: Data, model: Model, others: Sequence[Signature]
+) -> tuple[Model, dict[Label, Comparison]]:
+    """The model with the best of every class, and what each is compared with."""
+    classes: dict[Label, Comparison] = {}
+    for _ in range(ROUNDS):
+        before, classes = set(model.labels), {}
+        for label in [a.label for a in model.acting]:
+            known = set(model.labels)
+            model, compared = competed(data, model, label, others)
+            own = (set(model.labels) - known) or {label}
+            classes[own.pop()] = compared
+        if set(model.labels) == before:
+            break
+    return model, classes
+
+
+def refitted_without(data: Data, model: Model, label: Label) -> Model:
+    """The model less one effect, the others and the noise fitted again."""
+    less = without(model, label)
+    return fit(data, less.acting, less.opened, start=model.level)
+
+
+def _evidence(data: Data, model: Model, label: Label, less: Model) -> Evidence:
+    effect = effect_of(model, label)
+    gain = max(less.nll - model.nll, 0.0)
+    if any(o.candidate.label == label and o.what == "tails" for o in model.opened):
+        gain += max(tails_in(data, model).gain, 0.0)  # not in the normal likelihood
+    return Evidence(gain, log_chance(effect, gain, freedom_of(effect)))
+
+
+def _stairs(
+    data: Data, model: Model, evidence: Mapping[Label, Evidence]
+) -> tuple[tuple[Label, Model], ...]:
+    """Models of the final effects, added one by one, strongest first."""
+    ranked = sorted(evidence, key=lambda label: (-evidence[label].gain, label))
+    stairs = []
+    for count in range(1, len(ranked)):
+        part = model
+        for label in ranked[count:]:
+            part = without(part, label)
+        fitted = fit(data, part.acting, part.opened, start=model.level)
+        stairs.append((ranked[count - 1], fitted))
+    return (*stairs, (ranked[-1], model)) if ranked else ()

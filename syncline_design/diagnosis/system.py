@@ -1,0 +1,127 @@
+"""The spec beside the log: which system made it, and whether the two fit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from syncline_design.choice.problem import build_problem, sole_design, system_of
+from syncline_design.diagnosis.gross import Reread, mended
+from syncline_design.diagnosis.scene import Acting
+from syncline_design.effects import registry
+from syncline_design.logs.log import Log
+from syncline_design.logs.reading import read_log
+from syncline_design.model.system import System
+from syncline_design.spec.known_effects import effect_entries
+from syncline_design.spec.load import BadInput, LoadedSpec
+from syncline_design.spec.yaml_text import KeyPath, Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Measured:
+    """A system with the log it made, and the effects that its spec already knows."""
+
+    system: System
+    log: Log
+    known: tuple[Acting, ...]
+    files: tuple[str, ...] = ()
+    reread: Reread | None = None
+
+
+def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
+    """Resolve the spec, read the log, and refuse what does not fit."""
+    system = pinned_system(loaded)
+    names = [stage.name for stage in system.stages]
+    mapping = loaded.spec.log.columns if loaded.spec.log else {}
+    origin = loaded.spec.log.origin if loaded.spec.log else None
+    ranges = system.stages[-1].ranging is not None
+    files = list(paths) or own_files(loaded)
+
+    def read(slip_s: float) -> Log:
+        return read_log(files, names, mapping, ranges, slip_s, origin)
+
+    log = read(0.0)
+    reread = read if len(files) > 1 else None
+    system = replace(system, stages=system.stages[: len(log.stages)])
+    _demand_fit(loaded, system, log)
+    known = known_effects(system)
+    for one in known:
+        if one.effect.kind == "discrete":
+            log = mended(log, one, reread)
+    kept = tuple(one for one in known if one.effect.kind != "discrete")
+    return Measured(system, log, kept, tuple(path.name for path in files), reread)
+
+
+def own_files(loaded: LoadedSpec) -> list[Path]:
+    """The files that the spec's `log:` names, beside the spec."""
+    files = loaded.spec.log.files if loaded.spec.log else ()
+    if not files:
+        raise _refuse(loaded, (), "no log given", "a LOG argument, or log: {files: [...]}")
+    folder = loaded.path.parent.resolve()
+    paths = []
+    for index, name in enumerate(files):
+        path = (folder / name).resolve()
+        if not path.is_relative_to(folder):
+            raise _refuse(loaded, ("log", "files", index), "outside the spec's folder", name)
+        paths.append(path)
+    return paths
+
+
+def pinned_system(loaded: LoadedSpec) -> System:
+    """The system of a spec that leaves nothing open; its effects come along."""
+    found = sole_design(build_problem(loaded))
+    if found is None:
+        raise _refuse(
+            loaded,
+            ("stages",),
+            "the spec leaves choices open, and a log comes from one system",
+            "every role pinned by `sensor:` and `timestamping:`",
+            "optimize SPEC --write-design writes a pinned spec",
+        )
+    problem, design = found
+    return system_of(loaded, problem, design, effect_entries(loaded))
+
+
+def known_effects(system: System) -> tuple[Acting, ...]:
+    """The spec's own effects as they act on its stages."""
+    places = {stage.name: k for k, stage in enumerate(system.stages)}
+    return tuple(
+        Acting(
+            registry()[entry.effect],
+            entry.sensor,  # type: ignore[arg-type]  # checked when the spec was read
+            places[entry.stage],
+            dict(entry.parameters),  # type: ignore[arg-type]  # a convention's value is its name
+        )
+        for entry in system.effects
+        if entry.stage in places
+    )
+
+
+def _demand_fit(loaded: LoadedSpec, system: System, log: Log) -> None:
+    if system.stages[0].position is None:
+        raise _refuse(loaded, ("stages", 0), "the first stage has no position sensor")
+    if log.kind == "position":
+        return
+    for k, stage in enumerate(system.stages):
+        for role in ("attitude", "ranging"):
+            if getattr(stage, role) is None:
+                raise _refuse(
+                    loaded,
+                    ("stages", k),
+                    f"the log holds ranges to targets, but stage {stage.name!r} has no {role} "
+                    "sensor",
+                    f"a {role} sensor, or a log with reference_north_m, ... instead of targets",
+                )
+
+
+def _refuse(
+    loaded: LoadedSpec, path: KeyPath, message: str, expected: str = "", hint: str = ""
+) -> BadInput:
+    at = path
+    while at and at not in loaded.positions:
+        at = at[:-1]
+    line, column = loaded.positions.get(at, (1, 1))
+    shown = ".".join(map(str, path))
+    problem = Problem(str(loaded.path), line, column, shown, message, expected, hint=hint)
+    return BadInput((problem,))

@@ -1,0 +1,135 @@
+"""The vehicle's motion around every stamp, from the logged velocity and rates.
+
+Displacements integrate a spline of the velocity and turns integrate a spline of the rates.  Poses
+themselves are never interpolated: averaging two noisy neighbours would make noise depend on the
+time shift, and a fit would prefer shifts half way between rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from syncline_design.effects.record import Array
+from syncline_design.logs.log import GAP_FACTOR
+from syncline_design.logs.stamps import per_stamp
+from syncline_design.simulation.chain import rotation_exp
+
+FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
+
+
+@dataclass(frozen=True, slots=True)
+class SplinePieces:
+    """Cubic splines of a series (n, k), one per stretch without a gap.
+
+    Beyond a stretch's ends the values there are held.
+    """
+
+    starts: Array  # first stamp of each stretch
+    ends: Array
+    splines: tuple[Any, ...]
+    integrals: tuple[Any, ...]
+
+    def value(self, at_s: Array, home_s: Array) -> Array:
+        """Series at times at_s (n,), each in the stretch of its home stamp."""
+        return self._piecewise(at_s, home_s, self._held)
+
+    def integral(self, from_s: Array, to_s: Array, home_s: Array) -> Array:
+        """Integral of the series from from_s to to_s, in the stretch of the home stamp."""
+        upper = self._piecewise(to_s, home_s, self._summed)
+        return upper - self._piecewise(from_s, home_s, self._summed)
+
+    def slope(self, at_s: Array, home_s: Array) -> Array:
+        """First derivative of the series."""
+        return self._piecewise(at_s, home_s, lambda k, at: self.splines[k](at, 1))
+
+    def _held(self, piece: int, at_s: Array) -> Array:
+        held: Array = self.splines[piece](np.clip(at_s, self.starts[piece], self.ends[piece]))
+        return held
+
+    def _summed(self, piece: int, at_s: Array) -> Array:
+        inside = np.clip(at_s, self.starts[piece], self.ends[piece])
+        beyond = (at_s - inside)[:, None] * self.splines[piece](inside)
+        total: Array = self.integrals[piece](inside) + beyond
+        return total
+
+    def _piecewise(self, at_s: Array, home_s: Array, rule: Any) -> Array:
+        if len(self.splines) == 1:
+            return np.asarray(rule(0, at_s))
+        first = np.searchsorted(home_s, self.starts[1:])  # homes rise: every stretch is a slice
+        bounds = [0, *first.tolist(), home_s.shape[0]]
+        parts = [rule(k, at_s[a:b]) for k, (a, b) in enumerate(pairwise(bounds)) if b > a]
+        return np.concatenate(parts)
+
+
+def pieces(time_s: Array, series: Array) -> SplinePieces:
+    """Splines of a series (n, k) over rising stamps, cut at gaps; one value a stamp, the mean."""
+    from scipy.interpolate import CubicSpline
+
+    time_s, series = per_stamp(time_s, series)
+    step = np.diff(time_s)
+    cuts = np.flatnonzero(step > GAP_FACTOR * np.median(step)) + 1
+    bounds = [0, *cuts.tolist(), time_s.shape[0]]
+    splines, starts, ends = [], [], []
+    for a, b in pairwise(bounds):
+        times, values = time_s[a:b], series[a:b]
+        if b - a == 1:  # a lone row: constant
+            times = np.array([times[0], times[0] + 1.0])
+            values = np.repeat(values, 2, axis=0)
+        splines.append(CubicSpline(times, values, bc_type="not-a-knot" if b - a > 3 else "natural"))
+        starts.append(time_s[a])
+        ends.append(time_s[b - 1])
+    integrals = tuple(s.antiderivative() for s in splines)
+    return SplinePieces(np.array(starts), np.array(ends), tuple(splines), integrals)
+
+
+@dataclass(frozen=True, slots=True)
+class LoggedMotion:
+    """Motion of one stage: velocity [m/s] in NED and rate [rad/s] in the body, as functions.
+
+    stamps_s, attitude (m,), (m, 3, 3): the logged poses, for shifts of many rows.
+    follows_position: the velocity was derived from the antenna's own positions, so it is late by
+    what the positions are late by.
+    """
+
+    time_s: Array
+    velocity: SplinePieces
+    rate: SplinePieces
+    stamps_s: Array
+    attitude: Array
+    follows_position: bool = False
+
+    def displacement(self, from_s: Array, to_s: Array, position_shift_s: Array) -> Array:
+        """p(to) - p(from) [m], NED, (n, 3)."""
+        own = position_shift_s if self.follows_position else np.zeros(1)
+        return self.velocity.integral(from_s - own, to_s - own, self.time_s)
+
+    def turn(self, from_s: Array, to_s: Array) -> Array:
+        """Rotation vector theta [rad], R(to) = R(from) exp(S(theta)), (n, 3).
+
+        Magnus series to second order: the integral of w plus h^2/12 w(from) x w(to).
+        Source: Iserles et al., Lie-group methods, Acta Numerica 9 (2000), sec. 4.
+        """
+        first = self.rate.integral(from_s, to_s, self.time_s)
+        start, stop = (self.rate.value(at, self.time_s) for at in (from_s, to_s))
+        second: Array = ((to_s - from_s) ** 2 / 12.0)[:, None] * np.cross(start, stop)
+        return first + second
+
+    def turned(self, rotation: Array, from_s: Array, to_s: Array) -> Array:
+        """R(to) from R(from) (n, 3, 3)."""
+        if np.array_equal(from_s, to_s):
+            return rotation
+        if float(np.max(np.abs(to_s - from_s))) > FAR_S:
+            return self._far(to_s)
+        carried: Array = rotation @ rotation_exp(self.turn(from_s, to_s))
+        return carried
+
+    def _far(self, to_s: Array) -> Array:
+        """R(to) from the logged pose next to it; over many seconds the series does not hold."""
+        middle = 0.5 * (self.stamps_s[1:] + self.stamps_s[:-1])
+        near = np.searchsorted(middle, to_s)
+        carried: Array = self.attitude[near] @ rotation_exp(self.turn(self.stamps_s[near], to_s))
+        return carried

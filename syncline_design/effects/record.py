@@ -1,0 +1,255 @@
+"""What an effect is: one record that simulator, budget, diagnosis and report all read.
+
+An effect looks at the rows of one stage (`StageRows`, the true state at every stamp) and says how
+the world departs from the spec (`Departures`).  The chain (`simulation.chain`) turns departures
+into errors; the linear sensitivity beside it is what the diagnosis screens with.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
+from syncline_design.model.system import RoleName, Stage
+
+Array = NDArray[np.float64]
+Target = RoleName | Literal["target"]
+Values = Mapping[str, float]
+Rng = np.random.Generator | None
+
+
+@dataclass(frozen=True, slots=True)
+class StageRows:
+    """True state of one stage at n stamps of its ranging sensor.
+
+    time_s (n,); position_m (n, 3) reference point in NED; rotation (n, 3, 3) R_nb;
+    euler_rad (n, 3) roll, pitch, yaw; velocity_mps and acceleration_mps2 (n, 3) of the reference
+    point, body axes; rate_radps (n, 3) body; range_m, azimuth_rad, elevation_rad (n,) true
+    bearing in the ranging sensor's believed axes; target_m (n, 3) true object in NED.
+    antenna_m, ranging_m: lever arms l_G, l_L the spec believes [m], body, (3,) or (n, 3).
+    start_s: when the mission began, on the clock of time_s; None: at the first row, as in a log.
+    independent: each row is a sample of a mission of its own, so what is correlated in time is
+    drawn anew in each; False: the rows follow each other in time.
+    """
+
+    time_s: Array
+    position_m: Array
+    rotation: Array
+    euler_rad: Array
+    velocity_mps: Array
+    acceleration_mps2: Array
+    rate_radps: Array
+    range_m: Array
+    azimuth_rad: Array
+    elevation_rad: Array
+    antenna_m: Array
+    ranging_m: Array
+    target_m: Array
+    start_s: float | None = None
+    independent: bool = False
+
+    def __len__(self) -> int:
+        return int(self.time_s.shape[0])
+
+
+_ZERO = np.zeros(1)
+_ZERO3 = np.zeros((1, 3))
+
+
+@dataclass(frozen=True, slots=True)
+class Departures:
+    """How the world departs from the spec, row by row; every field adds, zero means as specified.
+
+    position_shift_s, attitude_shift_s, ranging_shift_s (n,): extra mu of that sensor.
+    antenna_m, ranging_m (n, 3): true lever arm minus the spec's, body.
+    attitude_rotation_rad (n, 3): alpha, measured R = R exp(S(alpha)).
+    attitude_euler_rad (n, 3): added to measured roll, pitch, yaw.
+    bearing_rotation_rad (n, 3): beta, true mounting of the ranging sensor exp(S(beta)).
+    position_m (n, 3): added to the antenna reading, NED.
+    range_m (n,), range_scale (n,): measured r = r (1 + range_scale) + range_m.
+    azimuth_rad, elevation_rad (n,): added to the measured bearing.
+    target_m (n, 3): surveyed object minus true object, NED.
+    position_noise, attitude_noise, ranging_noise (n,): the noise draw of that sensor is taken
+    times (1 + this).
+    """
+
+    position_shift_s: Array = field(default_factory=lambda: _ZERO)
+    attitude_shift_s: Array = field(default_factory=lambda: _ZERO)
+    ranging_shift_s: Array = field(default_factory=lambda: _ZERO)
+    antenna_m: Array = field(default_factory=lambda: _ZERO3)
+    ranging_m: Array = field(default_factory=lambda: _ZERO3)
+    attitude_rotation_rad: Array = field(default_factory=lambda: _ZERO3)
+    attitude_euler_rad: Array = field(default_factory=lambda: _ZERO3)
+    bearing_rotation_rad: Array = field(default_factory=lambda: _ZERO3)
+    position_m: Array = field(default_factory=lambda: _ZERO3)
+    range_m: Array = field(default_factory=lambda: _ZERO)
+    range_scale: Array = field(default_factory=lambda: _ZERO)
+    azimuth_rad: Array = field(default_factory=lambda: _ZERO)
+    elevation_rad: Array = field(default_factory=lambda: _ZERO)
+    target_m: Array = field(default_factory=lambda: _ZERO3)
+    position_noise: Array = field(default_factory=lambda: _ZERO)
+    attitude_noise: Array = field(default_factory=lambda: _ZERO)
+    ranging_noise: Array = field(default_factory=lambda: _ZERO)
+
+    def __add__(self, other: Departures) -> Departures:
+        """Both departures at once; rotation vectors add, which is exact to second order."""
+        return Departures(
+            **{f.name: getattr(self, f.name) + getattr(other, f.name) for f in fields(self)}
+        )
+
+
+NOTHING = Departures()
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter: its name carries the unit; [low, high] is its plausible magnitude.
+
+    choices: what a discrete parameter may be; its value is then a text.
+    located: the error depends on it only through where along the log something happens.
+    above, most: the values between which the effect exists at all, `above` left out (a factor of
+    noise is more than 0, a share at most 1); one that is not signed is at least 0.
+    whole: a whole number.
+    """
+
+    name: str
+    low: float
+    high: float
+    unit: str = ""
+    signed: bool = True
+    choices: tuple[str, ...] = ()
+    located: bool = False
+    above: float = -math.inf
+    most: float = math.inf
+    whole: bool = False
+
+    def holds(self, value: float) -> bool:
+        """Whether the effect exists with this value."""
+        small = value <= self.above or (not self.signed and value < 0.0)
+        return not (small or value > self.most or (self.whole and not value.is_integer()))
+
+    @property
+    def domain(self) -> str:
+        """The values that `holds` takes, in words."""
+        kind = "a whole number" if self.whole else "a number"
+        least = (
+            "at least 0" if not self.signed and self.above < 0.0 else f"more than {self.above:g}"
+        )
+        bounds = [least] if not self.signed or self.above > -math.inf else []
+        bounds += [f"at most {self.most:g}"] if self.most < math.inf else []
+        return " ".join([kind, " and ".join(bounds)]).strip()
+
+
+@dataclass(frozen=True, slots=True)
+class Basis:
+    """What the charge of an effect depends on besides its stage and its parameters.
+
+    horizon: over which drifts, grids and tilts are charged; coverage_factor: k of a normal timing
+    error's bound; distance_m: range d, 0 for a stage without a ranging sensor; arm_m: largest
+    |l_L - l_G| [m], which attitude errors turn as they turn the line of sight.
+    """
+
+    horizon: Horizon = DEFAULT_HORIZON
+    coverage_factor: float = 3.0
+    distance_m: float = 0.0
+    arm_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Contribution:
+    """What a known effect adds to the Syncline.
+
+    tau_s: to the timestamp error's bound of its sensor; systematic_m: displaces the estimate by at
+    most this; turn_rad: turns the measured attitude, and with it the line of sight and the arms;
+    sight_rad: turns the line of sight in the body.
+    """
+
+    tau_s: float = 0.0
+    systematic_m: float = 0.0
+    turn_rad: float = 0.0
+    sight_rad: float = 0.0
+
+    def total_m(self, basis: Basis) -> float:
+        """Systematic term of the budget [m]: systematic + sight d + turn (d + |l_L - l_G|)."""
+        d = basis.distance_m
+        return self.systematic_m + self.sight_rad * d + self.turn_rad * (d + basis.arm_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Wander:
+    """Gauss-Markov noise of the error: e += loading x, x of std_m and time_constant_s.
+
+    loading (3,): NED axis, or (3, 3) with a column per independent process.
+    """
+
+    loading: Array
+    std_m: float
+    time_constant_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Covariance:
+    """What a stochastic effect adds to the covariance of the error.
+
+    directions (n, 3, k): white noise with covariance directions directions' [m2] per row.
+    factors: (sensor, factor): that sensor's standard deviations are times factor.
+    wander: a Gauss-Markov process.
+    """
+
+    directions: Array | None = None
+    factors: tuple[tuple[Target, float], ...] = ()
+    wander: Wander | None = None
+
+
+Depart = Callable[[StageRows, Values, Target, Rng], Departures]
+Sensitivity = Callable[[StageRows, Values, Target], Array]
+Contribute = Callable[[Stage, Values, Target, Basis], Contribution]
+Spread = Callable[[StageRows, Values, Target], Covariance]
+Applies = Callable[[Stage, Target], bool]
+
+
+def everywhere(stage: Stage, sensor: Target) -> bool:
+    """Whether the stage has the sensor at all; the default of `Effect.applies`."""
+    return sensor == "target" or getattr(stage, sensor) is not None
+
+
+@dataclass(frozen=True, slots=True)
+class Effect:
+    """One physical effect.
+
+    kind: deterministic (a departure given the rows), stochastic (a departure drawn anew, seen as
+    covariance) or discrete (a convention; re-simulated, never linearised).
+    depart: exact departures; stochastic effects draw from the generator they are given.
+    sensitivity: (n, 3, p) slope of the (mean) error [m], NED, by each parameter that is neither
+    located nor discrete, at zero of these; None where the mean does not move.
+    spread: covariance of a stochastic effect.
+    contribute: what it adds to the Syncline of a stage.
+    applies: whether a stage can have it.
+    tilted: acts by roll and pitch, which the simulator then draws over the horizon's tilt.
+    sentence: for people, a format string over {sensor} and the parameters.
+    """
+
+    name: str
+    sensors: tuple[Target, ...]
+    kind: Literal["deterministic", "stochastic", "discrete"]
+    parameters: tuple[Parameter, ...]
+    sentence: str
+    confused_with: str
+    separated_by: str
+    source: str
+    depart: Depart
+    sensitivity: Sensitivity | None
+    contribute: Contribute
+    spread: Spread | None = None
+    applies: Applies = everywhere
+    tilted: bool = False
+
+    def slopes(self) -> tuple[Parameter, ...]:
+        """The parameters that `sensitivity` has a column for."""
+        return tuple(p for p in self.parameters if not p.located and not p.choices)

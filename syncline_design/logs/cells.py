@@ -1,0 +1,118 @@
+"""Cells as people write them: decimal commas, ISO 8601 times, names of targets."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.effects.record import Array
+
+if TYPE_CHECKING:
+    import polars as pl
+
+Stamps = NDArray[np.int64]
+
+LONGEST_CELL = 200  # characters; no figure and no name of a target is longer
+NOTHING = ("", "nan", "NaN", "NAN", "NA", "N/A", "null")
+NO_TIME = np.iinfo(np.int64).min
+ISO = (
+    r"^(\d{4})-?(\d\d)-?(\d\d)[T ](\d\d):?(\d\d):?(\d\d)(?:[.,](\d{1,9})\d*)?"
+    r"\s*(Z|z|[+-]\d\d(?::?\d\d)?)?$"
+)
+COMMA, POINT = ",", "."
+ONE_MARK = "one decimal mark, point or comma, in all of a file"
+
+
+class BadCellError(Exception):
+    """A cell that is not what its column holds: its row, and what was expected instead."""
+
+    def __init__(self, row: int, text: str, expected: str, hint: str = "") -> None:
+        super().__init__(f"row {row}: {text!r}")
+        self.row, self.text, self.expected, self.hint = row, text, expected, hint
+
+
+def trimmed(series: pl.Series) -> pl.Series:
+    """Text without blanks at its ends; null where a cell says that there is nothing."""
+    import polars as pl
+
+    lengths = series.str.len_bytes().fill_null(0)
+    if len(lengths) and int(lengths.max() or 0) > LONGEST_CELL:  # type: ignore[arg-type]
+        row = int(lengths.arg_max() or 0)
+        short = str(series.str.slice(0, 40)[row])
+        raise BadCellError(row, short, f"at most {LONGEST_CELL} characters")
+    text = series.str.strip_chars()
+    return text.set(text.is_in(list(NOTHING)).fill_null(True), None).cast(pl.String)
+
+
+def numbers(text: pl.Series, comma: bool) -> tuple[Array, str]:
+    """Figures of trimmed text, NaN where a cell is empty; and which decimal mark was met.
+
+    comma: whether a comma may be one, which it is where it does not separate columns.
+    """
+    import polars as pl
+
+    mark = ""
+    if comma:
+        commas, points = (text.str.contains(m, literal=True) for m in (COMMA, POINT))
+        mark = COMMA if commas.any() else (POINT if points.any() else "")
+        if mark == COMMA and points.any():
+            raise _two_marks(text, commas.fill_null(False), points.fill_null(False))
+        text = text.str.replace(COMMA, POINT, literal=True)
+    found = text.cast(pl.Float64, strict=False)
+    bad = (found.is_null() & text.is_not_null()).arg_true()
+    if len(bad):
+        row = int(bad[0])
+        mark_name = "point or comma" if comma else "point"
+        raise BadCellError(row, str(text[row]), f"a number with a decimal {mark_name}, or nothing")
+    values: Array = found.to_numpy().astype(float)
+    values[~np.isfinite(values)] = np.nan
+    return values, mark
+
+
+def _two_marks(text: pl.Series, commas: pl.Series, points: pl.Series) -> BadCellError:
+    """The cell that holds both marks, else the first with the rarer one."""
+    both = commas & points
+    rarer = commas if int(commas.sum()) <= int(points.sum()) else points
+    row = int((both if both.any() else rarer).arg_true()[0])
+    return BadCellError(row, str(text[row]), ONE_MARK)
+
+
+def looks_like_a_date(text: pl.Series) -> bool:
+    """Whether any cell is an ISO 8601 time."""
+    return bool(text.str.contains(ISO).any())
+
+
+def iso_times(text: pl.Series) -> tuple[Stamps, bool | None]:
+    """Nanoseconds since 1970 UTC, NO_TIME for empty cells; and whether they name their zone."""
+    import polars as pl
+
+    parts = text.str.extract_groups(ISO).struct.unnest()
+    fields = [parts.to_series(k) for k in range(8)]
+    year, month, day, hour, minute, second, fraction, zone = fields
+    plain = year + "-" + month + "-" + day + "T" + hour + ":" + minute + ":" + second
+    at = plain.str.strptime(pl.Datetime("us"), "%Y-%m-%dT%H:%M:%S", strict=False)
+    zoned = zone.is_not_null()
+    bad = text.is_not_null() & at.is_null()
+    mixed = at.is_not_null() & (zoned != bool(zoned.any()))
+    wanted = "an ISO 8601 time such as 2026-03-01T12:00:00.125Z"
+    for wrong, expected in ((bad, wanted), (mixed, "a zone (Z or +01:00) in every row or in none")):
+        rows = wrong.fill_null(True).arg_true()
+        if len(rows):
+            raise BadCellError(int(rows[0]), str(text[int(rows[0])]), expected)
+    seconds = at.dt.epoch("s") - _offset_s(zone)
+    nanoseconds = fraction.fill_null("0").str.pad_end(9, "0").cast(pl.Int64)
+    stamps = (seconds * 1_000_000_000 + nanoseconds).fill_null(NO_TIME)
+    return stamps.to_numpy().astype(np.int64), bool(zoned.any()) if at.count() else None
+
+
+def _offset_s(zone: pl.Series) -> pl.Series:
+    """Seconds by which a zone is ahead of UTC."""
+    import polars as pl
+
+    digits = zone.str.replace_all("[^0-9]", "").str.pad_end(4, "0")
+    hours = digits.str.slice(0, 2).cast(pl.Int64, strict=False).fill_null(0)
+    minutes = digits.str.slice(2, 2).cast(pl.Int64, strict=False).fill_null(0)
+    behind = zone.str.starts_with("-").fill_null(False).cast(pl.Int64)
+    return (3600 * hours + 60 * minutes) * (1 - 2 * behind)

@@ -1,0 +1,81 @@
+"""Column names to SI: `roll_deg` and `range_mm` are what `roll_rad` and `range_m` stand for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+
+from syncline_design.model.quantity import UNITS, si_name, suffix_unit
+from syncline_design.spec.spec import split_column
+
+NED = ("north", "east", "down")
+TIME = "time_s"
+ATTITUDE = ("roll_rad", "pitch_rad", "yaw_rad")
+RANGING = ("range_m", "azimuth_rad", "elevation_rad")
+POSITION = tuple(f"position_{axis}_m" for axis in NED)
+VELOCITY = tuple(f"velocity_{axis}_mps" for axis in NED)
+RATE = tuple(f"rate_{axis}_radps" for axis in "xyz")
+TARGET = tuple(f"target_{axis}_m" for axis in NED)
+REFERENCE = tuple(f"reference_{axis}_m" for axis in NED)
+GEODETIC = ("latitude_rad", "longitude_rad", "height_m")
+PER_STAGE = (*POSITION, *ATTITUDE, *VELOCITY, *RATE, *RANGING, *GEODETIC)
+COMMON = (
+    TIME,
+    *TARGET,
+    *REFERENCE,
+    *(f"{p}_{g}" for p in ("target", "reference") for g in GEODETIC),
+)
+TARGET_ID = "target_id"
+ISO_TIMES = ("time", "time_utc", "time_iso")  # columns of ISO 8601 times; no unit in the name
+HEADING, YAW = "heading_rad", "yaw_rad"
+
+
+def known_names(stages: Iterable[str]) -> frozenset[str]:
+    """Every SI column name that a log of these stages may hold."""
+    names = [*COMMON, TARGET_ID, *PER_STAGE, HEADING]
+    names += [f"{stage}_{name}" for stage in stages for name in (*PER_STAGE, HEADING)]
+    return frozenset(names)
+
+
+def si_columns(
+    present: Iterable[str], mapping: Mapping[str, str], wanted: frozenset[str]
+) -> dict[str, tuple[str, float]]:
+    """SI name -> (column of the file, factor to SI) for everything the diagnosis can use.
+
+    A name of the mapping wins over the column's own; `their.name [unit]` brings its own unit,
+    without brackets the canonical name's suffix is the unit.  The factor is NaN for a time column
+    whose name has no unit.  A heading is a yaw.
+    """
+    names = dict.fromkeys(present)
+    found: dict[str, tuple[str, float]] = {}
+    for name in names:
+        si = TARGET_ID if name == TARGET_ID else si_name(name)
+        if si in wanted and si not in found:
+            found[si] = (name, 1.0 if name == TARGET_ID else suffix_unit(name)[0])
+    for canonical, theirs in mapping.items():
+        column, unit = split_column(theirs)
+        if column in names:
+            factor = float(UNITS[unit][1]) if unit else suffix_unit(canonical)[0]
+            found[si_name(canonical)] = (column, factor)
+    for name in ISO_TIMES:
+        own = found.pop(name, (name, math.nan) if name in names else None)
+        if own is not None and TIME not in found:
+            found[TIME] = (own[0], math.nan)
+    for si in [s for s in found if s.endswith(HEADING)]:
+        heading = found.pop(si)
+        found.setdefault(si.removesuffix(HEADING) + YAW, heading)
+    return found
+
+
+def headings(found: Mapping[str, tuple[str, float]]) -> tuple[str, ...]:
+    """What to say of headings that stand in for yaw."""
+    return tuple(
+        f"{name} was read as yaw"
+        for si, (name, _) in sorted(found.items())
+        if si.endswith(YAW) and si_name(name).endswith(HEADING)
+    )
+
+
+def shown(si: str) -> str:
+    """How people write an SI name in a log: `roll_rad` as `roll_deg`."""
+    return si.replace("_radps", "_degps").replace("_rad", "_deg")

@@ -1,0 +1,194 @@
+"""Several files, each with its own rate, to rows at the stamps of the reference sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.effects.record import Array
+from syncline_design.logs.columns import (
+    ATTITUDE,
+    GEODETIC,
+    NED,
+    POSITION,
+    RANGING,
+    RATE,
+    REFERENCE,
+    TIME,
+    VELOCITY,
+)
+from syncline_design.logs.derivatives import derived_velocity
+from syncline_design.logs.log import Track
+from syncline_design.logs.refusals import refuse
+from syncline_design.logs.tables import Table
+from syncline_design.logs.twins import one_a_stamp, without_twins
+from syncline_design.simulation.chain import euler_to_rotation, rotation_to_euler
+
+Index = NDArray[np.intp]
+TURNING = ("yaw_rad", "azimuth_rad", "longitude_rad")  # where 180 deg and -180 deg are neighbours
+REACH = 2.5  # intervals of the other file across which its values are still interpolated
+
+
+@dataclass(frozen=True, slots=True)
+class Merged:
+    """Columns at common stamps, and the motion at the rate it was logged at."""
+
+    table: Table  # the file that sets the rows, with the columns of all
+    tracks: Mapping[str, Track]  # "PREFIXvelocity" or "PREFIXrate"
+    follows_position: bool = False
+
+
+def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
+    """Interpolate every other file to the stamps of the file that sets the rows."""
+    at = _base(tables, prefixes)
+    tables = [without_twins(t) if k == at else one_a_stamp(t) for k, t in enumerate(tables)]
+    follows = _needs_velocity(tables, prefixes[0])
+    if follows is not None:
+        tables = [_with_velocity(t, prefixes[0]) if t is follows else t for t in tables]
+    base = tables[at]
+    columns: dict[str, Array] = dict(base.columns)
+    tracks: dict[str, Track] = {}
+    notes = [note for t in tables for note in t.notes]
+    notes += [note for t in tables if t is not base for note in _left_out(t)]
+    stamps = base.columns[TIME]
+    for table in tables:
+        if table is base:
+            continue
+        taken = {k: v for k, v in table.columns.items() if k not in columns and k != TIME}
+        found, covered = interpolated(table, taken, stamps, prefixes)
+        columns |= found
+        tracks |= _tracks(table, taken, prefixes)
+        share = float(np.mean(covered))
+        notes.append(f"{table.path.name}: {share:.1%} of the rows matched")
+        if not np.any(covered):
+            raise refuse(
+                table.path,
+                "no row of the log is matched",
+                field=TIME,
+                expected=f"stamps between {stamps[0]:.3f} and {stamps[-1]:.3f} s",
+                found=f"{table.columns[TIME][0]:.3f} to {table.columns[TIME][-1]:.3f} s",
+                hint="are both files on the same time scale?",
+            )
+    table = replace(base, columns=columns, notes=tuple(notes))
+    return Merged(table, tracks, follows is not None)
+
+
+def _needs_velocity(tables: Sequence[Table], prefix: str) -> Table | None:
+    """The file of antenna positions, if nothing else can tell the velocity at a high rate."""
+    if any(prefix + VELOCITY[0] in t.columns for t in tables):
+        return None
+    holds = [t for t in tables if all(prefix + n in t.columns for n in POSITION)]
+    reference = [t for t in tables if all(n in t.columns for n in REFERENCE)]
+    if not holds or (reference and len(reference[0]) >= len(holds[0])):
+        return None
+    return holds[0]
+
+
+def _with_velocity(table: Table, prefix: str) -> Table:
+    place = np.stack([table.columns[prefix + n] for n in POSITION], axis=1)
+    kept = np.all(np.isfinite(place), axis=1)
+    columns = {name: values[kept] for name, values in table.columns.items()}
+    slope = derived_velocity(columns[TIME], place[kept])
+    columns |= {prefix + n: slope[:, k] for k, n in enumerate(VELOCITY)}
+    note = f"velocity was derived from the positions of {table.path.name}, smoothed over 1 s"
+    return replace(table, columns=columns, notes=(*table.notes, note))
+
+
+def _left_out(table: Table) -> list[str]:
+    """What a file that does not set the rows lost."""
+    return [f"{table.path.name}: {n} rows left out ({why})" for why, n in table.rejected.items()]
+
+
+def _base(tables: Sequence[Table], prefixes: Sequence[str]) -> int:
+    """The last stage's ranging sensor; in a position log the sparser of antenna and reference."""
+    for k, table in enumerate(tables):
+        if f"{prefixes[-1]}{RANGING[0]}" in table.columns:
+            return k
+    names = (POSITION[0], REFERENCE[0], GEODETIC[0], f"reference_{GEODETIC[0]}")
+    fixes = [k for k, t in enumerate(tables) if any(n in t.columns for n in names)]
+    return min(fixes or range(len(tables)), key=lambda k: len(tables[k]))
+
+
+def interpolated(
+    table: Table, taken: Mapping[str, Array], stamps: Array, prefixes: Sequence[str]
+) -> tuple[dict[str, Array], Array]:
+    """Columns of a file at other stamps; NaN where the file has a gap.  Also which are covered."""
+    own = table.columns[TIME]
+    if own.shape[0] < 2:
+        raise refuse(table.path, "too few rows to interpolate", found=str(own.shape[0]))
+    right = np.clip(np.searchsorted(own, stamps), 1, own.shape[0] - 1)
+    step = own[right] - own[right - 1]
+    inside = (stamps >= own[0]) & (stamps <= own[-1])
+    covered = inside & (step <= REACH * np.median(np.diff(own)))
+    result: dict[str, Array] = {}
+    for prefix in dict.fromkeys(("", *prefixes)):
+        names = tuple(prefix + n for n in ATTITUDE)
+        if all(n in taken for n in names):
+            euler = _slerp(own, np.stack([taken[n] for n in names], axis=1), stamps, right)
+            result |= {n: euler[:, k] for k, n in enumerate(names)}
+    for name, values in taken.items():
+        if name not in result:
+            slope = taken.get(_slope_name(name))
+            whole = _unwound(values) if name.endswith(TURNING) else values
+            result[name] = hermite(own, whole, slope, stamps, right)
+    for values in result.values():
+        values[~covered] = np.nan
+    return result, covered
+
+
+def _unwound(angle: Array) -> Array:
+    """An angle [rad] without the jumps of a whole turn."""
+    known = np.isfinite(angle)
+    result = angle.copy()
+    result[known] = np.unwrap(angle[known])
+    return result
+
+
+def _slope_name(name: str) -> str:
+    """The velocity column that belongs to a position column of the same file."""
+    for kind in ("position", "reference"):
+        for axis in NED:
+            if name.endswith(f"{kind}_{axis}_m"):
+                return name.replace(f"{kind}_{axis}_m", f"velocity_{axis}_mps")
+    return ""
+
+
+def hermite(own: Array, values: Array, slope: Array | None, stamps: Array, right: Index) -> Array:
+    """Cubic Hermite interpolation with known slopes, or with those of a parabola."""
+    slopes = np.gradient(values, own) if slope is None else slope
+    left = right - 1
+    h = own[right] - own[left]
+    u = (stamps - own[left]) / h
+    a, b = values[left], values[right]
+    result: Array = (
+        (1 + 2 * u) * (1 - u) ** 2 * a
+        + u * (1 - u) ** 2 * h * slopes[left]
+        + u * u * (3 - 2 * u) * b
+        + u * u * (u - 1) * h * slopes[right]
+    )
+    return result
+
+
+def _slerp(own: Array, euler: Array, stamps: Array, right: Index) -> Array:
+    """Attitude at the stamps along the shortest turn between the neighbours, as Euler angles."""
+    from scipy.spatial.transform import Rotation
+
+    left = right - 1
+    before, after = (Rotation.from_matrix(euler_to_rotation(euler[k])) for k in (left, right))
+    share = (stamps - own[left]) / (own[right] - own[left])
+    turn = (before.inv() * after).as_rotvec() * share[:, None]
+    return rotation_to_euler((before * Rotation.from_rotvec(turn)).as_matrix())
+
+
+def _tracks(table: Table, taken: Mapping[str, Array], prefixes: Sequence[str]) -> dict[str, Track]:
+    tracks = {}
+    for prefix in dict.fromkeys(("", *prefixes)):
+        for word, names in (("velocity", VELOCITY), ("rate", RATE)):
+            if all(prefix + n in taken for n in names):
+                value = np.stack([taken[prefix + n] for n in names], axis=1)
+                kept = np.all(np.isfinite(value), axis=1)
+                tracks[prefix + word] = Track(table.columns[TIME][kept], value[kept])
+    return tracks

@@ -1,0 +1,376 @@
+"""Files to columns, read in pieces: delimited text and Parquet, each by its literal path."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.effects.record import Array
+from syncline_design.logs import delimited
+from syncline_design.logs.cells import (
+    NO_TIME,
+    NOTHING,
+    ONE_MARK,
+    BadCellError,
+    Stamps,
+    iso_times,
+    looks_like_a_date,
+    numbers,
+    trimmed,
+)
+from syncline_design.logs.refusals import refuse
+from syncline_design.spec.load import BadInput
+
+if TYPE_CHECKING:
+    import polars as pl
+
+MOST_BYTES = 4 * 1024**3
+MOST_ROWS = 20_000_000
+NANOSECONDS = 1_000_000_000
+PACKED = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd", b"PK\x03\x04": "zip", b"BZh": "bzip2"}
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """A column of times: seconds as written, or nanoseconds since 1970 where it is a calendar's.
+
+    zoned: whether calendar times name their zone; None for numbers.
+    """
+
+    seconds: Array | None
+    nanoseconds: Stamps | None
+    zoned: bool | None = None
+
+
+class Source(Protocol):
+    """A file whose columns can be read one pass at a time.
+
+    cut: the line in which the file is cut off, 0 if it is whole.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    cut: int
+
+    def clock(self, name: str) -> Clock:
+        """The time column of every row."""
+        ...
+
+    def numbers(self, names: Sequence[str], keep: Mask) -> dict[str, Array]:
+        """Columns of figures in the kept rows, in the order of the file."""
+        ...
+
+    def labels(self, name: str, keep: Mask) -> Array:
+        """A column of names, as numbers that differ where the names do."""
+        ...
+
+
+def opened(path: Path) -> Source:
+    """The file as a source; refuses what is no log."""
+    demand_plain_file(path)
+    if path.suffix.lower() in (".parquet", ".pq"):
+        return ParquetSource(path)
+    return TextSource(path)
+
+
+def demand_plain_file(path: Path) -> None:
+    try:
+        if not path.is_file():
+            what = "a folder" if path.is_dir() else "no regular file"
+            raise refuse(path, "cannot read the log", expected="a CSV or Parquet file", found=what)
+        size = path.stat().st_size
+        with path.open("rb") as file:
+            head = file.read(4)
+    except OSError as error:
+        raise refuse(path, f"cannot read the log: {error.strerror}") from None
+    for magic, name in PACKED.items():
+        if head.startswith(magic):
+            raise refuse(path, "the log is compressed", found=name, hint="unpack it first")
+    if size > MOST_BYTES:
+        raise refuse(path, "the log is too large", expected="at most 4 GiB", found=f"{size} bytes")
+    if size == 0:
+        raise refuse(path, "the log is empty", line=1, column=1, expected="a header and rows")
+
+
+class TextSource:
+    """Delimited text, block by block."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.how = delimited.dialect(path)
+        self.header = self.how.names
+        self.end, self.cut = path.stat().st_size, 0
+        self._mark = ""
+        self._find_cut()
+
+    def _find_cut(self) -> None:
+        """Where the file was cut off in its last row: that row is left out."""
+        found = delimited.last_line(self.path, self.how.body)
+        if found is None:
+            return
+        at, text = found
+        if not text.strip() or text.lstrip().startswith("#"):
+            return
+        cells = delimited.split_line(text, self.how.separator)
+        if len(cells) < len(self.header) or cells[-1].strip() in NOTHING or _torn(cells[-1]):
+            self.end, self.cut = at, -1
+
+    def clock(self, name: str) -> Clock:
+        place = [self.header.index(name)]
+        seconds: list[Array] = []
+        dates: list[Stamps] = []
+        zoned: bool | None = None
+        rows = 0
+        last = self.how.body_line - 1
+        for block in delimited.blocks(self.path, self.how, self.end):
+            rows += block.lines.shape[0]
+            last = int(block.lines[-1])
+            if rows > MOST_ROWS:
+                raise refuse(self.path, "too many rows", expected=f"at most {MOST_ROWS}")
+            if not dates:
+                fast = self._fast(block, place)
+                if fast is not None:
+                    seconds.append(fast[0])
+                    continue
+            text = self._text(block, place[0])
+            if dates or (not seconds and looks_like_a_date(text)):
+                stamps, zone = self._dates(block, place[0], text, zoned)
+                zoned = zone if zoned is None else zoned
+                dates.append(stamps)
+            else:
+                seconds.append(self._figures(block, place[0], text))
+        if self.cut:
+            self.cut = last + 1
+        if dates:
+            return Clock(None, np.concatenate(dates), bool(zoned))
+        return Clock(np.concatenate(seconds) if seconds else np.zeros(0), None)
+
+    def numbers(self, names: Sequence[str], keep: Mask) -> dict[str, Array]:
+        places = [self.header.index(name) for name in names]
+        found: list[list[Array]] = [[] for _ in names]
+        at = 0
+        for block in delimited.blocks(self.path, self.how, self.end):
+            kept = keep[at : at + block.lines.shape[0]]
+            at += block.lines.shape[0]
+            if not np.any(kept):
+                continue
+            values = self._fast(block, places)
+            if values is None:
+                values = [self._figures(block, k, self._text(block, k)) for k in places]
+            for own, column in zip(found, values, strict=True):
+                own.append(column[kept])
+        return {
+            n: np.concatenate(v) if v else np.zeros(0) for n, v in zip(names, found, strict=True)
+        }
+
+    def labels(self, name: str, keep: Mask) -> Array:
+        import polars as pl
+
+        place, at = self.header.index(name), 0
+        found: list[pl.Series] = []
+        for block in delimited.blocks(self.path, self.how, self.end):
+            kept = keep[at : at + block.lines.shape[0]]
+            at += block.lines.shape[0]
+            if np.any(kept):
+                found.append(self._text(block, place).filter(pl.Series(kept)))
+        return as_labels(pl.concat(found)) if found else np.zeros(0)
+
+    def _fast(self, block: delimited.Block, places: Sequence[int]) -> list[Array] | None:
+        """Columns that are plain figures throughout; None where one is not."""
+        import polars as pl
+
+        try:
+            frame = delimited.parsed(block, self.how, places, as_text=False)
+        except pl.exceptions.PolarsError:
+            return None
+        return [
+            _finite(frame.get_column(f"column_{k + 1}").to_numpy().astype(float)) for k in places
+        ]
+
+    def _text(self, block: delimited.Block, place: int) -> pl.Series:
+        import polars as pl
+
+        try:
+            frame = delimited.parsed(block, self.how, [place], as_text=True)
+            return trimmed(frame.to_series(0))
+        except BadCellError as bad:
+            raise self._bad(block, place, bad) from None
+        except pl.exceptions.PolarsError as error:
+            found = (str(error).splitlines() or [type(error).__name__])[0][:160]
+            raise refuse(self.path, "no readable CSV file", found=found) from None
+
+    def _figures(self, block: delimited.Block, place: int, text: pl.Series) -> Array:
+        try:
+            values, mark = numbers(text, self.how.comma_is_decimal)
+            if mark and self._mark and mark != self._mark:
+                row = int(text.str.contains(mark, literal=True).arg_max() or 0)
+                raise BadCellError(row, str(text[row]), ONE_MARK)
+        except BadCellError as bad:
+            raise self._bad(block, place, bad) from None
+        self._mark = self._mark or mark
+        return values
+
+    def _dates(
+        self, block: delimited.Block, place: int, text: pl.Series, zoned: bool | None
+    ) -> tuple[Stamps, bool | None]:
+        try:
+            stamps, zone = iso_times(text)
+            if zoned is not None and zone is not None and zone != zoned:
+                raise BadCellError(0, str(text[0]), "a zone (Z or +01:00) in every row or in none")
+        except BadCellError as bad:
+            raise self._bad(block, place, bad) from None
+        return stamps, zone
+
+    def _bad(self, block: delimited.Block, place: int, bad: BadCellError) -> BadInput:
+        return refuse(
+            self.path,
+            "text among numbers",
+            line=int(block.lines[bad.row]),
+            column=place + 1,
+            field=self.header[place],
+            expected=bad.expected,
+            found=repr(bad.text[:40]),
+            hint=bad.hint,
+        )
+
+
+def _torn(cell: str) -> bool:
+    """Whether the last cell stops within a number: `-`, `1e`, `1.5e-`."""
+    text = cell.strip().replace(",", ".")
+    try:
+        float(text)
+    except ValueError:
+        if text[-1:] in "+-eE.":
+            try:
+                float(text + "0")
+            except ValueError:
+                return False
+            return True
+    return False
+
+
+def _finite(values: Array) -> Array:
+    values[~np.isfinite(values)] = np.nan
+    return values
+
+
+def as_labels(text: pl.Series) -> Array:
+    """Names as numbers: their own value where all are figures, else their rank."""
+    import polars as pl
+
+    found = text.cast(pl.Float64, strict=False)
+    if found.null_count() > text.null_count():
+        found = text.rank("dense").cast(pl.Float64)
+    values: Array = found.to_numpy().astype(float)
+    return values
+
+
+class ParquetSource:
+    """A Parquet file, column by column."""
+
+    def __init__(self, path: Path) -> None:
+        import polars as pl
+
+        self.path, self.cut = path, 0
+        try:
+            self._frame = pl.scan_parquet(path, glob=False, hive_partitioning=False)
+            self._schema = self._frame.collect_schema()
+            self.rows = int(self._frame.select(pl.len()).collect().item())
+        except Exception as error:  # polars raises many kinds, all of them the file's fault
+            raise self._unreadable(error) from None
+        self.header = tuple(self._schema.names())
+        if len(self.header) > delimited.MOST_COLUMNS:
+            most = f"at most {delimited.MOST_COLUMNS}"
+            raise refuse(path, "too many columns", expected=most, found=str(len(self.header)))
+        if self.rows > MOST_ROWS:
+            most = f"at most {MOST_ROWS}"
+            raise refuse(path, "too many rows", expected=most, found=str(self.rows))
+
+    def _unreadable(self, error: Exception) -> BadInput:
+        found = (str(error).splitlines() or [type(error).__name__])[0][:160]
+        return refuse(self.path, "no readable Parquet file", found=found)
+
+    def _column(self, name: str) -> pl.Series:
+        try:
+            return self._frame.select(name).collect().to_series(0)
+        except Exception as error:
+            raise self._unreadable(error) from None
+
+    def clock(self, name: str) -> Clock:
+        import polars as pl
+
+        kind = self._schema[name]
+        if kind == pl.Datetime or kind == pl.Date:
+            at = self._column(name).cast(pl.Datetime("ns", getattr(kind, "time_zone", None)))
+            stamps = at.to_physical().fill_null(NO_TIME).to_numpy().astype(np.int64)
+            return Clock(None, stamps, getattr(kind, "time_zone", None) is not None)
+        if kind == pl.Duration:
+            return Clock(self._column(name).dt.total_nanoseconds().to_numpy() / NANOSECONDS, None)
+        series = self._plain(name)
+        if series.dtype == pl.String:
+            text = self._trimmed(name, series)
+            if looks_like_a_date(text):
+                try:
+                    return Clock(None, *iso_times(text))
+                except BadCellError as bad:
+                    raise self._bad(name, bad) from None
+        return Clock(self._figures(name, series), None)
+
+    def numbers(self, names: Sequence[str], keep: Mask) -> dict[str, Array]:
+        import polars as pl
+
+        mask = pl.Series(keep)
+        return {name: self._figures(name, self._plain(name), mask) for name in names}
+
+    def labels(self, name: str, keep: Mask) -> Array:
+        import polars as pl
+
+        series = self._plain(name).filter(pl.Series(keep))
+        if series.dtype == pl.String:
+            return as_labels(self._trimmed(name, series))
+        return series.cast(pl.Float64).to_numpy().astype(float)
+
+    def _plain(self, name: str) -> pl.Series:
+        """Numbers or text; anything else is refused."""
+        import polars as pl
+
+        kind = self._schema[name]
+        if kind == pl.Categorical or kind == pl.Enum:
+            return self._column(name).cast(pl.String)
+        if kind == pl.String or kind == pl.Null or kind.is_numeric():
+            return self._column(name)
+        raise refuse(self.path, "not a column of numbers", field=name, found=str(kind))
+
+    def _trimmed(self, name: str, series: pl.Series) -> pl.Series:
+        try:
+            return trimmed(series)
+        except BadCellError as bad:
+            raise self._bad(name, bad) from None
+
+    def _figures(self, name: str, series: pl.Series, keep: pl.Series | None = None) -> Array:
+        import polars as pl
+
+        if series.dtype == pl.String:
+            try:
+                values, _ = numbers(self._trimmed(name, series), comma=False)
+            except BadCellError as bad:
+                raise self._bad(name, bad) from None
+            return values if keep is None else values[keep.to_numpy()]
+        kept = series if keep is None else series.filter(keep)
+        return _finite(kept.cast(pl.Float64).to_numpy().astype(float))
+
+    def _bad(self, name: str, bad: BadCellError) -> BadInput:
+        return refuse(
+            self.path,
+            f"text among numbers in row {bad.row + 1}",
+            field=name,
+            expected=bad.expected,
+            found=repr(bad.text[:40]),
+        )

@@ -1,0 +1,165 @@
+"""Files to columns of floats in SI; nothing here knows what the columns mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from syncline_design.effects.record import Array
+from syncline_design.logs.cells import NO_TIME, Stamps
+from syncline_design.logs.columns import TARGET_ID, TIME, headings, known_names, si_columns
+from syncline_design.logs.refusals import refuse
+from syncline_design.logs.row_choice import Arranged, arranged, thinned
+from syncline_design.logs.sources import NANOSECONDS, Clock, Source, opened
+
+DAY = 86_400 * NANOSECONDS
+Slip = tuple[Sequence[str], float]  # files with one of these columns have stamps ahead by so much
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """One file: SI name -> values (n,) by rising stamp, with NaN where a value is missing.
+
+    rows: of the file; rejected: left out of these, by reason; thinned: left out as too many.
+    """
+
+    path: Path
+    columns: Mapping[str, Array]
+    header: tuple[str, ...]
+    notes: tuple[str, ...] = ()
+    rows: int = 0
+    rejected: Mapping[str, int] = field(default_factory=dict)
+    thinned: int = 0
+
+    def __len__(self) -> int:
+        return int(self.columns[TIME].shape[0])
+
+
+@dataclass(frozen=True, slots=True)
+class _Open:
+    """A file whose time column has been read.
+
+    day: nanoseconds since 1970 of the midnight (UTC) that its seconds count from; None for numbers.
+    """
+
+    source: Source
+    found: Mapping[str, tuple[str, float]]
+    seconds: Array
+    day: int | None
+    notes: tuple[str, ...]
+
+
+def read_tables(
+    paths: Sequence[Path],
+    mapping: Mapping[str, str],
+    stages: tuple[str, ...],
+    slip: Slip = ((), 0.0),
+) -> list[Table]:
+    """Read CSV or Parquet files that belong together; raises BadInput."""
+    files = _on_one_scale([_opened(path, mapping, stages) for path in paths])
+    names, ahead_s = slip
+    stamps = [
+        f.seconds - ahead_s if ahead_s and any(n in f.found for n in names) else f.seconds
+        for f in files
+    ]
+    rows = [arranged(f.source.path, s) for f, s in zip(files, stamps, strict=True)]
+    return [_table(f, chosen) for f, chosen in zip(files, thinned(rows), strict=True)]
+
+
+def _opened(path: Path, mapping: Mapping[str, str], stages: tuple[str, ...]) -> _Open:
+    source = opened(path)
+    found = si_columns(source.header, mapping, known_names(stages))
+    if TIME not in found:
+        raise refuse(
+            path,
+            "no time column",
+            line=1,
+            column=1,
+            field=TIME,
+            expected="a column time_s (or time_ms, time_us, time_ns), or time with ISO 8601 times",
+            found=", ".join(source.header[:12])[:300] or "no columns",
+            hint="name it there, or map it in the spec: log: {columns: {time_s: theirs}}",
+        )
+    name, factor = found[TIME]
+    clock = source.clock(name)
+    notes = headings(found)
+    seconds, day, said = _seconds(path, name, factor, clock)
+    if not seconds.shape[0]:
+        raise refuse(path, "no rows below the header", line=2, column=1)
+    return _Open(source, found, seconds, day, (*notes, *said))
+
+
+def _seconds(
+    path: Path, name: str, factor: float, clock: Clock
+) -> tuple[Array, int | None, tuple[str, ...]]:
+    if clock.nanoseconds is not None:
+        seconds, day = _since_midnight(clock.nanoseconds)
+        said = () if clock.zoned else (f"{path.name}: {name} names no zone and is taken as UTC",)
+        return seconds, day, said
+    assert clock.seconds is not None
+    if math.isnan(factor) and clock.seconds.shape[0]:
+        raise refuse(
+            path,
+            "times without a unit",
+            field=name,
+            expected="ISO 8601 times such as 2026-03-01T12:00:00.125Z",
+            found="numbers",
+            hint="put the unit into the name: time_s, time_ms, time_us or time_ns",
+        )
+    return clock.seconds * factor, None, ()
+
+
+def _since_midnight(stamps: Stamps) -> tuple[Array, int]:
+    """Seconds since the midnight (UTC) before the first stamp, which is exact to a nanosecond."""
+    known = stamps != NO_TIME
+    first = int(stamps[known].min()) if np.any(known) else 0
+    day = first - first % DAY
+    seconds = (np.where(known, stamps, day) - day) / NANOSECONDS
+    return np.where(known, seconds, np.nan), day
+
+
+def _on_one_scale(files: list[_Open]) -> list[_Open]:
+    """Calendar times of all files count from one midnight; beside plain numbers, from 1970."""
+    days = [f.day for f in files if f.day is not None]
+    if not days:
+        return files
+    origin = min(days) if len(days) == len(files) else 0
+    shown = np.datetime64(origin, "ns").astype("datetime64[s]")
+    note = f"times are UTC, in seconds since {shown}Z"
+    moved = [
+        f if f.day is None else replace(f, seconds=f.seconds + (f.day - origin) / NANOSECONDS)
+        for f in files
+    ]
+    return [replace(moved[0], notes=(*moved[0].notes, note)), *moved[1:]]
+
+
+def _table(file: _Open, rows: Arranged) -> Table:
+    """The columns of the rows that are worked on."""
+    keep = np.zeros(rows.rows, dtype=bool)
+    keep[rows.order] = True
+    place = (np.cumsum(keep) - 1)[rows.order]  # of every row among the kept ones of the file
+    figures = {si: f for si, f in file.found.items() if si not in (TIME, TARGET_ID)}
+    read = file.source.numbers(sorted({name for name, _ in figures.values()}), keep)
+    columns = {si: read[name][place] * factor for si, (name, factor) in sorted(figures.items())}
+    if TARGET_ID in file.found:
+        columns[TARGET_ID] = file.source.labels(file.found[TARGET_ID][0], keep)[place]
+    columns[TIME] = rows.stamps
+    rejected, notes, count = dict(rows.rejected), [*file.notes, *rows.notes], rows.rows
+    if file.source.cut:
+        rejected["cut off in the last row"] = 1
+        count += 1
+        line = f"{file.source.path.name} is cut off in line {file.source.cut}"
+        notes.append(f"{line}; the rows before it are used")
+    return Table(
+        file.source.path,
+        columns,
+        file.source.header,
+        tuple(notes),
+        count,
+        rejected,
+        rows.thinned,
+    )

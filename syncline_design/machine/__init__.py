@@ -1,0 +1,1 @@
+"""What the program asks of the machine: files read and written whole, streams, processes, time."""

@@ -1,0 +1,342 @@
+"""`reproduce`: every printed figure of the paper, computed anew from the built-in catalog.
+
+A tau_crit cell agrees when the exact value lies within one unit of its last printed digit (the
+paper sometimes cuts and sometimes rounds).  One that does not must be a documented erratum and
+come out at the documented value; anything else makes the reproduction fail.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any, Literal
+
+from syncline_design import __version__
+from syncline_design.model import syncline
+from syncline_design.model.budget import budget
+from syncline_design.model.quantity import Dimension, Quantity, format_quantity, parse_quantity
+from syncline_design.paper.errata import ERRATA, Key
+from syncline_design.paper.figures import (
+    FIGURE_1_SENSOR_ERROR_M,
+    SURVEY_PAYLOAD,
+    Comparison,
+    Figure,
+    compare,
+    figures,
+    platform_of,
+    sigma_axes,
+    survey_system,
+)
+from syncline_design.paper.printed import PRINTED
+from syncline_design.spec.catalog import Catalog
+from syncline_design.spec.load import load_builtin
+
+SCHEMA = "syncline-design/reproduction/v1"
+TAU_CRIT_TABLES = ("tau_crit_georeferencing", "tau_crit_survey")
+
+Status = Literal["agrees", "erratum", "differs"]
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """One printed figure and the same computed, both in `unit`."""
+
+    table: str
+    row: str
+    column: str
+    printed_text: str
+    printed: float
+    computed: float
+    unit: str
+    status: Status
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What came out.
+
+    cells: the paper's results; inputs: its platform and sensor figures against the catalog;
+    comparisons: figure number to its simulated points (figures 3 and 7).
+    """
+
+    cells: tuple[Cell, ...]
+    inputs: tuple[Cell, ...]
+    figures: tuple[Figure, ...]
+    comparisons: Mapping[int, tuple[Comparison, ...]]
+    seed: int = 0
+
+    @property
+    def ok(self) -> bool:
+        """Whether every printed figure agrees or is a documented erratum."""
+        return all(cell.status != "differs" for cell in (*self.cells, *self.inputs))
+
+    def to_json(self) -> dict[str, Any]:
+        """The reproduction as plain data (schema syncline-design/reproduction/v1)."""
+        return as_json(self)
+
+
+def reproduce(catalog: Catalog | None = None, simulate: bool = True, seed: int = 0) -> Reproduction:
+    """Compute every printed figure from a catalog, the built-in one unless another is given.
+
+    simulate: whether to add the simulated points of figures 3 and 7 (takes a second or two).
+    seed: of the starting points of their search; nothing else here is random.
+    """
+    catalog = load_builtin() if catalog is None else catalog
+    cells = tuple(
+        _cell((table, row, column), printed, _computed_si(catalog, table, row, column))
+        for table in (*TAU_CRIT_TABLES, "text")
+        for row, column, printed in _entries(table)
+    )
+    inputs = tuple(
+        _cell((table, row, column), printed, _catalog_si(catalog, table, row, column), exact=True)
+        for table in ("platforms", "sensors")
+        for row, column, printed in _entries(table)
+    )
+    plotted = figures(catalog)
+    beside = [figure for figure in plotted if figure.simulated and simulate]
+    simulated = {figure.number: compare(figure, seed=seed) for figure in beside}
+    return Reproduction(cells, inputs, plotted, simulated, seed)
+
+
+def _entries(table: str) -> Iterator[tuple[str, str, str]]:
+    for row, columns in PRINTED[table].items():
+        for column, printed in columns.items():
+            yield row, column, printed
+
+
+def _computed_si(catalog: Catalog, table: str, row: str, column: str) -> float:
+    """A result of the paper in SI: a sensor's tau_crit, a system's, or a roof."""
+    if table in TAU_CRIT_TABLES:
+        return _sensor_tau_crit_s(catalog, row, column)
+    if row == "survey_tau_crit":
+        return budget(survey_system(catalog, column, SURVEY_PAYLOAD)).tau_crit_s
+    if row == "survey_roof":
+        return budget(survey_system(catalog, "large_sv", SURVEY_PAYLOAD)).sensor_error_m
+    p = platform_of(catalog, column)
+    rate = syncline.sync_rate_mps(p.v_max_mps, p.omega_max_radps, p.distance_m)
+    return syncline.accuracy_per_m(syncline.syncline_m(0.0, FIGURE_1_SENSOR_ERROR_M, rate))
+
+
+def _sensor_tau_crit_s(catalog: Catalog, sensor: str, platform: str) -> float:
+    entry, p = catalog.sensors[sensor], platform_of(catalog, platform)
+    role = entry.modality
+    error = syncline.sensor_error_m(role, sigma_axes(entry), p.distance_m)
+    rate = syncline.sensor_rate_mps(role, p.v_max_mps, p.omega_max_radps, p.distance_m)
+    return syncline.tau_crit_s(error, rate)
+
+
+def _catalog_si(catalog: Catalog, table: str, row: str, column: str) -> Quantity:
+    """A figure of the catalog that the paper prints as an input."""
+    if table == "platforms":
+        value: Any = getattr(catalog.platforms[row], column)
+        return _quantity(value)
+    entry = catalog.sensors[row]
+    field, axis = {
+        "position": ("sigma_position", 0),
+        "roll": ("sigma_attitude", 0),
+        "pitch": ("sigma_attitude", 1),
+        "yaw": ("sigma_attitude", 2),
+        "range": ("sigma_range", 0),
+        "azimuth": ("sigma_bearing", 0),
+        "elevation": ("sigma_bearing", 1),
+    }[column]
+    value = getattr(entry, field)
+    return _quantity(value[axis] if isinstance(value, tuple) else value)
+
+
+def _quantity(value: Any) -> Quantity:
+    if not isinstance(value, Quantity):
+        raise TypeError(f"expected a figure with a unit, found {value!r}")
+    return value
+
+
+_DIMENSIONS = {
+    "m": Dimension.LENGTH, "cm": Dimension.LENGTH, "mm": Dimension.LENGTH,
+    "us": Dimension.TIME, "ms": Dimension.TIME, "deg": Dimension.ANGLE,
+    "m/s": Dimension.SPEED, "deg/s": Dimension.ANGULAR_RATE,
+}  # fmt: skip
+
+
+def _unit_si(unit: str) -> Fraction:
+    """One display unit in SI, exactly; 1/m (figure 1's axis) is SI itself."""
+    if unit == "1/m":
+        return Fraction(1)
+    return parse_quantity(f"1 {unit}", _DIMENSIONS[unit]).exact
+
+
+def _last_digit(number: str) -> Fraction:
+    """One unit of the last digit: `16` -> 1, `4.330` -> 1/1000."""
+    return Fraction(1, 10 ** len(number.partition(".")[2]))
+
+
+def _cell(key: Key, text: str, computed_si: float, *, exact: bool = False) -> Cell:
+    """Compare a printed figure with the computed one: within one unit of the last digit.
+
+    exact: an input, which has to be the printed figure itself.
+    """
+    number, unit = text.split(" ")
+    computed = (
+        computed_si.exact if isinstance(computed_si, Quantity) else Fraction(computed_si)
+    ) / _unit_si(unit)
+    distance = abs(computed - Fraction(number))
+    agrees = distance == 0 if exact else distance < _last_digit(number)
+    status, note = _agreement(key) if agrees else _explain(key, computed)
+    return Cell(*key, text, float(number), float(computed), unit, status, note)
+
+
+def _agreement(key: Key) -> tuple[Status, str]:
+    """A figure that agrees, with what it was computed with where that is not the printed row."""
+    table, row, column = key
+    uses_auv = table in TAU_CRIT_TABLES and column == "auv"
+    corrected = uses_auv or row == "survey_tau_crit"
+    return "agrees", "with the corrected AUV row" if corrected else ""
+
+
+def _explain(key: Key, computed: Fraction) -> tuple[Status, str]:
+    """A figure that does not agree: an erratum if it is documented and comes out as documented."""
+    for erratum in ERRATA:
+        documented = dict(erratum.cells).get(key)
+        if documented is None:
+            continue
+        if abs(computed - Fraction(documented)) <= _last_digit(documented) / 2:
+            return "erratum", f"{erratum.id}: {erratum.reason}"
+        return "differs", f"documented as {documented} (erratum {erratum.id})"
+    return "differs", "neither agrees nor is a documented erratum"
+
+
+def tau_crit_cells(result: Reproduction) -> tuple[Cell, ...]:
+    """The cells of the paper's two tau_crit tables."""
+    return tuple(cell for cell in result.cells if cell.table in TAU_CRIT_TABLES)
+
+
+def as_json(result: Reproduction) -> dict[str, Any]:
+    """The reproduction as plain data (schema syncline-design/reproduction/v1)."""
+    return {
+        "schema": SCHEMA,
+        "version": __version__,
+        "seed": result.seed,
+        "ok": result.ok,
+        "counts": _counts(result),
+        "cells": [_cell_json(cell) for cell in result.cells],
+        "inputs": [_cell_json(cell) for cell in result.inputs],
+        "errata": [
+            {"id": e.id, "where": e.where, "reason": e.reason, "cells": [k for k, _ in e.cells]}
+            for e in ERRATA
+        ],
+        "figures": [_figure_json(f, result.comparisons.get(f.number, ())) for f in result.figures],
+    }
+
+
+def _cell_json(cell: Cell) -> dict[str, Any]:
+    names = ("table", "row", "column", "printed", "printed_text", "computed", "unit")
+    return {name: getattr(cell, name) for name in (*names, "status", "note")}
+
+
+def _figure_json(figure: Figure, simulated: tuple[Comparison, ...]) -> dict[str, Any]:
+    grid = figure.tau_grid_s()
+    return {
+        "number": figure.number,
+        "title": figure.title,
+        "note": figure.note,
+        "tau_s": list(grid),
+        "curves": [
+            {
+                "label": curve.label,
+                "sensor_error_m": curve.sensor_error_m,
+                "sync_rate_mps": curve.sync_rate_mps,
+                "tau_crit_s": curve.tau_crit_s,
+                "error_m": list(curve.error_m(grid)),
+            }
+            for curve in figure.curves
+        ],
+        "simulated": [
+            {"tau_s": p.tau_s, "worst_case_m": p.worst_case_m, "ratio_to_syncline": p.ratio}
+            for p in simulated
+        ],
+    }
+
+
+def _counts(result: Reproduction) -> dict[str, dict[str, int]]:
+    groups = {
+        "tau_crit": tau_crit_cells(result),
+        "text": tuple(cell for cell in result.cells if cell.table == "text"),
+        "inputs": result.inputs,
+    }
+    statuses: tuple[Status, ...] = ("agrees", "erratum", "differs")
+    return {
+        name: {"printed": len(cells)}
+        | {status: sum(cell.status == status for cell in cells) for status in statuses}
+        for name, cells in groups.items()
+    }
+
+
+def text(result: Reproduction) -> str:
+    """The reproduction as aligned text: every cell, the errata, the counts at the end."""
+    lines: list[str] = []
+    for table in (*TAU_CRIT_TABLES, "text"):
+        lines += [table, *_rows([cell for cell in result.cells if cell.table == table]), ""]
+    disputed = [cell for cell in result.inputs if cell.status != "agrees"]
+    lines += ["inputs that are not as printed", *_rows(disputed), ""]
+    lines += ["figures set beside a simulation", *_comparison_lines(result), ""]
+    lines += ["errata of the paper", *(f"  {e.id}: {e.where}. {e.reason}" for e in ERRATA), ""]
+    words = {"tau_crit": "printed tau_crit cells", "text": "figures of the text"}
+    for name, count in _counts(result).items():
+        lines.append(_count_line(count, words.get(name, "printed inputs")))
+    lines.append(
+        "Every printed figure is accounted for."
+        if result.ok
+        else "Some printed figures are NOT accounted for: see the rows that say differs."
+    )
+    return "\n".join(lines)
+
+
+def _comparison_lines(result: Reproduction) -> Iterator[str]:
+    for number, points in result.comparisons.items():
+        ratios = sorted(point.ratio for point in points)
+        yield (
+            f"  figure {number}: worst simulated error {ratios[0]:.3f} to {ratios[-1]:.3f} of the "
+            f"Syncline over {len(points)} values of tau, {_time_text(points[0].tau_s)} to "
+            f"{_time_text(points[-1].tau_s)}"
+        )
+
+
+def _time_text(value_s: float) -> str:
+    return format_quantity(value_s, Dimension.TIME, digits=2)
+
+
+def _count_line(count: Mapping[str, int], what: str) -> str:
+    accounted = count["agrees"] + count["erratum"]
+    return (
+        f"{accounted} of {count['printed']} {what} accounted for: agree {count['agrees']}, "
+        f"documented errata {count['erratum']}, differ {count['differs']}"
+    )
+
+
+def _rows(cells: list[Cell]) -> list[str]:
+    """Aligned lines of cells: row, column, printed, computed, status, erratum."""
+    header = ("row", "column", "printed", "computed", "status")
+    table = [(c.row, c.column, c.printed_text, _computed_text(c), _status_text(c)) for c in cells]
+    widths = [max(len(line[i]) for line in [header, *table]) for i in range(len(header))]
+    lines = (
+        f"  {a:<{widths[0]}}  {b:<{widths[1]}}  {p:>{widths[2]}}  {q:>{widths[3]}}  {s}"
+        for a, b, p, q, s in [header, *table]
+    )
+    return [line.rstrip() for line in lines]
+
+
+def _computed_text(cell: Cell) -> str:
+    """The computed figure: five digits, or one decimal more than printed if that is more."""
+    decimals = len(cell.printed_text.split(" ")[0].partition(".")[2])
+    five, one_more = f"{cell.computed:.5g}", f"{cell.computed:.{decimals + 1}f}"
+    return f"{max(five, one_more, key=len)} {cell.unit}"
+
+
+def _status_text(cell: Cell) -> str:
+    """Status; an erratum with its id, a difference with what is known of it."""
+    if cell.status == "erratum":
+        return f"erratum ({cell.note.partition(':')[0]})"
+    if cell.status == "differs":
+        return f"DIFFERS, {cell.note}"
+    return f"agrees, {cell.note}" if cell.note else "agrees"

@@ -1,0 +1,193 @@
+"""A study as one offline HTML page."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from syncline_design import __version__
+from syncline_design.report import figures_study, numbers, page
+from syncline_design.report.study_rows import reason
+from syncline_design.report.study_words import (
+    MOST_KEYS,
+    boundary_table,
+    heat_table,
+    outcome,
+    rule_sentence,
+    winners_table,
+)
+from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.verdict_words import OUTCOMES
+from syncline_design.spec.factors import Factor, figure_of
+from syncline_design.spec.yaml_text import plain_scalar
+from syncline_design.studies.result import StudyResult
+from syncline_design.studies.scatter import Scatter, scatter
+from syncline_design.studies.summary import Brief, Front, Summary, heat_map, summarise, varied
+
+MOST_CASES = 500  # rows of the case table; CSV and Parquet have them all
+MOST_FRONTS = 8
+
+
+def render_study_page(result: StudyResult) -> str:
+    """The page of a study: what holds, least cost, who wins, where it ends, fronts, cases."""
+    summary = summarise(result)
+    currency = result.study.bases[0].currency
+    heat = heat_map(summary)
+    sampled = scatter(summary) if heat is None else None
+    shown = outcome(result)
+    fronts = _distinct_fronts(summary)
+    ends = boundary_table(summary)
+    parts = {
+        "heat": heat is not None,
+        "sampled": sampled is not None,
+        "winners": True,
+        "ends": bool(ends.rows),
+        "fronts": bool(fronts),
+        "cases": True,
+        "provenance": True,
+    }
+    titles = {
+        "heat": "Least cost", "sampled": "Sample", "winners": "What wins where",
+        "ends": "Where it ends", "fronts": "Fronts", "cases": "Cases", "provenance": "Provenance",
+    }  # fmt: skip
+    return page.render_page(
+        "study.html.j2",
+        kind="Trade study",
+        name=visible(result.study.name),
+        note=visible(result.study.note),
+        contents=[(key, title) for key, title in titles.items() if parts[key]],
+        outcome=shown,
+        rule=rule_sentence(result),
+        facts=_facts(result),
+        heat_figure=_svg(figures_study.cost_map(heat, currency)) if heat is not None else None,
+        heat_table=heat_table(heat, currency) if heat is not None else None,
+        sampled_figure=None
+        if sampled is None
+        else _svg(figures_study.sampled_cases(sampled, currency)),
+        sampled_caption="" if sampled is None else visible(_sampled_caption(sampled)),
+        winners=winners_table(summary),
+        ends=ends if ends.rows else None,
+        fronts_figure=_fronts_figure(summary, fronts, currency) if fronts else None,
+        fronts_table=_fronts_table(summary, currency) if fronts else None,
+        cases=_case_table(summary, currency),
+        provenance=_provenance(result),
+    )
+
+
+def _svg(figure: Any) -> Any:
+    return page.trusted_svg(figure.svg)
+
+
+def _facts(result: StudyResult) -> list[tuple[str, str]]:
+    counts = result.counts
+    names = {"meets": "Meet", "fails": "Fail", "infeasible": "Infeasible", "refused": "Refused",
+             "indeterminate": "No verdict"}  # fmt: skip
+    facts = [("Cases", numbers.count(len(result)))]
+    return facts + [(names[word], numbers.count(n)) for word, n in counts.items() if n]
+
+
+def _distinct_fronts(summary: Summary) -> list[Front]:
+    """At most eight fronts, spread evenly over all that differ."""
+    found = list(summary.fronts)
+    if len(found) <= MOST_FRONTS:
+        return found
+    step = (len(found) - 1) / (MOST_FRONTS - 1)
+    return [found[round(place * step)] for place in range(MOST_FRONTS)]
+
+
+def _common(summary: Summary, front: Front) -> str:
+    """What the cases that share a front have in common: that is what tells it from others."""
+    chosen = [summary.briefs[number - 1] for number in front.cases]
+    parts = []
+    if len(summary.result.study.bases) > 1 and len({b.base for b in chosen}) == 1:
+        parts.append(summary.result.study.bases[chosen[0].base].name)
+    for place, factor in varied(summary):
+        values = {brief.labels[place] for brief in chosen}
+        if len(values) == 1:
+            parts.append(f"{factor.key} = {values.pop()}")
+    return visible(", ".join(parts)) or "every case"
+
+
+def _fronts_figure(summary: Summary, chosen: list[Front], currency: str) -> Any:
+    named = [figures_study.NamedFront(_common(summary, f), f.points) for f in chosen]
+    return _svg(figures_study.fronts(named, currency))
+
+
+def _fronts_table(summary: Summary, currency: str) -> Table:
+    rows = []
+    for front in summary.fronts:
+        (least, worst), (most, best) = front.points[0], front.points[-1]
+        rows.append((
+            Cell(_common(summary, front)),
+            Cell(numbers.count(len(front.cases)), float(len(front.cases))),
+            Cell(numbers.count(len(front.points)), float(len(front.points))),
+            Cell(numbers.money(least, currency), least), Cell(numbers.length(worst), worst),
+            Cell(numbers.money(most, currency), most), Cell(numbers.length(best), best),
+        ))  # fmt: skip
+    heads = ("With", "Cases #", "Points #", "Cheapest #", "its error #", "Most accurate: cost #",
+             "its error #")  # fmt: skip
+    note = (
+        "Each front is exact, over all payloads that meet every requirement but accuracy; cases "
+        "that differ only in limits on accuracy share it."
+    )
+    return table("Fronts of cost against error", heads, rows, note)
+
+
+def _figure(brief: Brief, place: int) -> float | None:
+    found = figure_of(plain_scalar(brief.labels[place]))
+    return None if found is None else found[0]
+
+
+def _sampled_caption(data: Scatter) -> str:
+    text = (
+        "Computed cases only. A disc meets its requirements, the stronger its colour the dearer; "
+        "a cross does not."
+    )
+    return text + (f" Vary besides: {sentence_list(list(data.others))}." if data.others else "")
+
+
+def _case_table(summary: Summary, currency: str) -> Table:
+    result = summary.result
+    several = varied(summary)
+    many = len(result.study.bases) > 1
+    rows = []
+    for brief in summary.briefs[:MOST_CASES]:
+        shown = OUTCOMES[brief.verdict]
+        payload = ", ".join(pick.name for pick in brief.picks)
+        why = payload or visible(reason(result.case(brief.number - 1)))
+        named = [Cell(result.study.bases[brief.base].name)] if many else []
+        rows.append([
+            Cell(str(brief.number), float(brief.number)), *named,
+            *_setting_cells(brief, several),
+            Cell(brief.verdict, tone=shown.tone, mark=shown.mark),
+            Cell(numbers.money(brief.cost, currency), brief.cost),
+            Cell(numbers.length(brief.error_m), brief.error_m),
+            Cell(why),
+        ])  # fmt: skip
+    keys = [factor.key for _, factor in several] if len(several) <= MOST_KEYS else ["Setting"]
+    varying = [*(["Base"] if many else []), *keys]
+    ends = ["Verdict", "Price #", "Syncline error #", "Payload, or why there is none"]
+    heads = ["Case #", *varying, *ends]
+    more = len(summary.briefs) - MOST_CASES
+    note = f"{more} further cases are in the CSV and Parquet tables." if more > 0 else ""
+    return table("All cases", heads, rows, note)
+
+
+def _setting_cells(brief: Brief, several: list[tuple[int, Factor]]) -> list[Cell]:
+    """What varies: a cell per key, or one cell that names them all."""
+    if len(several) <= MOST_KEYS:
+        return [Cell(brief.labels[i], _figure(brief, i)) for i, _ in several]
+    return [Cell("; ".join(f"{f.key} = {brief.labels[i]}" for i, f in several))]
+
+
+def _provenance(result: StudyResult) -> list[tuple[str, str]]:
+    facts = [
+        ("Version", __version__),
+        ("Study", str(result.study.path)),
+        ("SHA-256 of the study", result.study.sha256),
+        ("Seed", str(result.seed)),
+    ]
+    for base in result.study.bases:
+        facts.append((f"SHA-256 of {base.path}", base.document.sha256))
+        facts.append((f"SHA-256 of the catalogs of {base.path}", base.catalogs.sha256()))
+    return facts

@@ -1,0 +1,197 @@
+"""The nonlinear measurement chain: true pose to georeferenced position minus the true one.
+
+Every row is one stamp of the ranging sensor.  Nothing here is linearised: rotations are exact,
+position and attitude are taken at their own shifted times, lever arms rotate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from syncline_design.effects.kinematics import bearing, rotate
+from syncline_design.effects.record import NOTHING, Array, Departures, StageRows
+
+
+class Motion(Protocol):
+    """Where the vehicle is a while before or after each row's stamp."""
+
+    def displacement(self, shift_s: Array) -> Array:
+        """p(s) - p(0) [m], NED, (n, 3), for shifts (n,)."""
+
+    def rotation(self, shift_s: Array) -> Array:
+        """R_nb at s, (n, 3, 3)."""
+
+
+def cross_matrix(vector: Array) -> Array:
+    """S(v) with S(v) u = v x u, (n, 3) -> (n, 3, 3)."""
+    matrix = np.zeros((*vector.shape[:-1], 3, 3))
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    matrix[..., 0, 1], matrix[..., 0, 2] = -z, y
+    matrix[..., 1, 0], matrix[..., 1, 2] = z, -x
+    matrix[..., 2, 0], matrix[..., 2, 1] = -y, x
+    return matrix
+
+
+def _sinc_terms(angle: Array) -> tuple[Array, Array, Array]:
+    """sin a / a, (1 - cos a) / a^2, (a - sin a) / a^3, by series where a is small."""
+    small = angle < 1e-2
+    a = np.where(small, 1.0, angle)
+    a2 = angle * angle
+    first = np.where(small, 1 - a2 / 6 + a2**2 / 120, np.sin(a) / a)
+    # 1 - cos a = 2 sin^2(a/2): no cancellation where a is small but above the series' limit
+    second = np.where(small, 0.5 - a2 / 24 + a2**2 / 720, 2 * np.sin(0.5 * a) ** 2 / a**2)
+    third = np.where(small, 1 / 6 - a2 / 120 + a2**2 / 5040, (a - np.sin(a)) / a**3)
+    return first, second, third
+
+
+def rotation_exp(vector: Array) -> Array:
+    """exp(S(v)), (n, 3) -> (n, 3, 3): Rodrigues' formula."""
+    first, second, _ = _sinc_terms(np.linalg.norm(vector, axis=-1))
+    s = cross_matrix(vector)
+    return np.eye(3) + first[..., None, None] * s + second[..., None, None] * (s @ s)
+
+
+def screw_displacement(velocity_mps: Array, rate_radps: Array, shift_s: Array) -> Array:
+    """(integral of exp(S(w) u) du from 0 to s) v [m], body axes, (n, 3).
+
+    With a = |w s|: s (I + (1 - cos a)/a^2 S + (a - sin a)/a^3 S^2) v, S = S(w s).
+    """
+    turn = rate_radps * shift_s[:, None]
+    _, second, third = _sinc_terms(np.linalg.norm(turn, axis=-1))
+    once = np.cross(turn, velocity_mps)
+    twice = np.cross(turn, once)
+    return shift_s[:, None] * (velocity_mps + second[:, None] * once + third[:, None] * twice)
+
+
+@dataclass(frozen=True, slots=True)
+class ConstantTwist:
+    """Constant body velocity and rate through each row's pose: R(s) = R exp(S(w) s)."""
+
+    attitude: Array  # (n, 3, 3)
+    velocity_mps: Array  # (n, 3) body
+    rate_radps: Array  # (n, 3) body
+
+    def displacement(self, shift_s: Array) -> Array:
+        body = screw_displacement(self.velocity_mps, self.rate_radps, shift_s)
+        return rotate(self.attitude, body)
+
+    def rotation(self, shift_s: Array) -> Array:
+        turned: Array = self.attitude @ rotation_exp(self.rate_radps * shift_s[:, None])
+        return turned
+
+
+def euler_to_rotation(euler_rad: Array) -> Array:
+    """R_nb of (roll, pitch, yaw), (n, 3) -> (n, 3, 3); the paper's eq. R_nb."""
+    (sr, sp, sy), (cr, cp, cy) = np.sin(euler_rad).T, np.cos(euler_rad).T
+    rows = [
+        [cp * cy, -cr * sy + sr * sp * cy, sr * sy + cr * sp * cy],
+        [cp * sy, cr * cy + sr * sp * sy, -sr * cy + cr * sp * sy],
+        [-sp, sr * cp, cr * cp],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def rotation_to_euler(rotation: Array) -> Array:
+    """(roll, pitch, yaw) of R_nb, (n, 3, 3) -> (n, 3); at gimbal lock roll is taken as 0."""
+    sp = np.clip(-rotation[:, 2, 0], -1.0, 1.0)
+    cp = np.hypot(rotation[:, 2, 1], rotation[:, 2, 2])
+    locked = cp < 1e-9
+    roll = np.where(locked, 0.0, np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]))
+    yaw = np.where(
+        locked,
+        np.arctan2(-rotation[:, 0, 1], rotation[:, 1, 1]),
+        np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]),
+    )
+    return np.stack([roll, np.arctan2(sp, cp), yaw], axis=-1)
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """One draw of a stage's sensor noise and timestamp errors; zeros mean none.
+
+    position_m (n, 3) NED; attitude_rad (n, 3) roll, pitch, yaw; range_m, azimuth_rad,
+    elevation_rad (n,); mu_*_s (n,): timestamp error of each sensor against true time.
+    mu_position_s of a later stage is the timestamp error of the ranging sensor before it.
+    """
+
+    position_m: Array
+    attitude_rad: Array
+    range_m: Array
+    azimuth_rad: Array
+    elevation_rad: Array
+    mu_position_s: Array
+    mu_attitude_s: Array
+    mu_ranging_s: Array
+
+
+def no_noise(rows: int) -> Noise:
+    """A draw without noise and without timestamp errors."""
+    vector, scalar = np.zeros((rows, 3)), np.zeros(rows)
+    return Noise(vector, vector, scalar, scalar, scalar, scalar, scalar, scalar)
+
+
+def stage_error(
+    rows: StageRows,
+    motion: Motion,
+    noise: Noise,
+    departures: Departures = NOTHING,
+    carried_m: Array | None = None,
+) -> Array:
+    """Georeferenced position minus the true (or surveyed) one [m], NED, (n, 3).
+
+    estimate = antenna - R_hat l_G + R_hat (l_L + r_hat n_hat); error = estimate - (p + R (l_L + b))
+    (model.md, the paper's eq. analytic_direct_georef with eq. meas_gnss, meas_ins, meas_lidar).
+    Shifts are relative to the moment at which the ranging sensor measured.  `carried_m` (n, 3) is
+    the error of the chain before, which the reading of a later stage's antenna inherits.
+    """
+    mu_ranging = noise.mu_ranging_s + departures.ranging_shift_s
+    shift_p = noise.mu_position_s + departures.position_shift_s - mu_ranging
+    shift_a = noise.mu_attitude_s + departures.attitude_shift_s - mu_ranging
+    antenna_error = (
+        motion.displacement(shift_p)
+        + rotate(motion.rotation(shift_p), rows.antenna_m + departures.antenna_m)
+        + noise.position_m * (1 + departures.position_noise[:, None])
+        + departures.position_m
+    )
+    if carried_m is not None:
+        antenna_error = antenna_error + carried_m
+    r_hat = _measured_rotation(motion.rotation(shift_a), noise, departures)
+    believed = rows.ranging_m - rows.antenna_m + _measured_vector(rows, noise, departures)
+    true_vector = rows.range_m[:, None] * bearing(rows.azimuth_rad, rows.elevation_rad)
+    true = rotate(rows.rotation, rows.ranging_m + departures.ranging_m + true_vector)
+    error: Array = antenna_error + rotate(r_hat, believed) - true - departures.target_m
+    return error
+
+
+def _measured_rotation(rotation: Array, noise: Noise, departures: Departures) -> Array:
+    """R_hat: the turned attitude sensor's Euler angles plus their noise."""
+    if np.any(departures.attitude_rotation_rad):
+        rotation = rotation @ rotation_exp(departures.attitude_rotation_rad)
+    scatter = noise.attitude_rad * (1 + departures.attitude_noise[:, None])
+    offset = scatter + departures.attitude_euler_rad
+    if not np.any(offset):
+        return rotation
+    return euler_to_rotation(rotation_to_euler(rotation) + offset)
+
+
+def _measured_vector(rows: StageRows, noise: Noise, departures: Departures) -> Array:
+    """r_hat n_hat [m] in the axes the spec believes, (n, 3)."""
+    azimuth, elevation = rows.azimuth_rad, rows.elevation_rad
+    if np.any(departures.bearing_rotation_rad):
+        turned = rotate(
+            np.broadcast_to(rotation_exp(-departures.bearing_rotation_rad), (len(rows), 3, 3)),
+            bearing(azimuth, elevation),
+        )
+        azimuth = np.arctan2(turned[:, 1], turned[:, 0])
+        elevation = -np.arcsin(np.clip(turned[:, 2], -1.0, 1.0))
+    scatter = 1 + departures.ranging_noise
+    distance = (
+        rows.range_m * (1 + departures.range_scale) + departures.range_m + noise.range_m * scatter
+    )
+    return distance[:, None] * bearing(
+        azimuth + noise.azimuth_rad * scatter + departures.azimuth_rad,
+        elevation + noise.elevation_rad * scatter + departures.elevation_rad,
+    )

@@ -1,0 +1,62 @@
+"""Errors of a stage on which known effects act: the row-wise chain beside the fast kernel."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.effects.acting import Acting, departures
+from syncline_design.effects.record import Array, StageRows
+from syncline_design.simulation import kernel
+from syncline_design.simulation.chain import Motion, Noise, stage_error
+from syncline_design.simulation.surroundings import Moment, placed_rows
+
+
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """What a stage hands on to the next one.
+
+    error_m (3, n): error of the object it georeferences, NED; ranging_shift_s (n,): what effects
+    add to mu of its ranging sensor, whose stamp the next stage's position carries.
+    """
+
+    error_m: Array
+    ranging_shift_s: Array
+
+
+def level_error(draw: kernel.Draw, before: Carried | None) -> Carried:
+    """Error of one stage where no stage has an effect: the fast kernel, level."""
+    error = kernel.stage_error(draw, None if before is None else before.error_m)
+    return Carried(error, _NO_SHIFT)
+
+
+def placed_error(
+    draw: kernel.Draw,
+    around: tuple[Moment, Array],
+    acting: tuple[Acting, ...],
+    generator: np.random.Generator | None,
+    before: Carried | None,
+) -> Carried:
+    """Error of one stage at its moment and lean (roll, pitch), with effects: the row-wise chain."""
+    return moved_error(placed_rows(draw, *around), acting, generator, before)
+
+
+def moved_error(
+    rows: tuple[StageRows, Motion, Noise],
+    acting: tuple[Acting, ...],
+    generator: np.random.Generator | None,
+    before: Carried | None,
+) -> Carried:
+    """Error of one stage, row by row; without a generator stochastic effects do not act."""
+    state, motion, noise = rows
+    carried = None
+    if before is not None:
+        carried = before.error_m.T
+        noise = replace(noise, mu_position_s=noise.mu_position_s + before.ranging_shift_s)
+    world = departures(acting, state, generator, systematic_only=generator is None)
+    error = np.ascontiguousarray(stage_error(state, motion, noise, world, carried).T)
+    return Carried(error, world.ranging_shift_s)
+
+
+_NO_SHIFT = np.zeros(1)

@@ -1,0 +1,213 @@
+"""The simulator's questions, answered: cross_check, simulate, decide."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from syncline_design.model.budget import budget
+from syncline_design.model.system import SimulationError, System
+from syncline_design.simulation import distribution
+from syncline_design.simulation.distribution import Binned, Values
+from syncline_design.simulation.ensemble import ensemble_of
+from syncline_design.simulation.excursions import excursions, follows_a_file
+from syncline_design.simulation.intervals import proportion_interval, quantile_ranks
+from syncline_design.simulation.results import (
+    MonteCarlo,
+    ProportionEstimate,
+    QuantileEstimate,
+    SimulationResult,
+    histogram,
+)
+from syncline_design.simulation.sampling import JOB, error_distribution
+from syncline_design.simulation.settings import (
+    DEFAULT_MANOEUVRE,
+    SimulationSettings,
+    demand_simulable,
+)
+from syncline_design.simulation.worst_case import WorstCase, worst_cases
+
+DEFAULT_SETTINGS = SimulationSettings()
+DEFAULT_CAP = 4_000_000
+Status = Literal["pass", "fail", "indeterminate"]
+LOOK_GROWTH = 4  # each further look of `decide` has this many times the samples
+CROSS_CHECK_GAP = 1e-3  # where a cross-check stops looking: so near, relatively, to the bound
+CROSS_CHECK_ITERATIONS = 30
+
+
+def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> MonteCarlo:
+    """Quantiles, P(|error| <= limit) and the worst case at the system's own tau.
+
+    Raises SimulationError for a system or settings that cannot be simulated.
+    """
+    demand_simulable(system)
+    (worst,) = worst_cases(
+        system,
+        np.array([budget(system).tau_s]),
+        settings.seed,
+        iterations=CROSS_CHECK_ITERATIONS,
+        enough_gap=CROSS_CHECK_GAP,
+    )
+    if settings.estimator == "conditioned":
+        from syncline_design.simulation.conditioned import conditioned_monte_carlo
+
+        found = conditioned_monte_carlo(system, settings, worst)
+    else:
+        found = _monte_carlo(settings, error_distribution(system, settings), worst)
+    drawn = ensemble_of(
+        system, settings.envelope, follows_a_file(settings), excursions(system, settings)
+    )
+    return replace(found, ensemble=drawn)
+
+
+def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> SimulationResult:
+    """Monte Carlo and the worst case against the Syncline over the grid of tau."""
+    from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
+
+    found = cross_check(system, settings)
+    figures = budget(system)
+    grid = settings.tau_grid_s or DEFAULT_GRID_S
+    trajectory = None
+    if settings.envelope == "trajectory":
+        trajectory = str(settings.trajectory or DEFAULT_MANOEUVRE)
+    return SimulationResult(
+        monte_carlo=found,
+        grid=comparison(system, grid, settings.seed),
+        tau_crit_s=figures.tau_crit_s,
+        sensor_error_m=figures.sensor_error_m,
+        sync_rate_mps=figures.sync_rate_mps,
+        trajectory=trajectory,
+    )
+
+
+def _monte_carlo(
+    settings: SimulationSettings, found: Values | Binned, worst: WorstCase
+) -> MonteCarlo:
+    estimates = quantile_estimates(found, settings.quantiles, settings.confidence)
+    within = None
+    if settings.limit_m is not None:
+        count = found.within(settings.limit_m)
+        low, high = proportion_interval(count, found.count, settings.confidence)
+        within = ProportionEstimate(settings.limit_m, count / found.count, low, high)
+    return MonteCarlo(
+        samples=settings.samples,
+        seed=settings.seed,
+        envelope=settings.envelope,
+        estimator="plain",
+        effective_samples=settings.samples,
+        confidence=settings.confidence,
+        quantiles=estimates,
+        within_target=within,
+        worst_case=worst,
+        histogram=histogram(found),
+        distribution=found,
+    )
+
+
+def quantile_estimates(
+    found: Values | Binned, quantiles: tuple[float, ...], confidence: float
+) -> tuple[QuantileEstimate, ...]:
+    """Quantiles, each between two order statistics that enclose it with `confidence`."""
+    ranks = [quantile_ranks(quantile, found.count, confidence) for quantile in quantiles]
+    values = iter(found.order_statistics([rank for ends in ranks for rank in ends]))
+    estimates = []
+    for quantile in quantiles:
+        low, value, high = next(values), next(values), next(values)
+        estimates.append(QuantileEstimate(quantile, value, low, high))
+    return tuple(estimates)
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """Whether a quantile of |error| is at most a limit.
+
+    status `indeterminate`: after `samples` the interval still straddles the limit.  estimate: of
+    the quantile; within: of P(|error| <= limit), what the decision rests on.  Each of `looks`
+    looks was taken at `look_confidence`, so that all of them together are right with at least
+    `confidence` (Bonferroni).
+    """
+
+    status: Status
+    limit_m: float
+    samples: int
+    looks: int
+    confidence: float
+    look_confidence: float
+    estimate: QuantileEstimate
+    within: ProportionEstimate
+
+
+def decide(
+    system: System,
+    settings: SimulationSettings,
+    quantile: float,
+    limit_m: float,
+    cap_samples: int = DEFAULT_CAP,
+    first: MonteCarlo | None = None,
+) -> Decision:
+    """Whether the quantile of |error| is at most limit_m, sampling on while it is undecided.
+
+    Passes when P(|error| <= limit) >= quantile for the whole interval, fails when for none of it.
+    Starts with `settings.samples` (those of `first`, when given, are not drawn again) and takes
+    four times as many at each further look, up to `cap_samples`.  An error that is not a number
+    counts as beyond the limit.
+    """
+    from syncline_design.simulation.worker import tally
+
+    demand_simulable(system)
+    if not 0.0 < quantile < 1.0:
+        raise SimulationError(f"quantile: expected a number between 0 and 1, found {quantile}")
+    sizes = look_sizes(settings.samples, cap_samples)
+    look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
+    counts, within, drawn = _counted(first, settings, limit_m)
+    for size in sizes:
+        if drawn < size:
+            # a shorter first run may have ended inside a job: that job is drawn again
+            if drawn % JOB:
+                counts, within, drawn = _counted(None, settings, limit_m)
+            found, more = tally(system, settings, drawn, size, limit_m)
+            counts, within, drawn = counts + found, within + more, size
+        low, high = proportion_interval(within, size, look_confidence)
+        status = _status(low, high, quantile)
+        if status != "indeterminate":
+            break
+    (estimate,) = quantile_estimates(Binned(counts), (quantile,), look_confidence)
+    share = ProportionEstimate(limit_m, within / size, low, high)
+    looks = sizes.index(size) + 1
+    return Decision(
+        status, limit_m, size, looks, settings.confidence, look_confidence, estimate, share
+    )
+
+
+def _counted(
+    first: MonteCarlo | None, settings: SimulationSettings, limit_m: float
+) -> tuple[distribution.Counts, int, int]:
+    """(counts, how many within the limit, how many) of the samples of a first run, if any fits."""
+    counts = distribution.no_counts()
+    if first is None or not isinstance(first.distribution, Values):
+        return counts, 0, 0
+    if (first.samples, first.seed, first.envelope) != (
+        settings.samples,
+        settings.seed,
+        settings.envelope,
+    ):
+        return counts, 0, 0
+    distribution.add_counts(counts, first.distribution.errors_m)
+    return counts, first.distribution.within(limit_m), first.samples
+
+
+def _status(low: float, high: float, quantile: float) -> Status:
+    """Whether P(|error| <= limit), between low and high, reaches the quantile."""
+    if low >= quantile:
+        return "pass"
+    return "fail" if high < quantile else "indeterminate"
+
+
+def look_sizes(samples: int, cap_samples: int) -> list[int]:
+    """Sample counts of the looks: growing by LOOK_GROWTH, the last one the cap."""
+    sizes = [samples]
+    while sizes[-1] < cap_samples:
+        sizes.append(min(sizes[-1] * LOOK_GROWTH, cap_samples))
+    return sizes

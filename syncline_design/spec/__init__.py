@@ -1,0 +1,1 @@
+"""What the user wrote: YAML with places, catalogs, the spec and edits of it."""

@@ -1,0 +1,293 @@
+"""Catalogs: platforms, sensors, timestamping methods, clocks, shared hardware."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, PlainValidator, model_validator
+from pydantic_core import PydanticCustomError
+
+from syncline_design.model.quantity import Dimension, Quantity
+from syncline_design.spec.fields import (
+    AngularRate,
+    AtLeastOne,
+    Count,
+    Loc,
+    Mass,
+    Money,
+    NonNegativeLength,
+    NonNegativeTime,
+    PositiveLength,
+    PositiveTime,
+    Power,
+    Ratio,
+    Reader,
+    Record,
+    SigmaLength,
+    Speed,
+    Text,
+    Time,
+    axes,
+    did_you_mean,
+    kind_of,
+    quantity_schema,
+    read_list,
+    read_quantity,
+    refusal,
+    refusals,
+)
+
+Primitive = Literal["pps", "network", "tov", "trigger", "arrival"]
+Modality = Literal["position", "attitude", "ranging"]
+Need = Literal["gnss"]  # what an entry cannot work without
+Sigma = float | tuple[float, ...]
+
+SIGMAS_OF: dict[str, tuple[str, ...]] = {
+    "position": ("sigma_position",),
+    "attitude": ("sigma_attitude",),
+    "ranging": ("sigma_range", "sigma_bearing"),
+}
+
+
+def _read_basis(value: Any) -> Any:
+    if value == "assumption":
+        return value
+    if isinstance(value, dict) and value and all(v == "assumption" for v in value.values()):
+        return value
+    wanted = "assumption, or a mapping such as {cost: assumption}"
+    raise refusal("a basis that is not known", wanted, kind_of(value))
+
+
+Basis = Annotated[
+    Any,
+    Reader(
+        _read_basis,
+        {
+            "anyOf": [
+                {"const": "assumption"},
+                {"type": "object", "additionalProperties": {"const": "assumption"}},
+            ]
+        },
+    ),
+]
+
+
+class Entry(Record):
+    """What every catalog entry may say about itself."""
+
+    name: str = ""
+    source: str = ""
+    basis: Basis | None = None  # "assumption", or per figure: {cost: assumption}
+    note: str = ""
+
+    def is_assumed(self, figure: str) -> bool:
+        """Whether a figure of this entry has no public source."""
+        if isinstance(self.basis, dict):
+            return figure in self.basis
+        return bool(self.basis == "assumption")
+
+    @model_validator(mode="after")
+    def _basis_names_figures(self) -> Entry:
+        if isinstance(self.basis, dict):
+            known = list(type(self).model_fields)
+            wrong = [key for key in self.basis if key not in known]
+            if wrong:
+                raise refusals(
+                    (("basis", key), refusal("no such figure", hint=did_you_mean(key, known)))
+                    for key in wrong
+                )
+        return self
+
+
+class PlatformEntry(Entry):
+    v_max: Speed
+    omega_max: AngularRate
+    distance: PositiveLength
+    baseline: NonNegativeLength
+
+
+class SensorEntry(Entry):
+    """A sensor; the sigmas of its modality are due, those of others refused.
+
+    A single sigma_position, sigma_attitude or sigma_bearing holds for every axis.
+    """
+
+    modality: Modality
+    type: str = ""
+    sigma_position: Annotated[Sigma, axes(Dimension.LENGTH, ("north", "east", "down"))] | None = (
+        None
+    )
+    sigma_attitude: Annotated[Sigma, axes(Dimension.ANGLE, ("roll", "pitch", "yaw"))] | None = None
+    sigma_range: SigmaLength | None = None
+    sigma_bearing: Annotated[Sigma, axes(Dimension.ANGLE, ("azimuth", "elevation"))] | None = None
+    primitives: tuple[Primitive, ...]
+    needs: tuple[Need, ...] = ()
+    cost: Money | None = None
+    mass: Mass | None = None
+    power: Power | None = None
+
+    @model_validator(mode="after")
+    def _sigmas_fit_modality(self) -> SensorEntry:
+        errors: list[tuple[Loc, PydanticCustomError]] = []
+        for modality, names in SIGMAS_OF.items():
+            for name in names:
+                given = getattr(self, name) is not None
+                if modality == self.modality and not given:
+                    errors.append(
+                        ((name,), refusal(f"missing for a sensor of modality {modality}"))
+                    )
+                elif modality != self.modality and given:
+                    message = f"a figure of {modality} sensors"
+                    errors.append(((name,), refusal(message, found=f"modality {self.modality}")))
+        if errors:
+            raise refusals(errors)
+        return self
+
+    @property
+    def serves(self) -> tuple[Primitive, ...]:
+        """Primitives of the sensor; arrival, which every sensor has, included."""
+        return tuple(dict.fromkeys((*self.primitives, "arrival")))
+
+
+class UniformError(Record):
+    distribution: Literal["uniform"]
+    low: Time
+    high: Time
+    calibrated: NonNegativeTime | None = None  # mean removed, this much remains
+
+    @model_validator(mode="after")
+    def _ends_in_order(self) -> UniformError:
+        if not self.low <= self.high:
+            raise refusals([(("low",), refusal("above high", "low <= high"))])
+        return self
+
+
+class NormalError(Record):
+    distribution: Literal["normal"]
+    mean: Time
+    std: NonNegativeTime
+    calibrated: NonNegativeTime | None = None
+
+
+class ConstantError(Record):
+    distribution: Literal["constant"]
+    value: Time
+    calibrated: NonNegativeTime | None = None
+
+
+def _read_times(value: Any) -> tuple[Quantity, ...]:
+    return read_list(value, "times", lambda item: read_quantity(item, Dimension.TIME))
+
+
+_TIMES_SCHEMA = {"type": "array", "items": quantity_schema(Dimension.TIME), "minItems": 1}
+
+
+class EmpiricalError(Record):
+    """Measured values, given here or in a file (one per line) whose values loading puts here."""
+
+    distribution: Literal["empirical"]
+    values: Annotated[tuple[float, ...], Reader(_read_times, _TIMES_SCHEMA)] | None = None
+    file: str | None = None
+    calibrated: NonNegativeTime | None = None
+
+    @model_validator(mode="after")
+    def _has_values(self) -> EmpiricalError:
+        if self.values is None and self.file is None:
+            raise refusals([(("values",), refusal("missing", "values, or a file with values"))])
+        return self
+
+
+TimestampError = UniformError | NormalError | ConstantError | EmpiricalError
+_ERRORS: dict[str, type[TimestampError]] = {
+    "uniform": UniformError,
+    "normal": NormalError,
+    "constant": ConstantError,
+    "empirical": EmpiricalError,
+}
+
+
+def read_error(value: Any) -> TimestampError:
+    """A timestamp error; its distribution says which keys it has."""
+    if isinstance(value, UniformError | NormalError | ConstantError | EmpiricalError):
+        return value
+    if not isinstance(value, dict):
+        example = "{distribution: uniform, low: 0 ms, high: 16 ms}"
+        raise refusal("not a timestamp error", f"a mapping such as {example}", kind_of(value))
+    kind = value.get("distribution")
+    if "distribution" not in value:
+        raise refusal("missing key distribution", "uniform, normal, constant or empirical")
+    if not isinstance(kind, str) or kind not in _ERRORS:
+        hint = did_you_mean(kind, _ERRORS) if isinstance(kind, str) else ""
+        wanted = "uniform, normal, constant or empirical"
+        error = refusal("unknown distribution", wanted, kind_of(kind), hint)
+        raise refusals([(("distribution",), error)])
+    return _ERRORS[kind].model_validate(value)
+
+
+ErrorEntry = Annotated[
+    TimestampError, PlainValidator(read_error, json_schema_input_type=TimestampError)
+]
+
+
+class TimestampingEntry(Entry):
+    """A timestamping method; cost, mass and power count per sensor that uses it."""
+
+    primitives: Annotated[tuple[Primitive, ...], AtLeastOne]
+    timeline: Literal["host", "utc"] = "host"
+    error: ErrorEntry
+    needs: tuple[Need, ...] = ()
+    cost: Money | None = None
+    mass: Mass | None = None
+    power: Power | None = None
+    requires: dict[str, Count] = Field(default_factory=dict)  # channels of shared hardware
+
+
+class InfrastructureEntry(Entry):
+    """Shared hardware, bought once per vehicle and per full set of channels."""
+
+    channels: Count
+    needs: tuple[Need, ...] = ()
+    cost: Money | None = None
+    mass: Mass | None = None
+    power: Power | None = None
+
+
+class ClockEntry(Entry):
+    """How a vehicle's host clock is disciplined; offset is host against UTC."""
+
+    offset: ErrorEntry
+    drift: Ratio | None = None  # free-running clock: ppm, times holdover
+    holdover: PositiveTime | None = None
+    needs: tuple[Need, ...] = ()
+    cost: Money | None = None
+    mass: Mass | None = None
+    power: Power | None = None
+    requires: dict[str, Count] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _drift_has_holdover(self) -> ClockEntry:
+        if (self.drift is None) != (self.holdover is None):
+            given, due = ("drift", "holdover") if self.holdover is None else ("holdover", "drift")
+            raise refusals(
+                [((due,), refusal(f"missing beside {given}", "drift and holdover, or neither"))]
+            )
+        return self
+
+
+class Catalog(Record):
+    """All entries of one file, or of several merged."""
+
+    platforms: dict[Text, PlatformEntry] = Field(default_factory=dict)
+    sensors: dict[Text, SensorEntry] = Field(default_factory=dict)
+    timestamping: dict[Text, TimestampingEntry] = Field(default_factory=dict)
+    infrastructure: dict[Text, InfrastructureEntry] = Field(default_factory=dict)
+    clocks: dict[Text, ClockEntry] = Field(default_factory=dict)
+
+
+SECTIONS = tuple(Catalog.model_fields)
+
+
+class CatalogFile(Catalog):
+    """One catalog file: entries, and further catalog files it draws in."""
+
+    catalogs: tuple[Text, ...] = ()

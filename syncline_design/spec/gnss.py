@@ -1,0 +1,117 @@
+"""Where GNSS is: which stages receive it, which get its time by a cable, what cannot do without.
+
+A first stage has GNSS unless it lies at a depth; later stages have none; `gnss:` in a stage says
+otherwise.  A cable (`timing_from:`) brings time, and passes on, but no antenna.  A host clock is
+the vehicle's: one of the stages that share it has to have the time.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from syncline_design.spec.catalog import Catalog, ClockEntry, SensorEntry, TimestampingEntry
+from syncline_design.spec.spec import Spec, StageChoice
+
+GENERIC = ("gnss", "gps")  # inside a word too: dgps, GnssCompass
+NAMES = {"glonass", "galileo", "beidou", "rtk", "ppp", "sbas"}
+Code = Literal["gnss"]
+
+
+@dataclass(frozen=True, slots=True)
+class Barred:
+    """Why an entry cannot work where it would stand: what the entry says, what the spec offers."""
+
+    code: Code
+    reason: str
+    figure: str
+    limit: str
+
+
+def has_gnss(spec: Spec, stage: StageChoice) -> bool:
+    """Whether a stage has GNSS of its own."""
+    if stage.gnss is not None:
+        return stage.gnss
+    return stage.name == spec.stages[0].name and not _is_submerged(stage)
+
+
+def has_gnss_time(spec: Spec, stage: StageChoice) -> bool:
+    """Whether a stage has GNSS time, its own or by a cable from a stage that has it."""
+    return any(has_gnss(spec, one) for one in _along_cables(spec, stage))
+
+
+def _along_cables(spec: Spec, stage: StageChoice) -> Iterator[StageChoice]:
+    """The stage and those that its time comes from, one after the other."""
+    by_name = {one.name: one for one in spec.stages}
+    for _ in spec.stages:
+        yield stage
+        if stage.timing_from is None:
+            return
+        stage = by_name[stage.timing_from]
+
+
+def _is_submerged(stage: StageChoice) -> bool:
+    return stage.depth is not None and stage.depth > 0
+
+
+def is_receiver(kind: str) -> bool:
+    """Whether a sensor's free word for its type names a GNSS receiver: gnss, gps, gnss_rtk, DGPS.
+
+    gnss/ins counts: without its receiver it is an INS, and its type says so.
+    """
+    words = re.split(r"[^a-z0-9]+", kind.casefold())
+    return any(word in NAMES or any(part in word for part in GENERIC) for word in words)
+
+
+def barred_sensor(spec: Spec, stage: StageChoice, name: str, sensor: SensorEntry) -> Barred | None:
+    """Why a sensor cannot work on a stage; None where it can."""
+    needs = "gnss" in sensor.needs or is_receiver(sensor.type)
+    if not needs or has_gnss(spec, stage):
+        return None
+    hint = "write gnss: yes in the stage where its antenna is above the water"
+    reason = f"{name} needs GNSS; {stage.name} has none{_why(spec, stage)}; {hint}"
+    return Barred("gnss", reason, "needs: gnss", "gnss: no")
+
+
+def barred_method(
+    spec: Spec, stage: StageChoice, name: str, method: TimestampingEntry, catalog: Catalog
+) -> Barred | None:
+    """Why a timestamping method cannot work on a stage; None where it can."""
+    if not _needs_gnss(method, catalog) or has_gnss_time(spec, stage):
+        return None
+    return _without_time(stage.name, name, _why(spec, stage))
+
+
+def barred_clock(
+    spec: Spec, vehicle: str, name: str, clock: ClockEntry, catalog: Catalog
+) -> Barred | None:
+    """Why a clock cannot be disciplined so on a vehicle; None where it can."""
+    stages = [stage for stage in spec.stages if stage.vehicle_name == vehicle]
+    if not _needs_gnss(clock, catalog) or any(has_gnss_time(spec, stage) for stage in stages):
+        return None
+    return _without_time(vehicle, name, _why(spec, stages[0]))
+
+
+def _without_time(where: str, name: str, why: str) -> Barred:
+    hint = (
+        "write gnss: yes in the stage if it has GNSS, timing_from: STAGE if a cable brings its time"
+    )
+    reason = f"{name} needs GNSS time; {where} has none{why}; {hint}"
+    return Barred("gnss", reason, "needs: gnss", "gnss: no")
+
+
+def _why(spec: Spec, stage: StageChoice) -> str:
+    """How the spec comes to say that a stage has no GNSS."""
+    if stage.gnss is not None:
+        return " (gnss: no)"
+    if _is_submerged(stage):
+        return f" (depth: {getattr(stage.depth, 'text', stage.depth)})"
+    return " (a later stage has none unless it says so)" if stage != spec.stages[0] else ""
+
+
+def _needs_gnss(entry: TimestampingEntry | ClockEntry, catalog: Catalog) -> bool:
+    """Whether an entry, or shared hardware that it requires, needs GNSS."""
+    hardware = (catalog.infrastructure[name] for name in entry.requires)
+    return "gnss" in entry.needs or any("gnss" in one.needs for one in hardware)

@@ -1,0 +1,102 @@
+"""The systematic effects that a spec lists: checked, described, and what they add to the budget."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from syncline_design.model.estimates import figure
+from syncline_design.model.system import EffectEntry
+from syncline_design.spec.load import BadInput, LoadedSpec
+from syncline_design.spec.spec import EffectChoice
+from syncline_design.spec.yaml_text import KeyPath, Problem, show_path
+
+if TYPE_CHECKING:
+    from syncline_design.effects.record import Parameter
+
+
+def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:
+    """The spec's effects for the simulator; BadInput where one does not exist or fit."""
+    if not loaded.spec.effects:
+        return ()
+    problems = [
+        problem
+        for index, effect in enumerate(loaded.spec.effects)
+        for problem in _problems(loaded, ("effects", index), effect)
+    ]
+    if problems:
+        raise BadInput(tuple(problems))
+    last = loaded.spec.stages[-1].name
+    only = loaded.spec.stages[0].name
+    return tuple(
+        EffectEntry(
+            effect.effect,
+            effect.sensor,
+            effect.stage or (last if effect.sensor == "target" else only),
+            tuple((name, _plain(value)) for name, value in effect.parameters.items()),
+        )
+        for effect in loaded.spec.effects
+    )
+
+
+def _plain(value: float | str) -> float | str:
+    return value if isinstance(value, str) else float(value)
+
+
+def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator[Problem]:
+    from syncline_design.effects import registry
+
+    record = registry().get(effect.effect)
+    if record is None:
+        yield _problem(loaded, (*at, "effect"), "unknown effect", effect.effect, list(registry()))
+        return
+    if effect.sensor not in record.sensors:
+        message = f"{effect.effect} does not act on this sensor"
+        yield _problem(loaded, (*at, "sensor"), message, effect.sensor, list(record.sensors))
+    names = [parameter.name for parameter in record.parameters]
+    for name in effect.parameters:
+        if name not in names:
+            yield _problem(loaded, (*at, "parameters", name), "unknown parameter", name, names)
+    for parameter in record.parameters:
+        place = (*at, "parameters")
+        if parameter.name not in effect.parameters:
+            yield _problem(loaded, place, f"missing parameter {parameter.name}", "", names)
+        elif misfit := _misfit(effect.parameters[parameter.name], parameter):
+            wanted = list(parameter.choices) or [parameter.domain]
+            found = str(effect.parameters[parameter.name])
+            yield _problem(loaded, (*place, parameter.name), misfit, found, wanted)
+
+
+def _misfit(value: float | str, parameter: Parameter) -> str | None:
+    """What is wrong with a parameter's value."""
+    if isinstance(value, str) != bool(parameter.choices):
+        return "wrong kind of value"
+    if isinstance(value, str):
+        return None if value in parameter.choices else "not one of the choices"
+    return None if parameter.holds(float(value)) else "out of range"
+
+
+def _problem(
+    loaded: LoadedSpec, path: KeyPath, message: str, found: str, known: list[str]
+) -> Problem:
+    line, column = next(
+        loaded.positions[path[:n]] for n in range(len(path), -1, -1) if path[:n] in loaded.positions
+    )
+    close = get_close_matches(found, known, 1)
+    hint = f"did you mean {close[0]}?" if close else ""
+    expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]
+    return Problem(str(loaded.path), line, column, show_path(path), message, expected, found, hint)
+
+
+def describe(entry: EffectEntry) -> str:
+    """An effect in one sentence, its parameters printed as `diagnose` prints them."""
+    from syncline_design.effects import registry
+
+    effect = registry()[entry.effect]
+    units = {parameter.name: parameter.unit for parameter in effect.parameters}
+    shown = {
+        name: value if isinstance(value, str) else figure(value, None, units.get(name, ""))
+        for name, value in entry.parameters
+    }
+    return effect.sentence.format(sensor=entry.sensor, **shown)

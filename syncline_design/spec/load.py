@@ -1,0 +1,235 @@
+"""A spec file with its catalogs, checked as a whole: everything wrong is named in one go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from importlib.resources import files
+from pathlib import Path
+
+from syncline_design.machine.input_files import (
+    FileContent,
+    FilesRead,
+    UnsuitableError,
+    noting,
+    read_plain,
+)
+from syncline_design.spec.catalog import Catalog
+from syncline_design.spec.files import (
+    BUILTIN_PACKAGE,
+    Collection,
+    add_builtin,
+    add_own,
+    fill_empirical,
+    inside_folder,
+    problem_at,
+)
+from syncline_design.spec.references import currency_problems, misfits, missing_figures, unknown_ids
+from syncline_design.spec.spec import Spec
+from syncline_design.spec.validation import validate
+from syncline_design.spec.yaml_text import Document, KeyPath, Position, Problem, parse, read
+
+MAX_SHOWN = 50
+MOST_TRAJECTORY_BYTES = 2**28
+BUILTIN_FOLDER = Path(str(files(BUILTIN_PACKAGE))).resolve()
+
+
+class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the program
+    """What is wrong with a user's files; printing it gives one line per problem."""
+
+    def __init__(self, problems: tuple[Problem, ...]) -> None:
+        # By place, then by text: the order of a set differs from run to run.
+        self.problems = tuple(sorted(set(problems), key=_place_and_text))
+        super().__init__(self._lines())
+
+    def _lines(self) -> str:
+        lines = [str(problem) for problem in self.problems[:MAX_SHOWN]]
+        if len(self.problems) > MAX_SHOWN:
+            lines.append(f"... and {len(self.problems) - MAX_SHOWN} more")
+        return "\n".join(lines)
+
+
+def _place_and_text(problem: Problem) -> tuple[str, int, int, str]:
+    return problem.file, problem.line, problem.column, str(problem)
+
+
+@dataclass(frozen=True)
+class LoadedSpec:
+    """A spec that can be worked with: its catalogs merged, every reference found.
+
+    positions: key path, as in ("requirements", 0, "limit"), to (line, column).
+    origins: (section, id) of a catalog entry to the file:line:column that defines it.
+    """
+
+    spec: Spec
+    catalog: Catalog
+    path: Path
+    positions: dict[KeyPath, Position] = field(repr=False)
+    spec_sha256: str
+    catalogs_sha256: str
+    text: str = field(repr=False)
+    origins: dict[tuple[str, str], str] = field(repr=False)
+    builtin: bool = True
+    files: tuple[tuple[str, str], ...] = ()  # read besides: name from the spec's folder, SHA-256
+    trajectory: FileContent | None = None
+
+    def place(self, path: KeyPath) -> str:
+        """`file:line:column` of a key path, or of the nearest thing around it."""
+        for length in range(len(path), -1, -1):
+            if path[:length] in self.positions:
+                line, column = self.positions[path[:length]]
+                return f"{self.path}:{line}:{column}"
+        return str(self.path)
+
+
+def load(path: str | Path, builtin: bool = True) -> LoadedSpec:
+    """Read a spec and its catalogs; BadInput names everything that is wrong with them.
+
+    builtin: whether the shipped catalogs are drawn in too.
+    """
+    with noting() as found:
+        loaded = _loaded(read(path), Path(path), builtin)
+    return replace(loaded, files=_beside(loaded, found))
+
+
+def load_text(text: str, path: str | Path, builtin: bool = True) -> LoadedSpec:
+    """The same for a text that is not on disk yet; `path` says where it would lie."""
+    return _loaded(parse(text, str(path)), Path(path), builtin)
+
+
+def catalogs_of(document: Document, path: Path, builtin: bool = True) -> Collection:
+    """The catalogs that a spec draws in: the shipped ones and its own."""
+    collection = Collection()
+    if builtin:
+        add_builtin(collection)
+    add_own(collection, document, path.parent)
+    return collection
+
+
+def load_document(
+    document: Document, path: Path, collection: Collection, builtin: bool = True
+) -> LoadedSpec:
+    """A spec that was read already, with catalogs drawn together once for many specs."""
+    return _complete(document, path, collection.copy(), builtin)
+
+
+def load_builtin() -> Catalog:
+    """The shipped catalogs alone."""
+    collection = Collection()
+    add_builtin(collection)
+    _stop_at(collection.problems)
+    return collection.catalog()
+
+
+def load_catalogs(builtin: bool = True) -> Collection:
+    """The shipped catalogs with the place and digest of every entry."""
+    collection = Collection()
+    if builtin:
+        add_builtin(collection)
+    _stop_at(collection.problems)
+    return collection
+
+
+def _stop_at(problems: list[Problem]) -> None:
+    if problems:
+        raise BadInput(tuple(problems))
+
+
+def _loaded(document: Document, path: Path, builtin: bool) -> LoadedSpec:
+    if document.data is None:
+        raise BadInput(document.problems)
+    return _complete(document, path, catalogs_of(document, path, builtin), builtin)
+
+
+def _complete(document: Document, path: Path, collection: Collection, builtin: bool) -> LoadedSpec:
+    filled = fill_empirical(document, path.parent, path.parent, collection)
+    spec, problems = validate(Spec, document, filled)
+    problems = [*document.problems, *problems, *collection.problems]
+    problems += unknown_ids(document, collection)
+    if spec is None:
+        raise BadInput(tuple(problems))
+    found, trajectory = _named_files(document, spec, path.parent)
+    _stop_at(problems + found)
+    catalog = collection.catalog()
+    _stop_at(misfits(document, spec, catalog) + currency_problems(document, spec, catalog))
+    _stop_at(missing_figures(document, spec, catalog))
+    return LoadedSpec(
+        spec, catalog, path, document.positions, document.sha256, collection.sha256(),
+        document.text, collection.origins, builtin, trajectory=trajectory,
+    )  # fmt: skip
+
+
+def _named_files(
+    document: Document, spec: Spec, folder: Path
+) -> tuple[list[Problem], FileContent | None]:
+    """Files that the spec names for later: they have to be there, inside its folder.
+
+    The trajectory is read at once, so that a verdict rests on one content of it.
+    """
+    named = enumerate(spec.log.files if spec.log is not None else ())
+    found = [
+        inside_folder(document, ("log", "files", i), name, folder, folder.resolve())
+        for i, name in named
+    ]
+    problems = [item for item in found if isinstance(item, Problem)]
+    recorded = _recorded_trajectory(document, spec, folder)
+    if isinstance(recorded, Problem):
+        return [*problems, recorded], None
+    return problems, recorded
+
+
+def _recorded_trajectory(
+    document: Document, spec: Spec, folder: Path
+) -> FileContent | Problem | None:
+    choice = spec.monte_carlo.trajectory
+    if choice is None or choice.file is None:
+        return None
+    at: KeyPath = ("monte_carlo", "trajectory", "file")
+    inside = inside_folder(document, at, choice.file, folder, folder.resolve())
+    if isinstance(inside, Problem):
+        return inside
+    try:
+        return FileContent(folder / choice.file, read_plain(inside, MOST_TRAJECTORY_BYTES))
+    except (OSError, UnsuitableError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        return problem_at(document, at, f"cannot read the file: {reason.lower()}")
+
+
+def _beside(loaded: LoadedSpec, found: FilesRead) -> tuple[tuple[str, str], ...]:
+    """What a spec was read with: its own catalogs, files of delays, trajectory; names, hashes."""
+    folder = loaded.path.parent.resolve()
+    own = {Path(path).resolve(): digest for path, digest in found.contents.items()}
+    own.pop(loaded.path.resolve(), None)
+    return tuple(
+        (path.relative_to(folder).as_posix(), digest)
+        for path, digest in sorted(own.items())
+        if path.is_relative_to(folder) and not path.is_relative_to(BUILTIN_FOLDER)
+    )
+
+
+__all__ = [
+    "BadInput",
+    "LoadedSpec",
+    "Problem",
+    "catalogs_of",
+    "load",
+    "load_builtin",
+    "load_document",
+    "load_text",
+    "problem_at",
+]
+
+
+def without_simulated(loaded: LoadedSpec) -> LoadedSpec:
+    """The spec without its monte_carlo requirements, every other one still at its own line."""
+    kept = [i for i, r in enumerate(loaded.spec.requirements) if r.kind != "monte_carlo"]
+    requirements = tuple(loaded.spec.requirements[i] for i in kept)
+    renumbered = {old: new for new, old in enumerate(kept)}
+    positions: dict[KeyPath, Position] = {}
+    for path, position in loaded.positions.items():
+        if path[:1] == ("requirements",) and len(path) > 1:
+            if path[1] not in renumbered:
+                continue
+            path = ("requirements", renumbered[int(path[1])], *path[2:])
+        positions[path] = position
+    spec = loaded.spec.model_copy(update={"requirements": requirements})
+    return replace(loaded, spec=spec, positions=positions)

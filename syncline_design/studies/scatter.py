@@ -1,0 +1,101 @@
+"""A sampled study as points over two factors: only what was computed, nothing in between."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from syncline_design.spec.factors import Factor, figure_of
+from syncline_design.spec.yaml_text import plain_scalar
+from syncline_design.studies.summary import Summary, axis_values, varied
+
+LOG_SPAN = 30.0  # an axis whose ends differ by more than this factor is logarithmic
+
+
+@dataclass(frozen=True, slots=True)
+class ScatterAxis:
+    """One axis: figures in `unit` ("" for plain numbers), or words at 0, 1, 2 and so on."""
+
+    key: str
+    unit: str = ""
+    words: tuple[str, ...] = ()
+    log: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ScatterPoint:
+    """One case: where it lies, how it ended, what its design costs."""
+
+    x: float
+    y: float
+    verdict: str
+    cost: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Scatter:
+    """Every case of a study in the plane of two factors; others: what varies besides."""
+
+    x: ScatterAxis
+    y: ScatterAxis
+    points: tuple[ScatterPoint, ...]
+    others: tuple[str, ...]
+
+
+def scatter(summary: Summary) -> Scatter | None:
+    """The cases over the two factors that the study names, else over its first two of figures.
+
+    None where fewer than two factors vary.
+    """
+    chosen = _axes(summary)
+    if chosen is None:
+        return None
+    (across, first), (up, second) = chosen
+    x, y = _axis(first), _axis(second)
+    points = tuple(
+        ScatterPoint(
+            _place(x, brief.labels[across]),
+            _place(y, brief.labels[up]),
+            brief.verdict,
+            brief.cost if brief.meets else None,
+        )
+        for brief in summary.briefs
+    )
+    others = tuple(f.key for i, f in varied(summary) if i not in (across, up))
+    return Scatter(x, y, points, others)
+
+
+def _axes(summary: Summary) -> tuple[tuple[int, Factor], tuple[int, Factor]] | None:
+    several = varied(summary)
+    named = summary.result.study.heat_map
+    if named is not None:
+        by_key = {f.key: (i, f) for i, f in enumerate(summary.result.study.factors)}
+        return by_key[named.x], by_key[named.y]
+    # Sampled figures first, then other figures; words last, and never across if avoidable.
+    order = sorted(several, key=lambda item: (not _unit(item[1])[0], item[1].origin != "sample"))
+    if len(order) < 2:
+        return None
+    return order[0], order[1]
+
+
+def _unit(factor: Factor) -> tuple[bool, str]:
+    """Whether a factor's values are figures of one unit, and that unit."""
+    if any(figure_of(value) is None for value in factor.values):
+        return False, ""
+    units = {text.partition(" ")[2].strip() for text in axis_values(factor)}
+    return len(units) == 1, units.pop()
+
+
+def _axis(factor: Factor) -> ScatterAxis:
+    values = axis_values(factor)
+    figures, unit = _unit(factor)
+    if not figures:
+        return ScatterAxis(factor.key, words=values)
+    numbers = [float(text.partition(" ")[0]) for text in values]
+    low, high = min(numbers), max(numbers)
+    return ScatterAxis(factor.key, unit, log=low > 0.0 and high > LOG_SPAN * low)
+
+
+def _place(axis: ScatterAxis, text: str) -> float:
+    if axis.words:
+        return float(axis.words.index(text))
+    return float(plain_scalar(text.partition(" ")[0]))

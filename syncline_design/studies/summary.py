@@ -1,0 +1,259 @@
+"""What a study says as a whole: cheapest cost over two factors, who wins where, where it ends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from syncline_design.spec.factors import Factor, figure_of, label
+from syncline_design.studies.result import CaseResult, StudyResult
+
+MOST_FRONTS = 500
+MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
+
+
+@dataclass(frozen=True, slots=True)
+class Pick:
+    """One role of a design: stage.role, sensor, and how it is stamped."""
+
+    role: str
+    sensor: str
+    name: str
+    timestamping: str
+
+
+@dataclass(frozen=True, slots=True)
+class Brief:
+    """One case in a line; labels in the order of the study's factors."""
+
+    number: int
+    base: int
+    labels: tuple[str, ...]
+    verdict: str
+    cost: float | None
+    error_m: float | None
+    picks: tuple[Pick, ...]
+
+    @property
+    def meets(self) -> bool:
+        """Whether the case's design meets its requirements."""
+        return self.verdict == "meets"
+
+
+@dataclass(frozen=True, slots=True)
+class Front:
+    """One exact front of cost against error, and the cases that share it."""
+
+    points: tuple[tuple[float, float], ...]
+    cases: tuple[int, ...]  # numbers
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """Every case in a line, and the fronts that differ."""
+
+    result: StudyResult
+    briefs: tuple[Brief, ...]
+    fronts: tuple[Front, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class HeatMap:
+    """Least cost of a meeting case over two factors; None where no case meets."""
+
+    x: Factor
+    y: Factor
+    x_labels: tuple[str, ...]
+    y_labels: tuple[str, ...]
+    cost: tuple[tuple[float | None, ...], ...]  # [y][x]
+    picks: tuple[tuple[str, ...], ...]  # the payload of that case
+    undecided: int = 0  # cells without a cost in which a case got no verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Winner:
+    """One option of a role: in how many meeting cases it was chosen, and between which values."""
+
+    pick: Pick
+    cases: int
+    of: int
+    where: tuple[str, ...]  # per factor, the values at which it wins
+
+
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """Along one factor, everything else fixed: neighbours of which one meets and one does not."""
+
+    factor: str
+    met: str
+    missed: str
+    fixed: tuple[tuple[str, str], ...]
+    why: str  # verdict at the value that misses
+
+
+def summarise(result: StudyResult) -> Summary:
+    """One pass over all cases."""
+    briefs: list[Brief] = []
+    fronts: dict[tuple[tuple[float, float], ...], list[int]] = {}
+    for case in result.cases():
+        briefs.append(_brief(case))
+        points = tuple((p["cost"], p["error_m"]) for p in case.record.get("front") or ())
+        if points and (points in fronts or len(fronts) < MOST_FRONTS):
+            fronts.setdefault(points, []).append(case.number)
+    found = tuple(Front(points, tuple(cases)) for points, cases in fronts.items())
+    return Summary(result, tuple(briefs), found)
+
+
+def _brief(case: CaseResult) -> Brief:
+    return Brief(
+        case.number, case.base, tuple(case.labels.values()), case.verdict,
+        case.figure("design", "cost"), case.figure("syncline", "total_m"), tuple(picks_of(case)),
+    )  # fmt: skip
+
+
+def picks_of(case: CaseResult) -> Iterator[Pick]:
+    """The roles of a case's design."""
+    for stage in (case.record.get("design") or {}).get("stages") or ():
+        for role, entry in stage["roles"].items():
+            stamping = f"{entry['timestamping']} ({entry['primitive']})"
+            sensor = str(entry["sensor"])
+            yield Pick(f"{stage['name']}.{role}", sensor, entry.get("name") or sensor, stamping)
+
+
+def varied(summary: Summary) -> list[tuple[int, Factor]]:
+    """Factors with more than one value, and their place among all factors."""
+    factors = summary.result.study.factors
+    return [(i, f) for i, f in enumerate(factors) if len(set(map(label, f.values))) > 1]
+
+
+def axis_values(factor: Factor) -> tuple[str, ...]:
+    """The labels of a factor along an axis: figures by size, all else as listed."""
+    values = list(dict.fromkeys((label(v), figure_of(v)) for v in factor.values))
+    kinds = {figure[1] if figure is not None else "" for _, figure in values}
+    if len(kinds) == 1 and "" not in kinds:
+        values.sort(key=lambda item: item[1] or (0.0, ""))
+    return tuple(text for text, _ in values)
+
+
+def heat_map(summary: Summary) -> HeatMap | None:
+    """The study's heat map: the factors it names, else its first two, those of the grid first.
+
+    None where a cell of it was never computed, as between the points of a sample: an empty cell
+    would read as one that nothing meets (`scatter` shows such a study).
+    """
+    study = summary.result.study
+    if study.heat_map is not None:
+        named = {f.key: f for f in study.factors}
+        chosen = [named[study.heat_map.x], named[study.heat_map.y]]
+    else:
+        several = sorted((f for _, f in varied(summary)), key=lambda f: f.origin != "grid")
+        chosen = [f for f in several if len(axis_values(f)) <= MOST_CELLS][:2]
+    if len(chosen) < 2 or any(len(axis_values(f)) > MOST_CELLS for f in chosen):
+        return None
+    x, y = chosen
+    return _filled(summary, x, y) if _covered(summary, x, y) else None
+
+
+def _covered(summary: Summary, x: Factor, y: Factor) -> bool:
+    """Whether every combination of the two factors' values was computed."""
+    factors = summary.result.study.factors
+    across, up = factors.index(x), factors.index(y)
+    computed = {(brief.labels[across], brief.labels[up]) for brief in summary.briefs}
+    return len(computed) == len(axis_values(x)) * len(axis_values(y))
+
+
+def _filled(summary: Summary, x: Factor, y: Factor) -> HeatMap:
+    factors = summary.result.study.factors
+    across, up = factors.index(x), factors.index(y)
+    best: dict[tuple[str, str], Brief] = {}
+    for brief in summary.briefs:
+        if brief.meets and brief.cost is not None:
+            cell = (brief.labels[across], brief.labels[up])
+            held = best.get(cell)
+            if held is None or brief.cost < (held.cost or 0.0):
+                best[cell] = brief
+    open_cells = {
+        (brief.labels[across], brief.labels[up])
+        for brief in summary.briefs
+        if brief.verdict == "indeterminate"
+    }
+    columns, rows = axis_values(x), axis_values(y)
+    found = [[best.get((column, row)) for column in columns] for row in rows]
+    return HeatMap(
+        x, y, columns, rows,
+        tuple(tuple(None if b is None else b.cost for b in row) for row in found),
+        tuple(tuple("" if b is None else payload(b) for b in row) for row in found),
+        len(open_cells - set(best)),
+    )  # fmt: skip
+
+
+def payload(brief: Brief) -> str:
+    """The sensors of a case in a line."""
+    return ", ".join(pick.name for pick in brief.picks)
+
+
+def winners(summary: Summary) -> list[Winner]:
+    """Options that a meeting case chose, most frequent first within each role."""
+    meeting = [brief for brief in summary.briefs if brief.meets]
+    held: dict[Pick, list[Brief]] = {}
+    for brief in meeting:
+        for pick in brief.picks:
+            held.setdefault(pick, []).append(brief)
+    several = varied(summary)
+    roles = list(dict.fromkeys(pick.role for pick in held))
+    order = sorted(held, key=lambda p: (roles.index(p.role), -len(held[p]), p.sensor))
+    return [
+        Winner(
+            pick, len(held[pick]), sum(any(p.role == pick.role for p in b.picks) for b in meeting),
+            tuple(_extent(factor, {b.labels[i] for b in held[pick]}) for i, factor in several),
+        )
+        for pick in order
+    ]  # fmt: skip
+
+
+def _extent(factor: Factor, present: set[str]) -> str:
+    """`40 m to 80 m`, `everywhere`, or the values one by one."""
+    ordered = [text for text in axis_values(factor) if text in present]
+    if len(ordered) == len(axis_values(factor)):
+        return "everywhere"
+    if all(figure_of(value) is not None for value in factor.values) and len(ordered) > 2:
+        return f"{ordered[0]} to {ordered[-1]}"
+    return ", ".join(ordered[:6]) + (", ..." if len(ordered) > 6 else "")
+
+
+def boundaries(summary: Summary) -> list[Boundary]:
+    """Where feasibility ends: along every grid factor of figures, with all the others fixed."""
+    study = summary.result.study
+    found: list[Boundary] = []
+    for place, factor in varied(summary):
+        if factor.origin != "grid" or any(figure_of(v) is None for v in factor.values):
+            continue
+        lines: dict[Any, dict[str, Brief]] = {}
+        for brief in summary.briefs:
+            others = brief.labels[:place] + brief.labels[place + 1 :]
+            drawn = brief.number % study.samples if study.samples > 1 else 0
+            lines.setdefault((brief.base, others, drawn), {})[brief.labels[place]] = brief
+        order = axis_values(factor)
+        for (base, others, _), line in lines.items():
+            found += _flips(summary, factor, [line[v] for v in order if v in line], base, others)
+    return found
+
+
+def _flips(
+    summary: Summary, factor: Factor, line: Sequence[Brief], base: int, others: tuple[str, ...]
+) -> Iterator[Boundary]:
+    result = summary.result
+    keys = [f.key for f in result.study.factors if f.key != factor.key]
+    several = {f.key for _, f in varied(summary)}
+    fixed = [(key, value) for key, value in zip(keys, others, strict=True) if key in several]
+    if len(result.study.bases) > 1:
+        fixed.insert(0, ("base", result.study.bases[base].name))
+    place = result.study.factors.index(factor)
+    for one, other in pairwise(line):
+        if one.meets != other.meets and "indeterminate" not in (one.verdict, other.verdict):
+            met, missed = (one, other) if one.meets else (other, one)
+            yield Boundary(
+                factor.key, met.labels[place], missed.labels[place], tuple(fixed), missed.verdict
+            )

@@ -1,0 +1,1 @@
+"""The verdict: choose where something is open, verify, recheck apart from the solvers, judge."""

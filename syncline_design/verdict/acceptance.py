@@ -1,0 +1,269 @@
+"""Simulated requirements as part of the choice: the judge of a design problem.
+
+One `Simulations` serves a whole command: systems that differ in names alone are simulated once, and
+a what-if (another distance, another limit) meets the same random numbers as the verdict.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from datetime import date
+from fractions import Fraction
+from typing import Any, NoReturn
+
+from syncline_design.choice.chosen_system import system_of
+from syncline_design.choice.effect_tables import problem_of
+from syncline_design.choice.outcome import Unfinished
+from syncline_design.choice.problem import with_everything
+from syncline_design.choice.table import Design, Judge, Judgement, Option
+from syncline_design.choice.table import Problem as DesignProblem
+from syncline_design.machine.input_files import FileContent
+from syncline_design.model.system import ROLES, UTC, RoleName, Sensor, Stage, System
+from syncline_design.model.timing import (
+    NO_ERROR,
+    Constant,
+    Distribution,
+    Empirical,
+    Normal,
+    TimingError,
+    Uniform,
+)
+from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
+from syncline_design.simulation.run import DEFAULT_CAP
+from syncline_design.spec.known_effects import effect_entries
+from syncline_design.spec.load import BadInput, LoadedSpec, Problem
+from syncline_design.spec.spec import Requirement
+
+HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
+WHAT_IF_CAP = 400_000  # samples after which a what-if is left open, and so not offered
+MOST_SIMULATED = 1000  # different systems simulated for one command before it gives up
+
+
+def simulation_settings(loaded: LoadedSpec, seed: int) -> SimulationSettings:
+    """How a spec wants to be simulated; the target is its tightest accuracy (or other) limit."""
+    choice = loaded.spec.monte_carlo
+    limits = [float(r.limit) for r in loaded.spec.requirements if r.kind == "accuracy"]
+    limits = limits or [float(r.limit) for r in loaded.spec.requirements if r.kind == "monte_carlo"]
+    trajectory: str | FileContent | None = loaded.trajectory
+    if trajectory is None and choice.trajectory is not None:
+        trajectory = choice.trajectory.manoeuvre
+    return SimulationSettings(
+        samples=choice.samples,
+        seed=seed,
+        envelope=choice.envelope,
+        limit_m=min(limits) if limits else None,
+        trajectory=trajectory,
+    )
+
+
+def refuse_trajectory(loaded: LoadedSpec, message: str) -> NoReturn:
+    """A trajectory that cannot be flown, as bad input at its place."""
+    place = ("monte_carlo", "trajectory")
+    line, column = loaded.positions.get(place, (0, 0))
+    raise BadInput((Problem(str(loaded.path), line, column, ".".join(place), message),))
+
+
+@dataclass
+class Simulations:
+    """Decisions of one command, by what was simulated.
+
+    today: the day on which waivers are judged; a waived requirement decides nothing.
+    """
+
+    seed: int = 0
+    today: date | None = None
+    most: int = MOST_SIMULATED
+    known: dict[tuple[System, SimulationSettings, float, float], Decision] = field(
+        default_factory=dict
+    )
+    systems: set[System] = field(default_factory=set)
+    refusals: int = 0  # of systems beyond the most
+    asked: LoadedSpec | None = None  # the spec itself; every other one is a what-if
+
+    def decide(
+        self, loaded: LoadedSpec, system: System, quantile: float, limit_m: float
+    ) -> Decision:
+        """Whether a system's quantile keeps a limit; Unfinished once too many were simulated."""
+        settings = replace(simulation_settings(loaded, self.seed), limit_m=None)
+        nameless = _nameless(system)
+        key = (nameless, settings, quantile, limit_m)
+        if key not in self.known:
+            self.systems.add(nameless)
+            if len(self.systems) > self.most:
+                self.refusals += 1
+                raise Unfinished(f"the search stopped after {self.most} simulated designs")
+            cap = DEFAULT_CAP if loaded is self.asked else WHAT_IF_CAP
+            self.known[key] = decide(nameless, settings, quantile, limit_m, cap)
+        return self.known[key]
+
+    def problem_of(self, loaded: LoadedSpec) -> DesignProblem:
+        """The design problem of a spec, its simulated requirements included."""
+        wanted = [r for r in loaded.spec.requirements if r.kind == "monte_carlo"]
+        wanted = [r for r in wanted if not self._is_waived(r)]
+        problem = problem_of(loaded)
+        self.asked = self.asked or loaded
+        if not wanted:
+            return problem
+        limits = tuple((r.id, float(r.limit)) for r in wanted)
+        figures = {
+            (table.stage_name, table.role, option.names): (option.error(), option.tau())
+            for table in with_everything(problem).roles
+            for option in table.options
+        }
+        return replace(problem, judge=_SpecJudge(self, loaded, tuple(wanted), limits, figures))
+
+    def _is_waived(self, requirement: Requirement) -> bool:
+        waiver = requirement.waiver
+        return waiver is not None and waiver.holds_on(self.today or date.today())
+
+
+@dataclass(frozen=True, slots=True)
+class _SpecJudge:
+    """The simulated requirements of one spec, at limits that may be moved or lifted."""
+
+    simulations: Simulations
+    loaded: LoadedSpec
+    requirements: tuple[Requirement, ...]
+    limits: tuple[tuple[str, float], ...]
+    figures: Mapping[tuple[str, RoleName, tuple[str, str, str]], tuple[Fraction, Fraction]]
+
+    @property
+    def refusals(self) -> int:
+        """How often a design was not simulated because the command had simulated too many."""
+        return self.simulations.refusals
+
+    def hopeless(self, problem: DesignProblem, role: int, option: Option) -> bool:
+        """Whether the noise of a sensor alone, with all else perfect, fails a limit by 1 %.
+
+        Independent errors never make a symmetric, unimodal one less dispersed (T. W. Anderson,
+        Proc. AMS 6, 1955): whatever is added, P(|error| <= limit) is no larger.  The margin is for
+        what the simulator's angles do beyond first order.
+        """
+        if self._noise_is_changed():
+            return False
+        places = [0] * len(problem.roles)
+        places[role] = problem.roles[role].options.index(option)
+        design = Design(tuple(places), (0,) * len(problem.vehicles))
+        table = problem.roles[role]
+        bare = _noise_alone(system_of(self.loaded, problem, design), table.stage, table.role)
+        return any(
+            self._status(bare, name, HOPELESS * limit) == "fail" for name, limit in self.limits
+        )
+
+    def _noise_is_changed(self) -> bool:
+        """Whether a known effect changes the noise of a sensor."""
+        from syncline_design.effects import registry
+
+        kinds = [registry()[one.effect].kind for one in effect_entries(self.loaded)]
+        return "stochastic" in kinds
+
+    def judge(self, problem: DesignProblem, design: Design) -> Judgement:
+        """Every limit in turn; the first that fails settles it."""
+        left_open: list[str] = []
+        system = self._system(problem, design)
+        for name, limit in self.limits:
+            status = self._status(system, name, limit)
+            if status == "fail":
+                return Judgement(failed=(name,))
+            left_open += [name] if status == "indeterminate" else []
+        return Judgement(undecided=tuple(left_open))
+
+    def _system(self, problem: DesignProblem, design: Design) -> System:
+        """The design's system; an option whose error or tau was grown has its sensor's grown."""
+        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
+        for table, place in zip(problem.roles, design.options, strict=True):
+            option = table.options[place]
+            error, tau = self.figures[table.stage_name, table.role, option.names]
+            noise = option.error() / error if error else Fraction(1)
+            shift = option.tau() / tau if tau else Fraction(1)
+            if noise != 1 or shift != 1:
+                system = _grown(system, table.stage, table.role, float(noise), float(shift))
+        return system
+
+    def _status(self, system: System, name: str, limit_m: float) -> str:
+        try:
+            return self._decision(system, name, limit_m).status
+        except SimulationError as error:
+            if self.loaded.spec.monte_carlo.trajectory is not None:
+                refuse_trajectory(self.loaded, str(error))
+            return "indeterminate"
+
+    def _decision(self, system: System, name: str, limit_m: float) -> Decision:
+        quantile = next(float(r.quantile or 0.0) for r in self.requirements if r.id == name)
+        return self.simulations.decide(self.loaded, system, quantile, limit_m)
+
+    def reached_m(self, problem: DesignProblem, design: Design, requirement: str) -> float:
+        """Upper end of the interval of the quantile that the requirement limits [m]."""
+        limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
+        return self._decision(self._system(problem, design), requirement, limit).estimate.high_m
+
+    def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
+        """The same at other limits."""
+        return replace(self, limits=limits)
+
+
+def _grown(system: System, stage: int, role: RoleName, noise: float, shift: float) -> System:
+    """A system with one sensor's noise and timestamp error times a factor each."""
+    own = system.stages[stage]
+    sensor: Sensor = getattr(own, role)
+    first, second, third = sensor.sigma
+    sensor = replace(
+        sensor,
+        sigma=(first * noise, second * noise, third * noise),
+        timing=_stretched(sensor.timing, shift),
+    )
+    stages = list(system.stages)
+    changed: dict[str, Any] = {role: sensor}
+    stages[stage] = replace(own, **changed)
+    return replace(system, stages=tuple(stages))
+
+
+def _stretched(error: TimingError, factor: float) -> TimingError:
+    """A timestamp error with all its figures times a factor."""
+    match error.distribution:
+        case Uniform(low, high):
+            distribution: Distribution = Uniform(low * factor, high * factor)
+        case Normal(mean, std):
+            distribution = Normal(mean * factor, std * factor)
+        case Constant(value):
+            distribution = Constant(value * factor)
+        case Empirical(values):
+            distribution = Empirical(tuple(value * factor for value in values))
+    left = None if error.calibrated_s is None else error.calibrated_s * factor
+    return replace(error, distribution=distribution, calibrated_s=left)
+
+
+def _noise_alone(system: System, stage: int, role: RoleName) -> System:
+    """A system whose only error is the noise of one sensor; speeds then matter to nothing."""
+    stages = []
+    for index, one in enumerate(system.stages):
+        perfect = {
+            name: replace(sensor, timing=NO_ERROR, timeline=UTC)
+            if (index, name) == (stage, role)
+            else replace(sensor, sigma=(0.0, 0.0, 0.0), timing=NO_ERROR, timeline=UTC)
+            for name in ROLES
+            if (sensor := getattr(one, name)) is not None
+        }
+        platform = replace(one.platform, v_max_mps=1.0, omega_max_radps=1.0)
+        if role == "position":
+            platform = replace(platform, distance_m=1.0)
+        stages.append(replace(one, platform=platform, **perfect))
+    return replace(system, stages=tuple(stages), clock_offsets=(), effects=())
+
+
+def _nameless(system: System) -> System:
+    """A system without the names of its sensors, which no simulation looks at."""
+    return replace(system, stages=tuple(_nameless_stage(stage) for stage in system.stages))
+
+
+def _nameless_stage(stage: Stage) -> Stage:
+    def bare(sensor: Sensor | None) -> Sensor | None:
+        return None if sensor is None else replace(sensor, id="")
+
+    return replace(
+        stage,
+        position=bare(stage.position),
+        attitude=bare(stage.attitude),
+        ranging=bare(stage.ranging),
+    )

@@ -1,0 +1,196 @@
+"""The design of a verdict as data: who does what, by which clock, at what price, on what basis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_options, evaluate
+from syncline_design.choice.table import Design, Option, Problem
+from syncline_design.model.budget import Budget, SensorRow
+from syncline_design.model.quantity import Quantity
+from syncline_design.spec.catalog import Entry
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.resolve import candidate_sensors, platform_of
+from syncline_design.verdict.tree import finite
+
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True)
+class UsedEntry:
+    """A catalog entry (or one given in place) that a design rests on."""
+
+    section: str
+    id: str
+    entry: Entry
+
+
+def number(amount: Fraction | None) -> float | None:
+    """An exact sum for JSON; None where a catalog entry does not say."""
+    return None if amount is None else float(amount)
+
+
+def design_json(loaded: LoadedSpec, problem: Problem, design: Design, figures: Budget) -> Json:
+    """The `design` key of a verdict."""
+    sums = evaluate(problem, design)
+    rows = {(row.stage, row.role): row for row in figures.sensors}
+    return {
+        "cost": number(sums.cost),
+        "mass": number(sums.mass),
+        "power": number(sums.power),
+        "currency": loaded.spec.currency,
+        "infrastructure": _shared(loaded, problem, sums),
+        "clocks": _clocks(loaded, problem, design),
+        "stages": [
+            {
+                "name": stage.name,
+                "vehicle": stage.vehicle_name,
+                "platform": stage.platform.use or stage.platform.name or stage.name,
+                "roles": dict(_roles(loaded, problem, design, index, rows)),
+            }
+            for index, stage in enumerate(loaded.spec.stages)
+        ],
+    }
+
+
+def _roles(
+    loaded: LoadedSpec,
+    problem: Problem,
+    design: Design,
+    stage: int,
+    rows: Mapping[tuple[str, Any], SensorRow],
+) -> Iterator[tuple[str, Json]]:
+    for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
+        if table.stage == stage:
+            row = rows[table.stage_name, table.role]
+            yield table.role, _role(loaded, stage, table.role, option, row)
+
+
+def _role(loaded: LoadedSpec, stage: int, role: Any, option: Option, row: SensorRow) -> Json:
+    sensors = dict(candidate_sensors(loaded.spec, loaded.spec.stages[stage], role, loaded.catalog))
+    method = loaded.catalog.timestamping.get(option.method)
+    return {
+        "sensor": option.sensor,
+        "name": sensors[option.sensor].name or option.sensor,
+        "primitive": option.primitive,
+        "timestamping": option.method,
+        "timestamping_name": method.name if method is not None else "given in the spec",
+        "timeline": option.timeline,
+        "tau_s": row.tau_s,
+        "tau_crit_s": finite(row.tau_crit_s),
+        "tau_crit_lever_arm_s": finite(row.tau_crit_lever_arm_s),
+        "sensor_error_m": row.sensor_error_m,
+        "cost": number(option.resources.cost),
+        "mass": number(option.resources.mass),
+        "power": number(option.resources.power),
+    }
+
+
+def _shared(loaded: LoadedSpec, problem: Problem, sums: Evaluation) -> list[Json]:
+    found = []
+    for units in sums.units:
+        item = problem.infrastructure[units.infrastructure]
+        cost = item.resources.cost
+        found.append(
+            {
+                "id": item.id,
+                "name": loaded.catalog.infrastructure[item.id].name or item.id,
+                "vehicle": problem.vehicles[units.vehicle].name,
+                "count": units.count,
+                "cost": None if cost is None else float(cost * units.count),
+            }
+        )
+    return found
+
+
+def _clocks(loaded: LoadedSpec, problem: Problem, design: Design) -> list[Json]:
+    return [
+        {
+            "vehicle": vehicle.name,
+            "id": clock.id,
+            "name": loaded.catalog.clocks[clock.id].name or clock.id,
+            "offset_bound_s": clock.offset_bound_s,
+            "cost": number(clock.resources.cost),
+        }
+        for vehicle, clock in zip(problem.vehicles, chosen_clocks(problem, design), strict=True)
+        if clock.id is not None
+    ]
+
+
+def used_entries(loaded: LoadedSpec, problem: Problem, design: Design) -> list[UsedEntry]:
+    """Every catalog entry a design rests on, each once: platforms, sensors, methods, hardware."""
+    spec, catalog = loaded.spec, loaded.catalog
+    found: dict[tuple[str, str], Entry] = {}
+    for stage in spec.stages:
+        name = stage.platform.use or stage.platform.name or stage.name
+        found["platforms", name] = platform_of(stage.platform, catalog)
+    for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
+        stage = spec.stages[table.stage]
+        sensors = dict(candidate_sensors(spec, stage, table.role, catalog))
+        found["sensors", option.sensor] = sensors[option.sensor]
+        if option.method in catalog.timestamping:
+            found["timestamping", option.method] = catalog.timestamping[option.method]
+    for units in evaluate(problem, design).units:
+        identity = problem.infrastructure[units.infrastructure].id
+        found["infrastructure", identity] = catalog.infrastructure[identity]
+    for clock in chosen_clocks(problem, design):
+        if clock.id is not None:
+            found["clocks", clock.id] = catalog.clocks[clock.id]
+    return [UsedEntry(section, identity, entry) for (section, identity), entry in found.items()]
+
+
+def assumptions(entries: list[UsedEntry]) -> list[Json]:
+    """Figures without a public source, entry by entry."""
+    found = []
+    for used in entries:
+        basis = used.entry.basis
+        if basis is None:
+            continue
+        figures = list(basis) if isinstance(basis, Mapping) else _all_figures(used.entry)
+        found += [
+            {
+                "entry": used.id,
+                "section": used.section,
+                "figure": figure,
+                "value": figure_text(getattr(used.entry, figure, None)),
+                "note": used.entry.note,
+            }
+            for figure in figures
+        ]
+    return found
+
+
+_NOT_FIGURES = frozenset({"name", "source", "basis", "note", "modality", "type", "timeline"})
+
+
+def _all_figures(entry: Entry) -> list[str]:
+    return [key for key, value in entry if key not in _NOT_FIGURES and value not in (None, (), {})]
+
+
+def figure_text(value: Any) -> str:
+    """A figure as its catalog writes it."""
+    if isinstance(value, Quantity):
+        return value.text
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(figure_text(item) for item in value) + "]"
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items()) + "}"
+    if hasattr(value, "model_fields_set"):
+        parts = [(key, item) for key, item in value if item is not None]
+        return " ".join(
+            str(item) if key == "distribution" else f"{key} {figure_text(item)}"
+            for key, item in parts
+        )
+    return "" if value is None else str(value)
+
+
+def sources(entries: list[UsedEntry]) -> list[Json]:
+    """Where the figures come from."""
+    return [
+        {"entry": used.id, "section": used.section, "source": used.entry.source}
+        for used in entries
+        if used.entry.source
+    ]

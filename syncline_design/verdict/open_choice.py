@@ -1,0 +1,49 @@
+"""The best design of an open spec, verified."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from syncline_design.choice.table import Design, Problem
+from syncline_design.verdict.tree import Verified
+
+if TYPE_CHECKING:
+    from syncline_design.choice.outcome import Choice, Infeasible, Method
+
+
+@dataclass(frozen=True, slots=True)
+class Picked:
+    """What the choice came to: a verified design, with how many better ones failed simulation.
+
+    exhausted: False when the search ended before every design was simulated; the verified one is
+    then the first by the sums.
+    """
+
+    choice: Choice | Infeasible
+    verified: Verified | None
+    passed_over: int = 0
+    exhausted: bool = True
+
+
+def pick(
+    problem: Problem,
+    method: Method,
+    time_limit_s: float | None,
+    verify: Callable[[Design], Verified],
+) -> Picked:
+    """The first design in the documented order that meets every requirement, verified.
+
+    Where simulation leaves every candidate open, the first of those.
+    """
+    from syncline_design.choice.decide import choose
+    from syncline_design.choice.outcome import Infeasible, NoVerdict
+
+    choice = choose(problem, method, time_limit_s)
+    if isinstance(choice, Infeasible):
+        return Picked(choice, None, choice.passed_over)
+    verified = verify(choice.design)
+    if verified.word == "fails" and choice.exhausted:
+        raise NoVerdict("the chosen design does not stand up to the independent recheck")
+    return Picked(choice, verified, choice.passed_over, choice.exhausted)

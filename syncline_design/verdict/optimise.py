@@ -1,0 +1,393 @@
+"""`optimize`: the choice itself with its front, runners-up, prices and what they hinge on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from syncline_design import __version__
+from syncline_design.choice import presentation
+from syncline_design.choice.acceptable import refusals
+from syncline_design.choice.decide import best
+from syncline_design.choice.explain import Explanation, explain
+from syncline_design.choice.front import front
+from syncline_design.choice.outcome import ROADS, FrontPoint, Method, Unfinished
+from syncline_design.choice.prices import Step, staircase
+from syncline_design.choice.problem import selection_of
+from syncline_design.choice.slack import Slack, slack_ledger
+from syncline_design.choice.table import Design, Limits, Problem, ResourceName
+from syncline_design.choice.tolerance import (
+    Measurement,
+    ToleranceVerdict,
+    measure_next,
+    tolerance_verdict,
+)
+from syncline_design.choice.variations import Build
+from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_force, within
+from syncline_design.spec.edit import PinnedRole, pinned_spec_text
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.resolve import timestamping_of
+from syncline_design.spec.selection import RoleSelection
+from syncline_design.spec.spec import InlineTimestamping
+from syncline_design.spec.yaml_text import printable
+from syncline_design.verdict.acceptance import MOST_SIMULATED, Simulations
+from syncline_design.verdict.choice_data import (
+    designs_json,
+    excluded_json,
+    front_json,
+    left_out,
+    left_out_text,
+    proof_json,
+    unproven_json,
+)
+from syncline_design.verdict.open_choice import Picked, pick
+from syncline_design.verdict.tree import files_json
+from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
+
+SCHEMA = "syncline-design/optimization/v1"
+Json = dict[str, Any]
+# What stands for the tables where time ended before they were made.
+NO_TABLES = Problem((), (), (), (), 0.0, 0.0, Limits(None, 1.0), "syncline", "cost")
+
+
+@dataclass(frozen=True, slots=True)
+class OptimizeSettings:
+    """count: how many designs; pareto: the front too, of `resource` against error.
+
+    every: rank every design, not only those that differ in a sensor.
+    """
+
+    count: int = 1
+    pareto: bool = False
+    resource: ResourceName = "cost"
+    method: Method = "auto"
+    time_limit_s: float | None = None
+    seed: int = 0
+    every: bool = False
+    report: bool = False  # the whole verdict too, for a page
+
+
+@dataclass(frozen=True, slots=True)
+class Hinges:
+    """What the chosen design hinges on: slack of every figure, tolerances, what to measure.
+
+    None: not worked out within the time limit.
+    """
+
+    slack: tuple[Slack, ...] | None
+    tolerance: ToleranceVerdict | None
+    measure_next: tuple[Measurement, ...] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Optimisation:
+    """The best designs, or why there is none.
+
+    picked: None when the time limit came before any design; `unfinished` says so.
+    """
+
+    loaded: LoadedSpec
+    problem: Problem
+    settings: OptimizeSettings
+    picked: Picked | None
+    designs: tuple[Design, ...]
+    front: tuple[FrontPoint, ...]
+    prices: tuple[Step, ...]
+    hinges: Hinges | None
+    explanation: Explanation | None
+    cut_short: tuple[str, ...] = ()  # what the time limit left out or incomplete
+    gave_up: tuple[str, ...] = ()  # what lacks designs because too many were simulated
+    verdict: Json | None = None
+    unfinished: str = ""
+
+    @property
+    def exit_code(self) -> int:
+        """0: a design; 1: none; 3: the search for one was cut short."""
+        if self.picked is None:
+            return 3
+        found = self.picked.verified
+        if found is None:
+            return 1
+        return 0 if found.word == "meets" else 3
+
+
+def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
+    """The best designs of a spec; pinned roles stay as they are."""
+    limit = settings.time_limit_s
+    with within(in_force() if limit is None else Deadline(limit)):
+        return _optimize(loaded, settings)
+
+
+def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
+    build = Simulations(settings.seed).problem_of
+    simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
+    checking = CheckSettings(
+        settings.seed, settings.method, monte_carlo=simulated or settings.report
+    )
+    problem = NO_TABLES
+    try:
+        problem = build(loaded)
+        in_force().doing("choosing")
+        picked = pick(
+            problem,
+            settings.method,
+            None,
+            lambda design: verify(loaded, problem, design, checking),
+        )
+    except OutOfTime as error:
+        return _unfinished(loaded, problem, settings, checking, str(error))
+    pieces, nothing = Pieces(lambda: refusals(problem)), _no_points()
+    points = nothing
+    if settings.pareto:
+        points = pieces.made("front", lambda: front(problem, settings.resource), nothing)
+    designs: tuple[Design, ...] = ()
+    hinges = explanation = None
+    if picked.verified is None:
+        explanation = explain(loaded, problem, build)
+    elif picked.exhausted:
+        chosen = picked.verified.design
+        designs = _designs(problem, chosen, settings, pieces)
+        if picked.verified.word == "meets":
+            hinges = _hinges((loaded, problem, chosen, build), pieces)
+    if explanation is not None and explanation.cut_short:
+        pieces.cut_short.append("reasons and remedies")
+    steps = staircase([point for point in points if not point.undecided])
+    found = Optimisation(
+        loaded, problem, settings, picked, designs, points, steps, hinges,
+        explanation, tuple(pieces.cut_short), tuple(pieces.gave_up),
+    )  # fmt: skip
+    return replace(found, verdict=_verdict(found, checking)) if settings.report else found
+
+
+def _unfinished(
+    loaded: LoadedSpec,
+    problem: Problem,
+    settings: OptimizeSettings,
+    checking: CheckSettings,
+    why: str,
+) -> Optimisation:
+    """What there is to say when the time limit came before any design."""
+    known = None if problem is NO_TABLES else problem
+    verdict = unfinished_verdict(loaded, known, checking, why) if settings.report else None
+    return Optimisation(
+        loaded,
+        problem,
+        settings,
+        None,
+        (),
+        (),
+        (),
+        None,
+        None,
+        ("choosing",),
+        verdict=verdict,
+        unfinished=why,
+    )
+
+
+def _no_points() -> tuple[FrontPoint, ...]:
+    return ()
+
+
+def _designs(
+    problem: Problem, chosen: Design, settings: OptimizeSettings, pieces: Pieces
+) -> tuple[Design, ...]:
+    """The chosen design, then the next best others."""
+    count = settings.count
+    if count == 1:
+        return (chosen,)
+
+    def others() -> Iterator[Design]:
+        return (d for d in best(problem, count + 1, every=settings.every) if d != chosen)
+
+    return (chosen, *pieces.listed("next best designs", others)[: count - 1])
+
+
+def _hinges(given: tuple[LoadedSpec, Problem, Design, Build], pieces: Pieces) -> Hinges:
+    return Hinges(
+        pieces.made("slack ledger", lambda: slack_ledger(*given), None),
+        pieces.made("tolerances", lambda: _tolerances(*given), None),
+        pieces.made("what to measure next", lambda: measure_next(*given), None),
+    )
+
+
+def _tolerances(
+    loaded: LoadedSpec, problem: Problem, design: Design, build: Build
+) -> ToleranceVerdict | None:
+    """The verdict under tolerances; None where simulation is refused it."""
+    try:
+        return tolerance_verdict(loaded, problem, design, build)
+    except Unfinished:
+        return None
+
+
+def _verdict(found: Optimisation, checking: CheckSettings) -> Json:
+    """The verdict of the same design, for a page: nothing is chosen a second time."""
+    assert found.picked is not None
+    points = found.front if found.settings.pareto and found.settings.resource == "cost" else None
+    return open_verdict(found.loaded, found.problem, found.picked, checking, points=points)
+
+
+def optimisation_json(found: Optimisation) -> Json:
+    """Everything as plain data; `designs` best first, `front` with --pareto."""
+    loaded, problem = found.loaded, found.problem
+    data: Json = {
+        "schema": SCHEMA,
+        "verdict": "infeasible" if found.exit_code == 1 else "meets",
+        "spec": {"name": loaded.spec.name, "file": str(loaded.path)},
+        "proof": _proof(found),
+        "combinations": None if problem is NO_TABLES else str(problem.combinations),
+        "designs": designs_json(loaded, problem, found.designs),
+        **excluded_json(problem),
+        "cut_short": list(found.cut_short),
+        "gave_up": list(found.gave_up),
+        "provenance": {
+            "version": __version__,
+            "spec_sha256": loaded.spec_sha256,
+            "catalogs_sha256": loaded.catalogs_sha256,
+            "files": files_json(loaded),
+            "seed": found.settings.seed,
+        },
+    }
+    if found.exit_code == 3:
+        data["verdict"] = "indeterminate"
+    if found.unfinished:
+        data["message"] = _unfinished_line(found)
+    if found.settings.pareto:
+        data["front"] = front_json(loaded, problem, found.front, found.settings.resource)
+        data["front_left_out"] = left_out(loaded, problem, found.settings.resource)
+        data["staircase"] = [step.to_json() for step in found.prices]
+    if found.hinges is not None:
+        hinges = found.hinges
+        data["slack"] = None if hinges.slack is None else [row.to_json() for row in hinges.slack]
+        data["tolerances"] = None if hinges.tolerance is None else hinges.tolerance.to_json()
+        data["measure_next"] = (
+            None if hinges.measure_next is None else [m.to_json() for m in hinges.measure_next]
+        )
+    if found.explanation is not None:
+        data["infeasibility"] = found.explanation.to_json() | {"text": found.explanation.lines()}
+    return data
+
+
+def _proof(found: Optimisation) -> Json:
+    if found.picked is None:
+        return unproven_json(found.settings.method)
+    return proof_json(found.picked)
+
+
+def _unfinished_line(found: Optimisation) -> str:
+    return f"No verdict: {found.unfinished}; no design was found by then."
+
+
+def optimisation_text(found: Optimisation) -> str:
+    """The same for a terminal."""
+    problem, currency = found.problem, found.loaded.spec.currency
+    blocks = [[f"{found.loaded.spec.name} ({found.loaded.path})"]]
+    if found.explanation is not None:
+        blocks.append(found.explanation.lines())
+    if found.unfinished:
+        blocks.append([_unfinished_line(found)])
+    if found.picked is not None and found.designs:
+        blocks.append([_proof_line(found, found.picked)])
+        blocks.append(presentation.designs_table(problem, found.designs, currency))
+    if found.front:
+        title = f"Exact front of {found.settings.resource} against error, all else met:"
+        table = presentation.front_table(problem, found.front, found.settings.resource, currency)
+        prices = presentation.staircase_lines(found.prices, currency, found.settings.resource)
+        blocks += [[title, *table], ["What accuracy costs:", *(f"  {line}" for line in prices)]]
+    if found.settings.pareto and found.picked is not None:
+        missing = left_out(found.loaded, problem, found.settings.resource)
+        blocks += [[left_out_text(missing, found.settings.resource)]] if missing else []
+    blocks += _hinge_blocks(found.hinges)
+    if found.cut_short and not found.unfinished:
+        blocks.append([f"The time limit ended this too early: {', '.join(found.cut_short)}."])
+    if found.gave_up:
+        blocks.append([gave_up_line(found.gave_up)])
+    shown = ["\n".join(printable(line, len(line)) for line in block) for block in blocks]
+    return "\n\n".join(shown) + "\n"
+
+
+def gave_up_line(pieces: Sequence[str]) -> str:
+    """What is not complete because simulation is bounded."""
+    names = ", ".join(pieces)
+    return f"After {MOST_SIMULATED} simulated designs the search gave up; not complete: {names}."
+
+
+def _hinge_blocks(hinges: Hinges | None) -> list[list[str]]:
+    if hinges is None:
+        return []
+    blocks: list[list[str]] = []
+    if hinges.slack is not None:
+        blocks.append(["How far each term may grow:", *presentation.slack_table(hinges.slack)])
+    told = [] if hinges.tolerance is None else [hinges.tolerance.text]
+    told += [] if hinges.measure_next is None else _measure_lines(hinges.measure_next)
+    return [*blocks, told] if told else blocks
+
+
+def _proof_line(found: Optimisation, picked: Picked) -> str:
+    proof = picked.choice.proof
+    if not proof.optimal:
+        gap = "" if proof.gap is None else f": the optimum is at most {100 * proof.gap:.3g} % lower"
+        return (
+            f"Found among {problem_size(found.problem)} combinations by "
+            f"{found.loaded.spec.objective} within the time limit, rechecked exactly, not proven "
+            f"optimal{gap}"
+        )
+    confirmed = " and ".join(ROADS.get(road, road) for road in proof.agrees_with)
+    others = f", confirmed by {confirmed}" if confirmed else ""
+    passed = picked.passed_over
+    skipped = f"; {passed} better ones fail the Monte Carlo requirements" if passed else ""
+    return (
+        f"Best of {problem_size(found.problem)} combinations by {found.loaded.spec.objective}: "
+        f"proven by {ROADS.get(proof.method, proof.method)}{others}, rechecked exactly{skipped}"
+    )
+
+
+def problem_size(problem: Problem) -> str:
+    """How many combinations there are: plain up to a million, then as a power."""
+    count = problem.combinations
+    return f"{count}" if count < 1_000_000 else f"{count:.2e}"
+
+
+def _measure_lines(measure: Sequence[Measurement]) -> list[str]:
+    if not measure:
+        return ["No single datasheet figure, 20 % up or down, changes the choice."]
+    lines = ["What to measure next (a single figure that changes the choice):"]
+    for one in measure:
+        spread = " (20 % assumed)" if one.assumed else ""
+        lines.append(
+            f"  {one.figure} from {one.value_text} to {one.at_text}{spread}: {one.becomes}"
+        )
+    return lines
+
+
+def optimisation_csv(found: Optimisation) -> str:
+    """The front with --pareto, else the designs."""
+    if found.settings.pareto:
+        return presentation.front_csv(found.problem, found.front, found.settings.resource)
+    return presentation.designs_csv(found.problem, found.designs)
+
+
+def pinned_text(loaded: LoadedSpec, problem: Problem, design: Design) -> str:
+    """The spec with a design pinned, for `--write-design`."""
+    selected = selection_of(problem, design)
+    index = {stage.name: i for i, stage in enumerate(loaded.spec.stages)}
+    roles = [_pinned(loaded, index[one.stage], one) for one in selected.roles]
+    clocks = {
+        i: identity
+        for i, stage in enumerate(loaded.spec.stages)
+        if stage.clock is not None and (identity := selected.clock(stage.vehicle_name)) is not None
+    }
+    return pinned_spec_text(loaded, roles, clocks)
+
+
+def _pinned(loaded: LoadedSpec, index: int, one: RoleSelection) -> PinnedRole:
+    """What to write for one role; an error given in place stays, with its primitive if it has."""
+    stage = loaded.spec.stages[index]
+    choice = stage.role(one.role)
+    assert choice is not None
+    stamping = timestamping_of(loaded.spec, stage, choice, loaded.catalog)
+    if isinstance(stamping, InlineTimestamping):
+        return PinnedRole(index, one.role, one.sensor)
+    return PinnedRole(index, one.role, one.sensor, one.primitive, one.method)

@@ -1,0 +1,413 @@
+"""Every requirement of a chosen design anew, from the spec, in 60-digit decimals.
+
+The proof behind a PASS: it takes the loaded spec and the names of what was chosen, and shares no
+code with the model, the tables or the solvers.  Formulas (E. R. Jellum et al., arXiv:2209.01136v2):
+  sensor error  = sum of sigma_p + sigma_r + (sigma_Theta + sigma_u) d      (eq. sensor_error_ub)
+  sync error    = (v_max + d omega_max) tau_sys, summed over stages         (eq. sync_error_ub)
+  tau_crit      = sensor error / (v_max + d omega_max)                      (eq. t_crit)
+tau_sys is the largest bound of any two timestamps that meet: tau_a + tau_ref + offset of their
+timelines; a stage without a ranging sensor meets true time, which is UTC.  A figure is rounded to
+a float once, at the end, and that float is compared with the limit: a printed limit that is met
+exactly passes, one that is missed by 1e-12 does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Context, Decimal, localcontext
+from fractions import Fraction
+from typing import Any, Literal
+
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.resolve import candidate_sensors, platform_of, timestamping_of
+from syncline_design.spec.selection import Role, RoleSelection, Selection
+from syncline_design.spec.spec import InlineTimestamping, StageChoice
+from syncline_design.verdict.recheck_facts import impossible
+
+DIGITS = 60
+IMPLIED_SYNC = "SYNC"
+IMPLIED_FACTS = "FACTS"  # fails where a chosen entry cannot work where it stands
+Kind = Literal["accuracy", "sync", "cost", "mass", "power", "feasible"]
+BUDGETS: tuple[Literal["cost", "mass", "power"], ...] = ("cost", "mass", "power")
+NO_EXTRA: Mapping[tuple[str, Role], float] = {}
+
+
+class NotADesign(ValueError):  # noqa: N818 - names a state of the input
+    """A selection that the spec does not allow."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rechecked:
+    """One requirement: its exact value and limit, and whether it is met.
+
+    value None: a catalog entry does not say.  implied: no requirement of the spec says it.
+    """
+
+    id: str
+    kind: Kind
+    value: Fraction | None
+    limit: Fraction
+    passed: bool
+    implied: bool = False
+    note: str = ""
+
+    @property
+    def value_float(self) -> float | None:
+        """The value, rounded once."""
+        return None if self.value is None else float(self.value)
+
+
+@dataclass(frozen=True, slots=True)
+class Recheck:
+    """All requirements but the Monte Carlo ones, and the sums behind them (m, s, m/s)."""
+
+    requirements: tuple[Rechecked, ...]
+    cost: Fraction | None
+    mass: Fraction | None
+    power: Fraction | None
+    sensor_error_m: Fraction
+    sync_rate_mps: Fraction
+    tau_sys_s: Fraction
+    sync_error_m: Fraction
+    total_m: Fraction
+    sync_ratio: Fraction
+
+    @property
+    def passed(self) -> bool:
+        """Whether every requirement is met."""
+        return all(one.passed for one in self.requirements)
+
+
+@dataclass(frozen=True, slots=True)
+class _Chosen:
+    """One role's entries: the sensor, its timestamp error, timeline and hardware."""
+
+    selection: RoleSelection
+    sensor: Any
+    error: Any
+    method: Any  # None for an error given in place
+    timeline: str  # "utc" or the vehicle whose host clock it is
+    tau: Decimal = field(default=Decimal(0))
+
+
+def recheck(
+    loaded: LoadedSpec,
+    selection: Selection,
+    extra_tau_s: Mapping[tuple[str, Role], float] = NO_EXTRA,
+    systematic: Sequence[tuple[str, str, float]] = (),
+) -> Recheck:
+    """Recompute every requirement of a selection.
+
+    extra_tau_s: what known effects add to tau of (stage, role) [s]; systematic: known systematic
+    errors (term, stage, value [m]).  Raises NotADesign where the spec does not allow a choice.
+    """
+    with localcontext(Context(prec=DIGITS)):
+        return _recheck(loaded, selection, extra_tau_s, systematic)
+
+
+def _recheck(
+    loaded: LoadedSpec,
+    selection: Selection,
+    extra: Mapping[tuple[str, Role], float],
+    systematic: Sequence[tuple[str, str, float]],
+) -> Recheck:
+    chosen = _all_chosen(loaded, selection, extra)
+    stages = loaded.spec.stages
+    moves = {stage.name: _moves(loaded, stage, chosen) for stage in stages}
+    rate = sum((v + turning for v, turning, _ in moves.values()), Decimal(0))
+    meets = list(_meetings(loaded, selection, chosen, moves))
+    tau_sys = max((bound for bound, _ in meets), default=Decimal(0))
+    errors = {key: _sensor_error(key[1], one, moves[key[0]]) for key, one in chosen.items()}
+    sensor_error = sum(errors.values(), Decimal(0))
+    sync_error = rate * tau_sys
+    if loaded.spec.sync_model == "per_sensor":
+        sync_error = sum((bound * speed for bound, speed in meets), Decimal(0))
+    total = sensor_error + sync_error + sum((Decimal(v) for *_, v in systematic), Decimal(0))
+    ratios = [_ratio(rate * tau_sys, sensor_error)]
+    for (stage, role), one in chosen.items():
+        ratios.append(_ratio(one.tau * _own_rate(role, moves[stage]), errors[stage, role]))
+    amounts = {name: _amount(loaded, selection, chosen, name) for name in BUDGETS}
+    found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
+    found |= {"accuracy": Fraction(total), "sync": Fraction(max(ratios))}
+    return Recheck(
+        (*_facts(loaded, selection), *_requirements(loaded, found)),
+        amounts["cost"],
+        amounts["mass"],
+        amounts["power"],
+        Fraction(sensor_error),
+        Fraction(rate),
+        Fraction(tau_sys),
+        Fraction(sync_error),
+        Fraction(total),
+        Fraction(max(ratios)),
+    )
+
+
+def _decimal(value: float) -> Decimal:
+    """A figure of a file, exactly as written."""
+    exact = getattr(value, "exact", None)
+    if exact is None:
+        return Decimal(value)
+    return Decimal(exact.numerator) / Decimal(exact.denominator)
+
+
+def _length(figures: Any, axes: int) -> Decimal:
+    """Root of the sum of squares; a single figure counts once per axis."""
+    if not isinstance(figures, tuple):
+        return _decimal(figures) * Decimal(axes).sqrt()
+    return sum((_decimal(f) ** 2 for f in figures), Decimal(0)).sqrt()
+
+
+def _all_chosen(
+    loaded: LoadedSpec, selection: Selection, extra: Mapping[tuple[str, Role], float]
+) -> dict[tuple[str, Role], _Chosen]:
+    """Entries of every role that the spec fills, in its order."""
+    out: dict[tuple[str, Role], _Chosen] = {}
+    for stage in loaded.spec.stages:
+        for role in ("position", "attitude", "ranging"):
+            choice = stage.role(role)
+            if choice is None or choice.is_empty:
+                continue
+            picked = selection.role(stage.name, role)
+            if picked is None:
+                raise NotADesign(f"nothing is chosen for {role} of {stage.name}")
+            out[stage.name, role] = _chosen(loaded, stage, picked, extra)
+    return out
+
+
+def _chosen(
+    loaded: LoadedSpec,
+    stage: StageChoice,
+    picked: RoleSelection,
+    extra: Mapping[tuple[str, Role], float],
+) -> _Chosen:
+    spec, catalog = loaded.spec, loaded.catalog
+    choice = stage.role(picked.role)
+    assert choice is not None
+    sensor = dict(candidate_sensors(spec, stage, picked.role, catalog)).get(picked.sensor)
+    if sensor is None or choice.primitive not in (None, picked.primitive):
+        raise NotADesign(f"{picked.sensor} by {picked.primitive} is not open to {stage.name}")
+    stamping = timestamping_of(spec, stage, choice, catalog)
+    method: Any = None
+    if isinstance(stamping, InlineTimestamping):
+        if choice.primitive is not None and choice.primitive not in (
+            "arrival",
+            *sensor.primitives,
+        ):
+            raise NotADesign(f"{picked.sensor} cannot be stamped by {choice.primitive}")
+        error, timeline = stamping.error, stamping.timeline
+    else:
+        method = dict(stamping).get(picked.method)
+        if method is None or not _serves(method.primitives, sensor.primitives, picked.primitive):
+            raise NotADesign(f"{picked.method} cannot stamp {picked.sensor} by {picked.primitive}")
+        error, timeline = method.error, method.timeline
+    tau = _bound(error, spec.coverage_factor) + Decimal(extra.get((stage.name, picked.role), 0.0))
+    host = stage.vehicle or stage.name
+    return _Chosen(
+        picked, sensor, error, method, "utc" if timeline == "utc" else f"host {host}", tau
+    )
+
+
+def _serves(by_method: Sequence[str], by_sensor: Sequence[str], primitive: str) -> bool:
+    """A method stamps by a primitive that both have; one of arrival stamps every sensor."""
+    has = primitive == "arrival" or primitive in by_sensor
+    return has and (primitive in by_method or "arrival" in by_method)
+
+
+def _bound(error: Any, coverage_factor: float) -> Decimal:
+    """Largest |mu| [s]: ends of a uniform error, |mean| + k std of a normal one, measured values.
+
+    With the mean calibrated out, the same about the mean, plus what remains of it.
+    """
+    spread = Decimal(0)
+    if error.distribution == "uniform":
+        ends = [_decimal(error.low), _decimal(error.high)]
+    elif error.distribution == "normal":
+        ends = [_decimal(error.mean)]
+        spread = _decimal(coverage_factor) * _decimal(error.std)
+    elif error.distribution == "constant":
+        ends = [_decimal(error.value)]
+    else:
+        ends = [_decimal(value) for value in error.values]
+    if error.calibrated is None:
+        return max(abs(end) for end in ends) + spread
+    middle = sum(ends, Decimal(0)) / len(ends)
+    return max(abs(end - middle) for end in ends) + spread + _decimal(error.calibrated)
+
+
+Moves = tuple[Decimal, Decimal, Decimal]  # v_max, d omega_max, d
+_Moment = tuple[str, Decimal]  # timeline of a stamp, bound of its error against that timeline
+_TRUE_TIME: _Moment = ("utc", Decimal(0))
+
+
+def _moves(
+    loaded: LoadedSpec, stage: StageChoice, chosen: Mapping[tuple[str, Role], _Chosen]
+) -> Moves:
+    platform = platform_of(stage.platform, loaded.catalog)
+    if (stage.name, "ranging") not in chosen:
+        return _decimal(platform.v_max), Decimal(0), Decimal(0)
+    distance = _decimal(platform.distance)
+    return _decimal(platform.v_max), distance * _decimal(platform.omega_max), distance
+
+
+def _sensor_error(role: Role, one: _Chosen, moves: Moves) -> Decimal:
+    sensor, distance = one.sensor, moves[2]
+    if role == "position":
+        return _length(sensor.sigma_position, 3)
+    if role == "attitude":
+        return _length(sensor.sigma_attitude, 3) * distance
+    return _decimal(sensor.sigma_range) + _length(sensor.sigma_bearing, 2) * distance
+
+
+def _own_rate(role: Role, moves: Moves) -> Decimal:
+    """What a sensor's own tau_crit is taken against; 0 for an attitude that enters nothing."""
+    speed, turning, distance = moves
+    if role == "position":
+        return speed
+    return speed + turning if distance else Decimal(0)
+
+
+def _ratio(caused: Decimal, error: Decimal) -> Decimal:
+    """tau / tau_crit: the error that timestamps cause over the sensors' own."""
+    if not caused:
+        return Decimal(0)
+    return caused / error if error else Decimal(10) ** 30
+
+
+def _meetings(
+    loaded: LoadedSpec,
+    selection: Selection,
+    chosen: Mapping[tuple[str, Role], _Chosen],
+    moves: Mapping[str, Moves],
+) -> Iterator[tuple[Decimal, Decimal]]:
+    """(bound of the relative timestamp error [s], rate [m/s]) of all that meet.
+
+    A stage takes its object at one moment: the one at which its ranging sensor measured, or, where
+    nothing ranges, the true time that the result is compared at.  Its position (a later stage: the
+    chain before it, as stamped by the ranging there) and its attitude are held against that.
+    """
+    carried: _Moment | None = None
+    for stage in loaded.spec.stages:
+        speed, turning, _ = moves[stage.name]
+        ranging = chosen.get((stage.name, "ranging"))
+        located = _TRUE_TIME if ranging is None else (ranging.timeline, ranging.tau)
+        if carried is None:
+            own = chosen[stage.name, "position"]
+            carried = (own.timeline, own.tau)
+        held: list[tuple[_Moment, Decimal]] = [(carried, speed)]
+        if ranging is not None:
+            attitude = chosen[stage.name, "attitude"]
+            held.append(((attitude.timeline, attitude.tau), turning))
+        for (timeline, tau), rate in held:
+            yield tau + located[1] + _between(loaded, selection, timeline, located[0]), rate
+        carried = located
+
+
+def _between(loaded: LoadedSpec, selection: Selection, first: str, second: str) -> Decimal:
+    """Bound of the offset between two timelines [s]."""
+    if first == second:
+        return Decimal(0)
+    return _from_utc(loaded, selection, first) + _from_utc(loaded, selection, second)
+
+
+def _from_utc(loaded: LoadedSpec, selection: Selection, timeline: str) -> Decimal:
+    if timeline == "utc":
+        return Decimal(0)
+    entry = _clock(loaded, selection, timeline.removeprefix("host "))
+    if entry is None:
+        return Decimal(0)
+    drift = Decimal(0)
+    if entry.drift is not None:
+        drift = abs(_decimal(entry.drift)) * _decimal(entry.holdover)
+    return _bound(entry.offset, loaded.spec.coverage_factor) + drift
+
+
+def _clock(loaded: LoadedSpec, selection: Selection, vehicle: str) -> Any:
+    """The clock of a vehicle; it has to be one that the spec offers."""
+    offered: set[str] = set()
+    for stage in loaded.spec.stages:
+        if (stage.vehicle or stage.name) == vehicle and stage.clock is not None:
+            offered |= set(stage.clock.candidates)
+    picked = selection.clock(vehicle)
+    if (picked is None) != (not offered) or (picked is not None and picked not in offered):
+        raise NotADesign(f"{picked or 'no clock'} is not open to vehicle {vehicle}")
+    return None if picked is None else loaded.catalog.clocks[picked]
+
+
+def _amount(
+    loaded: LoadedSpec,
+    selection: Selection,
+    chosen: Mapping[tuple[str, Role], _Chosen],
+    name: Literal["cost", "mass", "power"],
+) -> Fraction | None:
+    """Sum of a resource, exact; shared hardware once per vehicle and full set of channels."""
+    bought: list[tuple[Any, int]] = []
+    channels: dict[tuple[str, str], int] = {}
+    vehicles = {stage.name: stage.vehicle or stage.name for stage in loaded.spec.stages}
+    for (stage, _), one in chosen.items():
+        bought.append((one.sensor, 1))
+        if one.method is not None:
+            bought.append((one.method, 1))
+            for item, count in one.method.requires.items():
+                key = (vehicles[stage], item)
+                channels[key] = channels.get(key, 0) + count
+    for vehicle in dict.fromkeys(vehicles.values()):
+        clock = _clock(loaded, selection, vehicle)
+        if clock is not None:
+            bought.append((clock, 1))
+            for item, count in clock.requires.items():
+                channels[vehicle, item] = channels.get((vehicle, item), 0) + count
+    for (_, item), count in channels.items():
+        entry = loaded.catalog.infrastructure[item]
+        bought.append((entry, (count + entry.channels - 1) // entry.channels))
+    amounts = [(getattr(entry, name), count) for entry, count in bought]
+    if any(amount is None for amount, _ in amounts):
+        return None
+    return sum((_money(loaded, amount) * count for amount, count in amounts), Fraction(0))
+
+
+def _money(loaded: LoadedSpec, amount: Any) -> Fraction:
+    """An amount as written; money in the spec's currency."""
+    exact = Fraction(getattr(amount, "exact", amount))
+    currency = getattr(amount, "currency", None)
+    if currency in (None, loaded.spec.currency):
+        return exact
+    return exact * Fraction(getattr(loaded.spec.exchange_rates[currency], "exact", 0))
+
+
+def _requirements(loaded: LoadedSpec, found: Mapping[str, Fraction | None]) -> Iterator[Rechecked]:
+    written = [one for one in loaded.spec.requirements if one.kind != "monte_carlo"]
+    if not any(one.kind == "sync" for one in written):
+        value = found["sync"]
+        yield Rechecked(
+            IMPLIED_SYNC, "sync", value, Fraction(1), _meets("sync", value, Fraction(1)), True
+        )
+    for one in written:
+        limit = _money(loaded, one.limit) if one.kind == "cost" else _exact(one.limit)
+        value = found[one.kind]
+        kind: Kind = one.kind  # type: ignore[assignment]  # monte_carlo is left out above
+        yield Rechecked(one.id, kind, value, limit, _meets(one.kind, value, limit))
+
+
+def _facts(loaded: LoadedSpec, selection: Selection) -> Iterator[Rechecked]:
+    """The implied requirement that the payload can exist, where it cannot: how much is wrong."""
+    wrong = impossible(loaded, selection)
+    if wrong:
+        count, none = Fraction(len(wrong)), Fraction(0)
+        yield Rechecked(IMPLIED_FACTS, "feasible", count, none, False, True, "; ".join(wrong))
+
+
+def _exact(value: float) -> Fraction:
+    return Fraction(getattr(value, "exact", value))
+
+
+def _meets(kind: str, value: Fraction | None, limit: Fraction) -> bool:
+    """Errors and ratios as floats rounded once, sums as they are; sync is strict."""
+    if value is None:
+        return False
+    if kind == "accuracy":
+        return float(value) <= float(limit)
+    if kind == "sync":
+        return float(value) < float(limit)
+    return value <= limit

@@ -1,0 +1,80 @@
+"""Whether a chosen payload can exist where it stands, worked out anew from the spec.
+
+The rules, written down once more for the recheck: a sensor that receives GNSS stands on a stage
+that has it; a method needs GNSS time where its sensor is, a clock where one of its vehicle's stages
+is.  A stage has GNSS if it says so; silent, the first one has it at the surface (no depth, or
+zero), and no other one.  Time also comes along `timing_from`, as many cables on as there are.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.selection import Selection
+
+# Types of sensors that receive GNSS: gnss or gps anywhere, systems and methods as whole words.
+RECEIVER = re.compile(r"gnss|gps|(?<![a-z0-9])(?:glonass|galileo|beidou|rtk|ppp|sbas)(?![a-z0-9])")
+
+
+def impossible(loaded: LoadedSpec, selection: Selection) -> list[str]:
+    """What of a selection cannot work where it stands, in words; empty where all can."""
+    return [*_sensors_and_methods(loaded, selection), *_clocks(loaded, selection)]
+
+
+def _sensors_and_methods(loaded: LoadedSpec, selection: Selection) -> Iterator[str]:
+    received, timed = _received(loaded), _timed(loaded)
+    stages = {stage.name: stage for stage in loaded.spec.stages}
+    for one in selection.roles:
+        choice = stages[one.stage].role(one.role)
+        given: Any = getattr(choice, "sensor", None)
+        sensor = given if hasattr(given, "modality") else loaded.catalog.sensors[one.sensor]
+        listens = _asks(sensor) or RECEIVER.search(sensor.type.casefold()) is not None
+        if listens and one.stage not in received:
+            yield f"{one.sensor} ({one.role} of {one.stage}) needs GNSS, {one.stage} has none"
+        if hasattr(getattr(choice, "timestamping", None), "error"):
+            continue  # an error given in place names no method
+        follows = _asks_with_hardware(loaded, loaded.catalog.timestamping[one.method])
+        if follows and one.stage not in timed:
+            yield f"{one.method} ({one.role} of {one.stage}) needs GNSS time, there is none"
+
+
+def _clocks(loaded: LoadedSpec, selection: Selection) -> Iterator[str]:
+    timed = _timed(loaded)
+    for one in selection.clocks:
+        if one.id is None or not _asks_with_hardware(loaded, loaded.catalog.clocks[one.id]):
+            continue
+        aboard = {s.name for s in loaded.spec.stages if (s.vehicle or s.name) == one.vehicle}
+        if not aboard & timed:
+            yield f"clock {one.id} of {one.vehicle} needs GNSS time, there is none"
+
+
+def _received(loaded: LoadedSpec) -> set[str]:
+    """Stages with GNSS of their own."""
+    found = set()
+    for number, stage in enumerate(loaded.spec.stages):
+        silent = number == 0 and not (stage.depth or 0)
+        if silent if stage.gnss is None else stage.gnss:
+            found.add(stage.name)
+    return found
+
+
+def _timed(loaded: LoadedSpec) -> set[str]:
+    """Stages with GNSS time: grown from those with GNSS, cable by cable, until nothing is new."""
+    found, grown = _received(loaded), True
+    while grown:
+        reached = {s.name for s in loaded.spec.stages if s.timing_from in found} - found
+        found |= reached
+        grown = bool(reached)
+    return found
+
+
+def _asks(entry: Any) -> bool:
+    return "gnss" in entry.needs
+
+
+def _asks_with_hardware(loaded: LoadedSpec, entry: Any) -> bool:
+    hardware = loaded.catalog.infrastructure
+    return _asks(entry) or any(_asks(hardware[name]) for name in entry.requires)

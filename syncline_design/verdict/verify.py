@@ -1,0 +1,444 @@
+"""Spec to verdict: choose what is open, recheck exactly, cross-check by Monte Carlo."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import date
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from syncline_design.choice.acceptable import refusals
+from syncline_design.choice.chosen_system import system_of
+from syncline_design.choice.effect_tables import problem_of
+from syncline_design.choice.problem import selection_of, sole_design
+from syncline_design.choice.table import Design
+from syncline_design.choice.table import Problem as DesignProblem
+from syncline_design.effects.acting import known_of
+from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_force, within
+from syncline_design.model.budget import budget
+from syncline_design.model.quantity import Quantity
+from syncline_design.model.system import System
+from syncline_design.simulation import Decision, MonteCarlo, SimulationError, cross_check, decide
+from syncline_design.spec.known_effects import effect_entries
+from syncline_design.spec.load import BadInput, LoadedSpec, Problem, load
+from syncline_design.spec.references import names_candidates
+from syncline_design.spec.spec import Requirement
+from syncline_design.verdict.acceptance import (
+    MOST_SIMULATED,
+    Simulations,
+    refuse_trajectory,
+    simulation_settings,
+)
+from syncline_design.verdict.cautions import cautions
+from syncline_design.verdict.design_data import assumptions, design_json, sources, used_entries
+from syncline_design.verdict.recheck import Recheck, recheck
+from syncline_design.verdict.tree import (
+    EXIT_CODES,
+    SCHEMA,
+    UNITS,
+    RequirementResult,
+    Status,
+    Verified,
+    effects_json,
+    figures_json,
+    frame,
+    problem_json,
+    syncline_json,
+)
+
+if TYPE_CHECKING:
+    from syncline_design.choice.outcome import FrontPoint, Method
+    from syncline_design.choice.variations import Build
+    from syncline_design.verdict.open_choice import Picked
+
+Json = dict[str, Any]
+T = TypeVar("T")
+
+
+@dataclass(frozen=True, slots=True)
+class CheckSettings:
+    """How to check: seed of the random numbers, road of the choice and its time limit.
+
+    monte_carlo: whether to simulate (a monte_carlo requirement stays undecided without).
+    today: the day on which waivers are judged; None: the machine's date.
+    """
+
+    seed: int = 0
+    method: Method = "auto"
+    time_limit_s: float | None = None
+    monte_carlo: bool = True
+    today: date | None = None
+
+
+def check_file(path: str | Path, settings: CheckSettings | None = None) -> Json:
+    """The verdict of a spec file (schema syncline-design/verdict/v1)."""
+    wanted = settings or CheckSettings()
+    with within(_deadline(wanted)):
+        return check_loaded(load(path), replace(wanted, time_limit_s=None))
+
+
+def _deadline(settings: CheckSettings) -> Deadline:
+    """A deadline of the settings' own, or the one in force."""
+    return in_force() if settings.time_limit_s is None else Deadline(settings.time_limit_s)
+
+
+def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
+    """Verdicts of specs, in the order given; a refused file stands among them as such.
+
+    Refused: {"verdict": "refused", "file", "problems"}, and nothing of that spec is computed.  A
+    time limit binds all of them together.
+    """
+    read = [_or_refused(path, load) for path in paths]  # all of them before anything is computed
+    with within(_deadline(settings)):
+        alone = replace(settings, time_limit_s=None)
+        return [_check_or_refuse(item, alone) for item in read]
+
+
+def _check_or_refuse(read: LoadedSpec | Json, settings: CheckSettings) -> Json:
+    if isinstance(read, dict):
+        return read
+    return _or_refused(read.path, lambda _: check_loaded(read, settings))
+
+
+def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Json:
+    try:
+        return work(path)
+    except BadInput as error:
+        return {
+            "schema": SCHEMA,
+            "verdict": "refused",
+            "file": str(path),
+            "problems": [problem_json(problem) for problem in error.problems],
+            "text": str(error),
+        }
+
+
+def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
+    """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
+    build = _build(settings)
+    problem: DesignProblem | None = None
+    with within(_deadline(settings)):
+        try:
+            problem = build(loaded)
+            if sole_design(problem) is not None:
+                return _sole_verdict(loaded, problem, settings, build)
+            return _check_open(loaded, problem, replace(settings, time_limit_s=None), build)
+        except OutOfTime as error:
+            return unfinished_verdict(loaded, problem, settings, str(error))
+
+
+def _sole_verdict(
+    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+) -> Json:
+    """The verdict on the only design that a spec leaves.
+
+    Where the spec names candidates, that no design meets it is said as for any number of designs.
+    """
+    sole = sole_design(problem)
+    assert sole is not None
+    from syncline_design.verdict.choice_data import excluded_json
+
+    everything, design = sole
+    verified = verify(loaded, everything, design, settings)
+    if verified.word == "fails" and names_candidates(loaded.spec):
+        return _infeasible_json(loaded, problem, settings, build)
+    return _verdict_json(loaded, everything, verified, settings, excluded_json(problem))
+
+
+def unfinished_verdict(
+    loaded: LoadedSpec, problem: DesignProblem | None, settings: CheckSettings, why: str
+) -> Json:
+    """A verdict that the time limit left without a design."""
+    from syncline_design.verdict.choice_data import unproven_json
+
+    data = frame(loaded, problem, "indeterminate", settings.seed)
+    data["requirements"] = [
+        _placed(loaded, index, one, _unmet(loaded, one, in_conflict=False), settings).to_json()
+        for index, one in enumerate(loaded.spec.requirements)
+    ]
+    data["warnings"] = [{"code": "time-limit", "message": f"{why}; no design was found by then"}]
+    data["choice"] = {"proof": unproven_json(settings.method)}
+    return data
+
+
+def _build(settings: CheckSettings) -> Build:
+    """How a spec becomes a problem: with simulated requirements, unless nothing is simulated."""
+    if not settings.monte_carlo:
+        return problem_of
+    return Simulations(settings.seed, settings.today).problem_of
+
+
+def picked_design(loaded: LoadedSpec, seed: int = 0) -> tuple[DesignProblem, Design]:
+    """The only design of a pinned spec, or the best of an open one; BadInput when there is none."""
+    problem = Simulations(seed).problem_of(loaded)
+    sole = sole_design(problem)
+    if sole is not None:
+        return sole
+    from syncline_design.choice.decide import choose
+    from syncline_design.choice.outcome import Infeasible
+
+    choice = choose(problem)
+    if isinstance(choice, Infeasible):
+        line, column = loaded.positions.get(("stages",), (0, 0))
+        message = "no design meets this spec, so there is no system to work with"
+        hint = f"see `syncline-design check {loaded.path.name}`, or pin the sensors"
+        place = (str(loaded.path), line, column, "stages")
+        raise BadInput((Problem(*place, message, hint=hint),))
+    return problem, choice.design
+
+
+def _check_open(
+    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+) -> Json:
+    """Choose, then verify; without any design say why and what would help."""
+    from syncline_design.verdict.open_choice import pick
+
+    picked = pick(
+        problem,
+        settings.method,
+        settings.time_limit_s,
+        lambda design: verify(loaded, problem, design, settings),
+    )
+    return open_verdict(loaded, problem, picked, settings, build)
+
+
+def open_verdict(
+    loaded: LoadedSpec,
+    problem: DesignProblem,
+    picked: Picked,
+    settings: CheckSettings,
+    build: Build | None = None,
+    points: Sequence[FrontPoint] | None = None,
+) -> Json:
+    """The verdict on what was picked for a spec; points: its front of cost, where known."""
+    from syncline_design.verdict.choice_data import choice_json, left_out_text
+
+    build = build or _build(settings)
+    if sole_design(problem) is not None:
+        return _sole_verdict(loaded, problem, settings, build)
+    if picked.verified is None:
+        return _infeasible_json(loaded, problem, settings, build)
+    pieces = Pieces(lambda: refusals(problem))
+    choice = choice_json(loaded, problem, picked, pieces, points)
+    data = _verdict_json(loaded, problem, picked.verified, settings, choice)
+    if picked.verified.word != "meets" and not picked.exhausted:
+        data["verdict"] = "indeterminate"
+    data["warnings"][:0] = [*_unproven(picked), *pieces.cautions]
+    if choice["front_left_out"]:
+        text = left_out_text(choice["front_left_out"], "cost")
+        data["warnings"].append({"code": "unpriced", "message": text})
+    if picked.passed_over:
+        data["warnings"].insert(0, _passed_over(picked))
+    return data
+
+
+def _unproven(picked: Picked) -> list[Json]:
+    """What the time limit left open about a design that meets."""
+    proof = picked.choice.proof
+    if proof.optimal:
+        return []
+    gap = "" if proof.gap is None else f" (by {100 * proof.gap:.3g} % at most)"
+    message = f"the time limit ended the search: a better design than this may exist{gap}"
+    return [{"code": "not-proven-optimal", "message": message}]
+
+
+def _infeasible_json(
+    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+) -> Json:
+    """Why there is no design, and which single changes would help."""
+    from syncline_design.choice.explain import explain
+    from syncline_design.verdict.choice_data import excluded_json
+
+    found = explain(loaded, problem, build)
+    data = frame(loaded, problem, "infeasible", settings.seed)
+    data["infeasibility"] = found.to_json() | {"text": found.lines()}
+    conflict = {m.id for members in (found.conflict, *found.further) for m in members}
+    data["requirements"] = [
+        _placed(
+            loaded, index, one, _unmet(loaded, one, one.id in conflict, found.minimal), settings
+        ).to_json()
+        for index, one in enumerate(loaded.spec.requirements)
+    ]
+    data["choice"] = excluded_json(problem)
+    if found.cut_short:
+        message = "the time limit ended the search for reasons and remedies"
+        data["warnings"] = [{"code": "time-limit", "message": message}]
+    return data
+
+
+def _unmet(
+    loaded: LoadedSpec, one: Requirement, in_conflict: bool, minimal: bool = True
+) -> RequirementResult:
+    """A requirement of a spec without a design: part of the conflict, or not reached."""
+    unit = UNITS.get(one.kind, loaded.spec.currency)
+    quantile = None if one.quantile is None else float(one.quantile)
+    status: Status = "fail" if in_conflict else "indeterminate"
+    part = "part of the conflict" if minimal else "perhaps part of the conflict"
+    note = part if in_conflict else "no design to judge it by"
+    limit = one.limit
+    if one.kind == "cost" and isinstance(limit, Quantity):
+        limit = float(loaded.spec.in_currency(limit))
+    return RequirementResult(
+        one.id, one.kind, status, None, float(limit), unit, quantile=quantile, note=note
+    )
+
+
+def _passed_over(picked: Picked) -> Json:
+    count = f"{picked.passed_over} design{'s' if picked.passed_over > 1 else ''}"
+    message = f"{count} that come before this one keep every sum but not the Monte Carlo limits"
+    if not picked.exhausted:
+        message = (
+            f"{count} keep every sum but not the Monte Carlo limits; shown is the first; the "
+            f"search stopped after {MOST_SIMULATED} simulated designs"
+        )
+    return {"code": "passed-over", "message": message}
+
+
+def exit_code(verdict: Json) -> int:
+    """0 meets, 1 does not meet, 2 refused, 3 no verdict."""
+    return EXIT_CODES[verdict["verdict"]]
+
+
+def verify(
+    loaded: LoadedSpec, problem: DesignProblem, design: Design, settings: CheckSettings
+) -> Verified:
+    """Budget, exact recheck, Monte Carlo and every requirement of one design."""
+    system = system_of(loaded, problem, design, effect_entries(loaded))
+    known = known_of(system)
+    figures = budget(system, known.extra_tau_s, known.systematic)
+    exact = recheck(loaded, selection_of(problem, design), known.extra_tau_s, known.systematic)
+    found, trouble = _monte_carlo(loaded, system, settings)
+    results = tuple(_results(loaded, system, exact, found, settings))
+    return Verified(design, system, figures, exact, found, results, trouble)
+
+
+def _monte_carlo(
+    loaded: LoadedSpec, system: System, settings: CheckSettings
+) -> tuple[MonteCarlo | None, str]:
+    """The cross-check, or why there is none; a trajectory that cannot be used is bad input."""
+    if not settings.monte_carlo:
+        return None, "left out on request"
+    try:
+        in_force().doing("simulating")
+        return cross_check(system, simulation_settings(loaded, settings.seed)), ""
+    except OutOfTime:
+        return None, "the time limit ended it"
+    except SimulationError as error:
+        if loaded.spec.monte_carlo.trajectory is not None:
+            refuse_trajectory(loaded, str(error))
+        return None, str(error)
+
+
+def _results(
+    loaded: LoadedSpec,
+    system: System,
+    exact: Recheck,
+    found: MonteCarlo | None,
+    settings: CheckSettings,
+) -> Iterator[RequirementResult]:
+    rechecked = {one.id: one for one in exact.requirements}
+    for one in exact.requirements:
+        if one.implied:
+            yield RequirementResult(
+                one.id, one.kind, "pass" if one.passed else "fail", one.value_float,
+                float(one.limit), UNITS[one.kind], implied=True,
+                note=one.note,
+            )  # fmt: skip
+    for index, requirement in enumerate(loaded.spec.requirements):
+        if requirement.kind == "monte_carlo":
+            result = _decided(loaded, requirement, system, found, settings)
+        else:
+            one = rechecked[requirement.id]
+            result = RequirementResult(
+                one.id,
+                one.kind,
+                "pass" if one.passed else "fail",
+                one.value_float,
+                float(one.limit),
+                UNITS.get(one.kind, loaded.spec.currency),
+                note="" if one.value is not None else f"a catalog entry gives no {one.kind}",
+            )
+        yield _placed(loaded, index, requirement, result, settings)
+
+
+def _decided(
+    loaded: LoadedSpec,
+    requirement: Requirement,
+    system: System,
+    found: MonteCarlo | None,
+    settings: CheckSettings,
+) -> RequirementResult:
+    """A Monte Carlo requirement: sampled on until its interval leaves the limit."""
+    limit, quantile = float(requirement.limit), float(requirement.quantile or 0.0)
+    blank = RequirementResult(
+        requirement.id, "monte_carlo", "indeterminate", None, limit, UNITS["monte_carlo"],
+        quantile=quantile,
+    )  # fmt: skip
+    if found is None:
+        return replace(blank, note="not simulated")
+    simulation = simulation_settings(loaded, settings.seed)
+    try:
+        decision = decide(system, simulation, quantile, limit, first=found)
+    except OutOfTime:
+        return replace(blank, note="the time limit ended the simulation before it was decided")
+    estimate = decision.estimate
+    return replace(
+        blank,
+        status=decision.status,
+        value=estimate.value_m,
+        low=estimate.low_m,
+        high=estimate.high_m,
+        note=_samples_note(decision, simulation.samples),
+    )
+
+
+def _samples_note(decision: Decision, asked: int) -> str:
+    if decision.status == "indeterminate":
+        return f"the interval still holds the limit after {decision.samples} samples"
+    return f"took {decision.samples} samples to decide" if decision.samples > asked else ""
+
+
+def _placed(
+    loaded: LoadedSpec,
+    index: int,
+    requirement: Requirement,
+    result: RequirementResult,
+    settings: CheckSettings,
+) -> RequirementResult:
+    """The result with its place in the spec, its note and its waiver."""
+    line, column = loaded.positions.get(("requirements", index), (None, None))
+    note = "; ".join(text for text in (requirement.note, result.note) if text)
+    waiver = None
+    if requirement.waiver is not None:
+        today = settings.today or date.today()
+        waiver = {
+            "reason": requirement.waiver.reason,
+            "expires": requirement.waiver.expires,
+            "expired": not requirement.waiver.holds_on(today),
+        }
+    return replace(result, line=line, column=column, note=note, waiver=waiver)
+
+
+def _verdict_json(
+    loaded: LoadedSpec,
+    problem: DesignProblem,
+    verified: Verified,
+    settings: CheckSettings,
+    choice: Json,
+) -> Json:
+    entries = used_entries(loaded, problem, verified.design)
+    model = loaded.spec.sync_model
+    data = frame(loaded, problem, verified.word, settings.seed)
+    data["requirements"] = [r.to_json() for r in verified.requirements]
+    data["design"] = design_json(loaded, problem, verified.design, verified.figures)
+    data["syncline"] = syncline_json(verified.figures, model, float(verified.exact.total_m))
+    data["figures"] = figures_json(verified)
+    data["monte_carlo"] = None if verified.monte_carlo is None else verified.monte_carlo.to_json()
+    data["assumptions"] = assumptions(entries)
+    data["sources"] = sources(entries)
+    data["effects"] = effects_json(verified.system)
+    data["warnings"] = cautions(loaded, verified, data["assumptions"])
+    if choice:
+        data["choice"] = choice
+    return data
