@@ -1,0 +1,137 @@
+"""Results as data: one walk from frozen records to JSON, one from their types to JSON Schema, and
+one back from JSON.
+
+A result is a frozen dataclass below `Record`; its fields are the keys of its JSON, in their order.
+A field that ends in an underscore stands for the key without it (`from_` is `from`).  A field made
+by `optional()` is left out of the JSON while it is None; every other one is always there, null
+where a figure is unknown or has no end.
+
+The rule for versions (`.../v1`): within a version keys are added, never renamed, never given
+another meaning and never dropped.  What is added later is `optional()` or has a default, so that
+files of an earlier state of the same version still read.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, ClassVar, Final, TypeVar
+
+Json = dict[str, Any]
+R = TypeVar("R", bound="Record")
+DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
+_OPTIONAL: Final = "optional"
+
+
+def key_of(field: str) -> str:
+    """The JSON key of a field."""
+    return field.removesuffix("_")
+
+
+class Record:
+    """Base of every result that is written as JSON; subclasses are frozen dataclasses."""
+
+    __slots__ = ()
+    # what pydantic reads when it makes a schema of a record, or a record of a file
+    __pydantic_config__: ClassVar[Json] = {"alias_generator": key_of, "strict": True}
+
+    def to_json(self) -> Json:
+        """The record as plain data, ready for `json`."""
+        return _record_json(self)
+
+
+def optional() -> Any:
+    """A field that may be missing: None here, no key there."""
+    return dataclasses.field(default=None, metadata={_OPTIONAL: True})
+
+
+def json_of(value: Any) -> Any:
+    """Nested records, mappings, sequences and scalars as plain JSON data.
+
+    Whatever is infinite or not a number becomes null: JSON has neither.
+    """
+    if value is None or isinstance(value, str | bool | int):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, Record):
+        return _record_json(value)
+    if isinstance(value, Mapping):
+        return {str(key): json_of(entry) for key, entry in value.items()}
+    if isinstance(value, Sequence):
+        return [json_of(entry) for entry in value]
+    raise TypeError(f"{type(value).__name__} has no place in a result")
+
+
+def _record_json(record: Record) -> Json:
+    found: Json = {}
+    for field in dataclasses.fields(record):  # type: ignore[arg-type]
+        value = getattr(record, field.name)
+        if value is not None or _OPTIONAL not in field.metadata:
+            found[key_of(field.name)] = json_of(value)
+    return found
+
+
+def with_texts(value: Any, change: Callable[[str], str]) -> Any:
+    """A copy of a record, or of nested data, in which every text (keys included) is changed."""
+    if isinstance(value, str):
+        return change(value)
+    if isinstance(value, Record):
+        fields = dataclasses.fields(value)  # type: ignore[arg-type]
+        parts = {f.name: with_texts(getattr(value, f.name), change) for f in fields}
+        return type(value)(**parts)
+    if isinstance(value, Mapping):
+        return {with_texts(k, change): with_texts(entry, change) for k, entry in value.items()}
+    if isinstance(value, tuple | list):
+        return tuple(with_texts(entry, change) for entry in value)
+    return value
+
+
+class NotThisResultError(ValueError):
+    """JSON that is not a result of the kind asked for; each line says where and what."""
+
+
+def read_as(kind: type[R], text: str | bytes) -> R:
+    """A result read back from its JSON; NotThisResultError where it does not hold what it must."""
+    from pydantic import TypeAdapter, ValidationError
+
+    try:
+        return TypeAdapter(kind).validate_json(text)
+    except ValidationError as error:
+        raise NotThisResultError("\n".join(_lines(error.errors()))) from None
+
+
+def _lines(errors: Sequence[Mapping[str, Any]]) -> list[str]:
+    """`path: what is wrong`, one line an error, the same ones every time."""
+    return sorted({f"{_path(e['loc']) or 'the file'}: {e['msg']}" for e in errors})
+
+
+def _path(location: Sequence[int | str]) -> str:
+    shown = ""
+    for part in location:
+        shown += f"[{part}]" if isinstance(part, int) else f".{part}" if shown else part
+    return shown
+
+
+def schema_of(kind: type[Record], name: str, title: str) -> Json:
+    """JSON Schema (draft 2020-12) of a result; name: its `schema` key, as in `.../verdict/v1`.
+
+    Further keys are allowed everywhere: a later state of the same version may add some.
+    """
+    from pydantic import TypeAdapter
+
+    raw = TypeAdapter(kind).json_schema()
+    body = _without_titles(raw)
+    body["properties"]["schema"] = {"const": name}
+    return {"$schema": DRAFT, "$id": f"urn:{name.replace('/', ':')}", **body, "title": title}
+
+
+def _without_titles(node: Any) -> Any:
+    """A schema without the titles that only repeat the names of its keys."""
+    if isinstance(node, list):
+        return [_without_titles(entry) for entry in node]
+    if not isinstance(node, dict):
+        return node
+    kept = {k: v for k, v in node.items() if not (k == "title" and isinstance(v, str))}
+    return {key: _without_titles(entry) for key, entry in kept.items()}

@@ -1,0 +1,128 @@
+"""Records against `json`, `jsonschema` and plain dictionaries written by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import jsonschema
+import numpy as np
+import pytest
+
+from syncline_design.machine.records import (
+    NotThisResultError,
+    Record,
+    optional,
+    read_as,
+    schema_of,
+    with_texts,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Change(Record):
+    """One change."""
+
+    kind: Literal["limit", "distance"]
+    from_: float | None
+    to: float | str | None
+    title: str
+    text: str | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class Whole(Record):
+    """A result of the tests."""
+
+    schema: str
+    changes: tuple[Change, ...]
+    sums: Mapping[str, float | None]
+    passed: bool
+    count: int
+
+
+RESULT = Whole(
+    "x/v1",
+    (Change("limit", 0.1, "far", "a"), Change("distance", math.inf, None, "b", "said")),
+    {"3d": 1.5, "horizontal": math.nan},
+    True,
+    3,
+)
+PLAIN: dict[str, Any] = {
+    "schema": "x/v1",
+    "changes": [
+        {"kind": "limit", "from": 0.1, "to": "far", "title": "a"},
+        {"kind": "distance", "from": None, "to": None, "title": "b", "text": "said"},
+    ],
+    "sums": {"3d": 1.5, "horizontal": None},
+    "passed": True,
+    "count": 3,
+}
+
+
+def test_json_holds_every_field_in_order_and_nothing_that_json_lacks() -> None:
+    assert RESULT.to_json() == PLAIN
+    assert json.dumps(RESULT.to_json(), allow_nan=False) == json.dumps(PLAIN)
+
+
+def test_what_json_cannot_say_is_refused_not_guessed() -> None:
+    with pytest.raises(TypeError, match="complex has no place"):
+        Whole("x/v1", (), {"a": 1j}, True, 1).to_json()  # type: ignore[dict-item]
+
+
+def test_figures_of_numpy_are_plain_figures() -> None:
+    made = Whole("x/v1", (), {"a": np.float64(0.25)}, True, 1).to_json()
+    assert type(made["sums"]["a"]) is float
+
+
+def test_a_record_comes_back_from_its_json_and_later_keys_do_no_harm() -> None:
+    text = json.dumps({**PLAIN, "added_later": [1]})
+    assert read_as(Whole, text).to_json() == PLAIN
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"count": "3"}, "count: "),
+        ({"changes": [{**PLAIN["changes"][0], "kind": "other"}]}, "changes[0].kind: "),
+        ({"changes": [{"kind": "limit"}]}, "changes[0].from: Field required"),
+        ({"sums": {"a": "1"}}, "sums.a"),
+        ({"passed": 1}, "passed: "),
+    ],
+)
+def test_other_json_is_refused_with_its_place(change: dict[str, Any], said: str) -> None:
+    with pytest.raises(NotThisResultError) as refused:
+        read_as(Whole, json.dumps(PLAIN | change))
+    assert said in str(refused.value)
+
+
+def test_text_that_is_no_json_is_refused() -> None:
+    with pytest.raises(NotThisResultError, match="the file: Invalid JSON"):
+        read_as(Whole, "{")
+
+
+def test_the_schema_accepts_the_result_and_refuses_another() -> None:
+    schema = schema_of(Whole, "x/v1", "a result")
+    validator = jsonschema.Draft202012Validator(schema)
+    validator.check_schema(schema)
+    validator.validate(RESULT.to_json())
+    validator.validate({**PLAIN, "added_later": 1})
+    for wrong in (
+        {**PLAIN, "schema": "x/v2"},
+        {**PLAIN, "passed": "yes"},
+        {key: value for key, value in PLAIN.items() if key != "sums"},
+        {**PLAIN, "changes": [{"kind": "limit", "from_": 0.1, "to": 1, "title": "a"}]},
+    ):
+        assert not validator.is_valid(wrong), wrong
+    assert "title" in schema["$defs"]["Change"]["properties"]
+
+
+def test_texts_are_changed_everywhere_and_nothing_else() -> None:
+    shouted = with_texts(RESULT, str.upper)
+    assert shouted.changes[1].text == "SAID"
+    assert shouted.sums["3D"] == 1.5
+    assert RESULT.changes[1].text == "said"
+    assert shouted.count == 3
