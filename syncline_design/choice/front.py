@@ -31,7 +31,7 @@ from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choice.pareto import Bools, Columns, Floats, Indices, undominated
 from syncline_design.choice.rounded_once import total_errors_m
 from syncline_design.choice.table import ClockOption, Design, Problem, ResourceName, is_empty
-from syncline_design.machine.deadline import in_force
+from syncline_design.machine.deadline import in_force, within
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,8 +71,14 @@ def merged_front(
     demand_structure(problem)
     if is_empty(problem):
         return ()
+    with within(deadline or in_force()) as end:
+        return _merged(problem, resource, accuracy, end)
+
+
+def _merged(
+    problem: Problem, resource: ResourceName, accuracy: bool, end: Deadline
+) -> tuple[FrontPoint, ...]:
     tables = _one_timeline(tabulate(problem, resource))
-    end = deadline or in_force()
     relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=None)
     holds = _hold_sync(tables, relaxed)
     points = _points(tables, relaxed, holds)

@@ -13,6 +13,7 @@ from syncline_design.choice.arrays import RoleArrays
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.pareto import Bools, Column, Floats, Indices
 from syncline_design.choice.table import Problem
+from syncline_design.machine.deadline import in_force
 
 CHUNK = 200_000  # candidates looked at in one go
 MOST_PER_STEP = 10 * CHUNK
@@ -105,7 +106,9 @@ def extend(labels: Labels, added: Addition, keep: Callable[[Labels], Indices]) -
     if n <= rows:
         return _extend(labels, added, keep)
     parts: list[Labels] = []
+    deadline = in_force()
     for start in range(0, n, rows):
+        deadline.check()
         parts.append(_extend(labels.take(np.arange(start, min(n, start + rows))), added, keep))
         if sum(map(len, parts)) > MOST_LABELS:
             raise TooLarge(f"more than {MOST_LABELS} partial designs that none replaces")

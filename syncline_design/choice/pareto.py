@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.machine.deadline import in_force
+
 Column = NDArray[Any]
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -19,6 +21,7 @@ BLOCK = 256
 MOST_GROUPS = 32  # combinations of columns of few values
 THIN_ABOVE = 3000  # rows from which a sample thins them out first
 SAMPLE = 1000
+ROWS_PER_LOOK = 8192  # rows between two looks at the clock
 
 
 @dataclass(frozen=True, slots=True)
@@ -248,12 +251,15 @@ class _Sorted:
         return self._in_blocks(left) if groups is None else self._in_staircases(left, *groups)
 
     def _in_blocks(self, left: Indices) -> Indices:
-        """Each block of rows against all rows kept before it."""
+        """Each block of rows against all rows kept before it; OutOfTime between two blocks."""
         kept = left[:0]
+        deadline = in_force()
         for start in range(0, len(left), BLOCK):
             block = left[start : start + BLOCK]
-            if len(kept):
-                block = block[~self.replaces(kept[:, None], block[None, :]).any(axis=0)]
+            for before in range(0, len(kept), ROWS_PER_LOOK):
+                deadline.check()
+                some = kept[before : before + ROWS_PER_LOOK]
+                block = block[~self.replaces(some[:, None], block[None, :]).any(axis=0)]
             block = block[~self.replaces(block[:, None], block[None, :]).any(axis=0)]
             kept = np.concatenate([kept, block])
         return kept
@@ -286,7 +292,10 @@ class _Sorted:
             return left[_one_staircase(amount, first, second, ties)]
         stairs = [_Stairs() for _ in below]
         kept = []
+        deadline = in_force()
         for row, (one, two) in enumerate(zip(first, second, strict=True)):
+            if row % ROWS_PER_LOOK == 0 and row:
+                deadline.check()
             for g in below[group[row]]:
                 other = stairs[g].lowest(one, two)
                 if other is not None and (
