@@ -6,8 +6,10 @@ of the standard library or the conversion of `tests.world.geodesy`.
 
 from __future__ import annotations
 
+import base64
 import csv
 import os
+import re
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta, timezone
@@ -306,6 +308,57 @@ def test_parquet_of_other_types(tmp_path: Path) -> None:
         "time"
     )
     frame.with_columns(at).drop("time_s").write_parquet(path)
+    assert read(path).time_s == pytest.approx(plain.time_s, abs=1e-6)
+
+
+def with_offset(path: Path, zone: str) -> None:
+    """Puts an offset in the place of the zone `Israel` (as long) in the Arrow schema of a file.
+
+    Arrow writes such files; polars writes none.
+    """
+    found = re.search(rb"ARROW:schema.{1,6}?([A-Za-z0-9+/]{40,}=*)", path.read_bytes(), re.DOTALL)
+    assert found is not None
+    coded = found[1][found[1].index(b"/////") :]
+    schema = base64.b64decode(coded)
+    assert b"Israel" in schema
+    patched = base64.b64encode(schema.replace(b"Israel", zone.encode()))
+    path.write_bytes(path.read_bytes().replace(coded, patched))
+
+
+@pytest.mark.parametrize("zone", ["+05:30", "-03:30", "Europe/Oslo", "UTC"])
+@pytest.mark.parametrize("unit", ["ms", "us", "ns"])
+def test_parquet_times_of_any_zone_are_utc(tmp_path: Path, zone: str, unit: str) -> None:
+    """Arrow keeps zoned stamps in UTC; offsets as zones made polars panic (exit code 1)."""
+    import polars as pl
+
+    per_second = {"ms": 10**3, "us": 10**6, "ns": 10**9}[unit]
+    start = int(datetime(2026, 3, 1, 10, tzinfo=UTC).timestamp())
+    made = pl.DataFrame(columns())
+    counts = [start * per_second + i * per_second // 8 for i in range(made.height)]
+    offset = zone[0] in "+-"
+    kind = pl.Datetime(unit, "Israel" if offset else zone)  # type: ignore[arg-type]
+    stamps = pl.Series("time", counts, dtype=pl.Int64).cast(kind)
+    path = tmp_path / "log.parquet"
+    made.drop("time_s").with_columns(stamps).write_parquet(path)
+    if offset:
+        with_offset(path, zone)
+    log = read(path)
+    assert log.time_s[0] == 10 * 3600.0
+    assert np.allclose(np.diff(log.time_s), 0.125, atol=1e-9)
+    assert log.notes == ("times are UTC, in seconds since 2026-03-01T00:00:00Z",)
+    assert "POLARS_IGNORE_TIMEZONE_PARSE_ERROR" not in os.environ
+
+
+@pytest.mark.parametrize("name", ["time", "time_s", "time_ms"])
+def test_parquet_durations_carry_their_own_unit(tmp_path: Path, name: str) -> None:
+    """`time` was refused as numbers without a unit, `time_ms` read as thousandths."""
+    import polars as pl
+
+    plain = read(write(tmp_path / "a.csv", columns()))
+    spans = (pl.col("time_s") * 1e6).round().cast(pl.Int64).cast(pl.Duration("us")).alias(name)
+    order = [name, *(key for key in columns() if key != "time_s")]
+    path = tmp_path / "log.parquet"
+    pl.DataFrame(columns()).with_columns(spans).select(order).write_parquet(path)
     assert read(path).time_s == pytest.approx(plain.time_s, abs=1e-6)
 
 

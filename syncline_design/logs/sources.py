@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
@@ -29,6 +31,7 @@ from syncline_design.spec.load import BadInput
 if TYPE_CHECKING:
     import polars as pl
 
+ZONE_CHECK = "POLARS_IGNORE_TIMEZONE_PARSE_ERROR"
 MOST_BYTES = 4 * 1024**3
 MOST_ROWS = 20_000_000
 NANOSECONDS = 1_000_000_000
@@ -42,11 +45,13 @@ class Clock:
     """A column of times: seconds as written, or nanoseconds since 1970 where it is a calendar's.
 
     zoned: whether calendar times name their zone; None for numbers.
+    spans: whether the seconds are durations, which need no unit in the column's name.
     """
 
     seconds: Array | None
     nanoseconds: Stamps | None
     zoned: bool | None = None
+    spans: bool = False
 
 
 class Source(Protocol):
@@ -272,6 +277,23 @@ def as_labels(text: pl.Series) -> Array:
     return values
 
 
+@contextmanager
+def any_zone() -> Iterator[None]:
+    """Lets polars open columns whose zone is an offset (`+05:30`, as Arrow writes it).
+
+    Without it polars panics over any zone that is no name of the time zone database.
+    """
+    before = os.environ.get(ZONE_CHECK)
+    os.environ[ZONE_CHECK] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[ZONE_CHECK]
+        else:
+            os.environ[ZONE_CHECK] = before
+
+
 class ParquetSource:
     """A Parquet file, column by column."""
 
@@ -280,10 +302,11 @@ class ParquetSource:
 
         self.path, self.cut = path, 0
         try:
-            self._frame = pl.scan_parquet(path, glob=False, hive_partitioning=False)
-            self._schema = self._frame.collect_schema()
-            self.rows = int(self._frame.select(pl.len()).collect().item())
-        except Exception as error:  # polars raises many kinds, all of them the file's fault
+            with any_zone():
+                self._frame = pl.scan_parquet(path, glob=False, hive_partitioning=False)
+                self._schema = self._frame.collect_schema()
+                self.rows = int(self._frame.select(pl.len()).collect().item())
+        except (Exception, pl.exceptions.PanicException) as error:  # all of them the file's fault
             raise self._unreadable(error) from None
         self.header = tuple(self._schema.names())
         if len(self.header) > delimited.MOST_COLUMNS:
@@ -293,14 +316,17 @@ class ParquetSource:
             most = f"at most {MOST_ROWS}"
             raise refuse(path, "too many rows", expected=most, found=str(self.rows))
 
-    def _unreadable(self, error: Exception) -> BadInput:
+    def _unreadable(self, error: BaseException) -> BadInput:
         found = (str(error).splitlines() or [type(error).__name__])[0][:160]
         return refuse(self.path, "no readable Parquet file", found=found)
 
     def _column(self, name: str) -> pl.Series:
+        import polars as pl
+
         try:
-            return self._frame.select(name).collect().to_series(0)
-        except Exception as error:
+            with any_zone():
+                return self._frame.select(name).collect().to_series(0)
+        except (Exception, pl.exceptions.PanicException) as error:
             raise self._unreadable(error) from None
 
     def clock(self, name: str) -> Clock:
@@ -308,11 +334,16 @@ class ParquetSource:
 
         kind = self._schema[name]
         if kind == pl.Datetime or kind == pl.Date:
-            at = self._column(name).cast(pl.Datetime("ns", getattr(kind, "time_zone", None)))
+            zoned = isinstance(kind, pl.Datetime) and kind.time_zone is not None
+            column = self._column(name)
+            if isinstance(kind, pl.Datetime):  # kept as UTC, whatever the zone
+                column = column.to_physical().cast(pl.Datetime(kind.time_unit))
+            at = column.cast(pl.Datetime("ns"))
             stamps = at.to_physical().fill_null(NO_TIME).to_numpy().astype(np.int64)
-            return Clock(None, stamps, getattr(kind, "time_zone", None) is not None)
+            return Clock(None, stamps, zoned)
         if kind == pl.Duration:
-            return Clock(self._column(name).dt.total_nanoseconds().to_numpy() / NANOSECONDS, None)
+            spans = self._column(name).dt.total_nanoseconds()
+            return Clock(spans.cast(pl.Float64).to_numpy() / NANOSECONDS, None, spans=True)
         series = self._plain(name)
         if series.dtype == pl.String:
             text = self._trimmed(name, series)

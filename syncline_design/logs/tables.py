@@ -101,6 +101,8 @@ def _seconds(
         said = () if clock.zoned else (f"{path.name}: {name} names no zone and is taken as UTC",)
         return seconds, day, said
     assert clock.seconds is not None
+    if clock.spans:
+        return clock.seconds, None, ()
     if math.isnan(factor) and clock.seconds.shape[0]:
         raise refuse(
             path,
