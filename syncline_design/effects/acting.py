@@ -19,7 +19,7 @@ from syncline_design.effects.record import (
 )
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
-from syncline_design.model.system import EffectEntry, RoleName, SimulationError, System
+from syncline_design.model.system import EffectEntry, RoleName, SimulationError, Stage, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,10 +39,10 @@ def by_stage(system: System) -> ByStage:
     if not system.effects:
         return {}
     known = registry()
-    names = {stage.name for stage in system.stages}
+    stages = {stage.name: stage for stage in system.stages}
     found: dict[str, tuple[Acting, ...]] = {}
     for number, entry in enumerate(system.effects):
-        _demand_entry(number, entry, known, names)
+        _demand_entry(number, entry, known, stages)
         values = dict(entry.parameters)
         acting = Acting(known[entry.effect], entry.sensor, values)  # type: ignore[arg-type]
         found[entry.stage] = (*found.get(entry.stage, ()), acting)
@@ -55,7 +55,7 @@ def tilts(system: System) -> bool:
 
 
 def _demand_entry(
-    number: int, entry: EffectEntry, known: Mapping[str, Effect], stages: set[str]
+    number: int, entry: EffectEntry, known: Mapping[str, Effect], stages: Mapping[str, Stage]
 ) -> None:
     path = f"effects[{number}]"
     if entry.effect not in known:
@@ -72,6 +72,9 @@ def _demand_entry(
         raise SimulationError(
             f"{path}.sensor: {entry.effect} acts on {expected}, found {entry.sensor!r}"
         )
+    nowhere = entry.sensor == "position" and stages[entry.stage].position is None
+    if nowhere and not effect.transponder:
+        raise SimulationError(f"{path}.sensor: stage {entry.stage} has no position sensor")
     missing = {p.name for p in effect.parameters} - {name for name, _ in entry.parameters}
     if missing:
         raise SimulationError(f"{path}.parameters: missing {', '.join(sorted(missing))}")

@@ -232,6 +232,8 @@ class Effect:
     contribute: what it adds to the Syncline of a stage.
     applies: whether a stage can have it.
     tilted: acts by roll and pitch, which the simulator then draws over the horizon's tilt.
+    transponder: as an effect of the position, acts on a later stage's transponder too, which has
+    a place but neither stamps nor noise of its own.
     sentence: for people, a format string over {sensor} and the parameters.
     """
 
@@ -249,6 +251,7 @@ class Effect:
     spread: Spread | None = None
     applies: Applies = everywhere
     tilted: bool = False
+    transponder: bool = False
 
     def slopes(self) -> tuple[Parameter, ...]:
         """The parameters that `sensitivity` has a column for."""

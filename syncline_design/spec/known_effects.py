@@ -40,6 +40,26 @@ def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:
     )
 
 
+def _transponder_problem(
+    loaded: LoadedSpec, at: KeyPath, effect: EffectChoice
+) -> Iterator[Problem]:
+    """A later stage has no position sensor whose stamps or noise an effect could change."""
+    from syncline_design.effects import registry
+
+    names = [stage.name for stage in loaded.spec.stages]
+    place = names.index(effect.stage) if effect.stage in names else 0
+    if place == 0:
+        return
+    before = names[place - 1]
+    message = (
+        f"stage {effect.stage} has no position sensor: its position is the chain before it, "
+        f"stamped by the ranging sensor of {before}"
+    )
+    acting = ", ".join(name for name, record in registry().items() if record.transponder)
+    known = [f"{acting} (of the transponder)", f"sensor: ranging with stage: {before}"]
+    yield _problem(loaded, (*at, "sensor"), message, f"{effect.effect} of its position", known)
+
+
 def _plain(value: float | str) -> float | str:
     return value if isinstance(value, str) else float(value)
 
@@ -54,6 +74,8 @@ def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator
     if effect.sensor not in record.sensors:
         message = f"{effect.effect} does not act on this sensor"
         yield _problem(loaded, (*at, "sensor"), message, effect.sensor, list(record.sensors))
+    elif effect.sensor == "position" and not record.transponder:
+        yield from _transponder_problem(loaded, at, effect)
     names = [parameter.name for parameter in record.parameters]
     for name in effect.parameters:
         if name not in names:

@@ -198,7 +198,10 @@ def _effect_misfits(document: Document, spec: Spec) -> Iterator[Problem]:
             wanted = f"one of {', '.join(names)}"
             yield problem_at(document, (*at, "stage"), "unknown stage", wanted, effect.stage, hint)
         elif effect.sensor in ROLE_NAMES:
-            stage = spec.stages[names.index(effect.stage) if effect.stage else 0]
+            place = names.index(effect.stage) if effect.stage else 0
+            stage = spec.stages[place]
+            if place > 0 and effect.sensor == "position":
+                continue  # a transponder: which effects act on it is the dictionary's to say
             if stage.role(effect.sensor) is None:
                 message = f"stage {stage.name} has no {effect.sensor} sensor"
                 yield problem_at(document, (*at, "sensor"), message)
