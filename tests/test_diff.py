@@ -172,3 +172,56 @@ def test_every_format_is_written(files: tuple[Path, Path]) -> None:
     assert written["markdown"].startswith("## ")
     [line] = written["github"].splitlines()
     assert line.startswith("::error file=")
+
+
+def _priced(path: Path, currency: str, rate: float) -> None:
+    """The spec with its sums in another currency; 1 EUR is `rate` of it."""
+    head, _, tail = SPEC.partition("requirements:\n")
+    money = f"currency: {currency}\nexchange_rates: {{EUR: {rate} {currency}}}\n"
+    path.write_text(f"{head}{money}requirements:\n{tail}", encoding="utf-8")
+
+
+@pytest.mark.parametrize("back", [False, True], ids=["to USD", "from USD"])
+@pytest.mark.parametrize("stored", [False, True], ids=["specs", "verdict files"])
+def test_each_side_keeps_its_currency(
+    files: tuple[Path, Path], tmp_path: Path, stored: bool, back: bool
+) -> None:
+    """Oracle: what each spec costs by itself; the same payload is no dearer in another currency.
+
+    Before, the old side's euros were printed as dollars and subtracted from them.
+    """
+    _priced(files[1], "USD", 1.17)
+    sides = (files[1], files[0]) if back else files
+    verdicts = [check_file(side, PLAIN) for side in sides]
+    if stored:
+        names = [tmp_path / "old.json", tmp_path / "new.json"]
+        for name, verdict in zip(names, verdicts, strict=True):
+            name.write_text(json_text(verdict), encoding="utf-8")
+        sides = (names[0], names[1])
+    data = diff(*sides, PLAIN)
+    euros, dollars = (f"{v['design']['cost']:,.2f}".replace(",", " ") for v in verdicts)
+    first, second = ("USD", "EUR") if back else ("EUR", "USD")
+    shown = [render_diff(name, data) for name in ("markdown", "html")] + [diff_text(data)]
+    for text in shown:
+        plain = text.replace("\N{NO-BREAK SPACE}", " ")
+        assert f"{euros} {first}" in plain
+        assert f"{dollars} {second}" in plain
+        assert f"{euros} {second}" not in plain
+    cost = next(entry for entry in data["sums"] if entry["name"] == "cost")
+    assert (cost["old_unit"], cost["unit"], cost["change"]) == (first, second, None)
+    assert f"price in {second} (before: {first})" in headline(data)
+    limits = next(r for r in data["requirements"] if r["kind"] == "cost")
+    assert (limits["old"]["unit"], limits["new"]["unit"]) == (first, second)
+
+
+def test_what_was_taken_out_reads_as_it_was_written(files: tuple[Path, Path]) -> None:
+    """Decimals in mappings and lists stood as {"number": "0.95"}."""
+    old, new = files
+    line = "  - {id: MC-9, kind: monte_carlo, quantile: 0.950, limit: 0.90 m}\n"
+    change(old, ("requirements:\n", "requirements:\n" + line))
+    drift = "effects:\n  - {effect: latency, sensor: position, parameters: {latency_s: 0.0010}}\n"
+    new.write_text(new.read_text(encoding="utf-8") + drift, encoding="utf-8")
+    text = diff_text(diff(old, new, PLAIN))
+    assert '"quantile": 0.950, "limit": "0.90 m"' in text
+    assert '"parameters": {"latency_s": 0.0010}' in text
+    assert '"number"' not in text

@@ -267,18 +267,23 @@ def _value_there(new: Any, path: KeyPath, old: Any) -> Any:
 
 def changes(old: Json, new: Json) -> Json:
     """Verdict, payload, sums, error and margins of two verdicts, side by side."""
-    currency = (new.get("spec") or old.get("spec") or {}).get("currency", "EUR")
+    currency = _currency(new)
+    sums = (("cost", (_currency(old), currency)), ("mass", ("kg", "kg")), ("power", ("W", "W")))
     return {
         "verdict": {"old": old["verdict"], "new": new["verdict"]},
         "currency": currency,
         "payload": list(_payload(old, new)),
         "sums": [
-            _pair(name, unit, _design(old, name), _design(new, name))
-            for name, unit in (("cost", currency), ("mass", "kg"), ("power", "W"))
+            _pair(name, units, _design(old, name), _design(new, name)) for name, units in sums
         ],
-        "error": _pair("error", "m", _total(old), _total(new)),
+        "error": _pair("error", ("m", "m"), _total(old), _total(new)),
         "requirements": list(_requirements(old, new)),
     }
+
+
+def _currency(verdict: Json) -> str:
+    design, spec = verdict.get("design") or {}, verdict.get("spec") or {}
+    return str(design.get("currency") or spec.get("currency") or "EUR")
 
 
 def _design(verdict: Json, key: str) -> float | None:
@@ -291,9 +296,12 @@ def _total(verdict: Json) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
-def _pair(name: str, unit: str, old: float | None, new: float | None) -> Json:
-    change = None if old is None or new is None else new - old
-    return {"name": name, "unit": unit, "old": old, "new": new, "change": change}
+def _pair(name: str, units: tuple[str, str], old: float | None, new: float | None) -> Json:
+    """Both sides in their own units; amounts in different currencies have no difference."""
+    before, unit = units
+    change = None if old is None or new is None or before != unit else new - old
+    figures = {"old": old, "new": new, "change": change}
+    return {"name": name, "unit": unit, "old_unit": before, **figures}
 
 
 def _picks(verdict: Json) -> dict[str, Json]:
@@ -335,4 +343,5 @@ def _requirements(old: Json, new: Json) -> Iterator[Json]:
 def _standing(row: Json | None) -> Json | None:
     if row is None:
         return None
-    return {key: row.get(key) for key in ("status", "value", "limit", "margin", "line", "column")}
+    keys = ("status", "value", "limit", "margin", "unit", "line", "column")
+    return {key: row.get(key) for key in keys}

@@ -12,6 +12,8 @@ from syncline_design.report.on_difference import (
     pick_words,
     signed_change,
     sum_name,
+    units_of,
+    value_of_limit,
 )
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import harmless
@@ -85,12 +87,12 @@ def _payload(data: Json) -> Table | None:
 def _sums(data: Json) -> Table | None:
     rows = []
     for entry in [*items(data, "sums"), part(data, "error")]:
-        unit = str(entry.get("unit"))
+        before, unit = units_of(entry)
         old, new = numbers.finite(entry.get("old")), numbers.finite(entry.get("new"))
         change = numbers.finite(entry.get("change"))
         rows.append((
             sum_name(entry),
-            Cell(numbers.in_unit(old, unit), old),
+            Cell(numbers.in_unit(old, before), old),
             Cell(numbers.in_unit(new, unit), new),
             Cell(numbers.MISSING if change is None else signed_change(change, unit), change),
         ))  # fmt: skip
@@ -100,17 +102,20 @@ def _sums(data: Json) -> Table | None:
 def _margins(data: Json) -> Table | None:
     rows: list[tuple[Cell | str, ...]] = []
     for entry in items(data, "requirements"):
-        unit = str(entry.get("unit") or "")
-        cells = [_standing(part(entry, side), unit) for side in ("old", "new")]
+        cells = [_standing(part(entry, side)) for side in ("old", "new")]
         rows.append((Cell(str(entry.get("id"))), kind_text(entry), *cells))
     heads = ("Requirement", "Limits", "Before", "Now")
     return table("Requirements, before and now", heads, rows) if rows else None
 
 
-def _standing(row: Json, unit: str) -> Cell:
+def _standing(row: Json) -> Cell:
     """`0.29 m of 0.3 m` with the requirement's status as colour and symbol."""
     if not row:
         return Cell("not required")
     state = STATUSES.get(str(row.get("status")), STATUSES["indeterminate"])
-    text = f"{numbers.in_unit(row.get('value'), unit)} of {numbers.in_unit(row.get('limit'), unit)}"
-    return Cell(f"{text}, {state.word}", numbers.finite(row.get("value")), state.tone, state.mark)
+    return Cell(
+        f"{value_of_limit(row)}, {state.word}",
+        numbers.finite(row.get("value")),
+        state.tone,
+        state.mark,
+    )

@@ -53,6 +53,8 @@ def effect_words(data: Json) -> str:
     change = numbers.finite(cost.get("change"))
     if change:
         parts.append(signed_change(change, str(data.get("currency"))))
+    elif units_differ(cost):
+        parts.append(f"price in {cost['unit']} (before: {cost['old_unit']})")
     error = numbers.finite(part(data, "error").get("change"))
     if error and abs(error) > 1e-12:
         word = "larger" if error > 0 else "smaller"
@@ -146,9 +148,23 @@ def pick_words(entry: Json) -> str:
 def _sums(data: Json) -> Iterator[str]:
     for entry in [*items(data, "sums"), part(data, "error")]:
         old, new = entry.get("old"), entry.get("new")
-        if old != new:
-            unit = str(entry.get("unit"))
-            yield f"{sum_name(entry)}: {numbers.in_unit(old, unit)} to {numbers.in_unit(new, unit)}"
+        if old != new or units_differ(entry):
+            before, now = (
+                numbers.in_unit(v, u) for v, u in zip((old, new), units_of(entry), strict=True)
+            )
+            yield f"{sum_name(entry)}: {before} to {now}"
+
+
+def units_of(entry: Json) -> tuple[str, str]:
+    """The units of a sum before and now; currencies may differ."""
+    unit = str(entry.get("unit"))
+    return str(entry.get("old_unit") or unit), unit
+
+
+def units_differ(entry: Json) -> bool:
+    """Whether a sum is given in two currencies and so has no difference."""
+    before, now = units_of(entry)
+    return before != now and None not in (entry.get("old"), entry.get("new"))
 
 
 def sum_name(entry: Json) -> str:
@@ -162,17 +178,19 @@ def _margins(data: Json) -> Iterator[str]:
         old, new = part(entry, "old"), part(entry, "new")
         if old and new and _comparable(old) == _comparable(new):
             continue
-        unit = str(entry.get("unit") or "")
-        yield f"{entry.get('id')}: {_standing(old, unit)} to {_standing(new, unit)}"
+        yield f"{entry.get('id')}: {_standing(old)} to {_standing(new)}"
 
 
 def _comparable(row: Json) -> tuple[Any, ...]:
-    return row.get("status"), row.get("value"), row.get("limit")
+    return row.get("status"), row.get("value"), row.get("limit"), row.get("unit")
 
 
-def _standing(row: Json, unit: str) -> str:
-    """`0.29 m of 0.3 m, pass`."""
-    if not row:
-        return "not required"
-    limit = numbers.in_unit(row.get("limit"), unit)
-    return f"{numbers.in_unit(row.get('value'), unit)} of {limit} ({row.get('status')})"
+def _standing(row: Json) -> str:
+    """`0.29 m of 0.3 m (pass)`."""
+    return f"{value_of_limit(row)} ({row.get('status')})" if row else "not required"
+
+
+def value_of_limit(row: Json) -> str:
+    """`0.29 m of 0.3 m`, in that side's own unit."""
+    unit = str(row.get("unit") or "")
+    return f"{numbers.in_unit(row.get('value'), unit)} of {numbers.in_unit(row.get('limit'), unit)}"

@@ -71,7 +71,17 @@ def label(value: Any) -> str:
         return json.dumps(value)
     if isinstance(value, int | float):
         return str(getattr(value, "text", None) or value)
-    return json.dumps(plain(value), ensure_ascii=False, separators=(", ", ": "))
+    return _compact(value)
+
+
+def _compact(value: Any) -> str:
+    """Compact JSON whose numbers are written as the file has them."""
+    if isinstance(value, Mapping):
+        pairs = (f"{_compact(str(key))}: {_compact(item)}" for key, item in value.items())
+        return "{" + ", ".join(pairs) + "}"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(_compact, value)) + "]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else label(value)
 
 
 def plain(value: Any) -> Any:
