@@ -104,3 +104,27 @@ def test_values_up_to_the_ends_of_what_exists_are_taken(
 ) -> None:
     verdict = check_file(written(tmp_path, effect, sensor, values), CheckSettings())
     assert verdict["verdict"] == "meets"
+
+
+MEANT = {  # what each sensor's columns can be written in by mistake, by what they hold
+    "position": {"enu", "up"},
+    "attitude": {"enu", "yaw_sign", "yaw_180", "transposed", "radians", "degrees"},
+    "ranging": {"azimuth_sign", "elevation_sign", "radians", "degrees"},
+}
+
+
+@pytest.mark.parametrize("sensor", sorted(MEANT))
+def test_a_convention_that_a_sensor_cannot_have_is_refused_at_its_place(
+    tmp_path: Path, sensor: str
+) -> None:
+    for convention in sorted(set().union(*MEANT.values())):
+        path = written(tmp_path, "frame_convention", sensor, f"convention: {convention}")
+        if convention in MEANT[sensor]:
+            assert check_file(path, CheckSettings(monte_carlo=False))["effects"]
+            continue
+        with pytest.raises(BadInput, match=f"found {convention}") as refused:
+            check_file(path, CheckSettings())
+        (problem,) = refused.value.problems
+        assert problem.line == LINE
+        assert set(problem.expected.removeprefix("one of ").split(", ")) == MEANT[sensor]
+        assert CliRunner().invoke(app, ["simulate", str(path)]).exit_code == 2

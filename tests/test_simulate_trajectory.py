@@ -337,7 +337,7 @@ def test_settings_that_make_no_sense(changes: dict[str, object], says: str) -> N
         ),
         (
             EffectEntry("frame_convention", "ranging", "uav", (("convention", "transposed"),)),
-            r"frame_convention \(ranging\) does not know 'transposed'",
+            r"parameters.convention: expected one of azimuth_sign, .*, found transposed",
         ),
     ],
 )

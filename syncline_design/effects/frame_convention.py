@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -21,10 +22,11 @@ from syncline_design.effects.record import (
 )
 from syncline_design.model.system import Stage
 
-POSITION = ("enu", "up")
-ATTITUDE = ("yaw_sign", "yaw_180", "transposed", "enu", "radians", "degrees")
-RANGING = ("azimuth_sign", "elevation_sign", "radians", "degrees")
-CHOICES = tuple(dict.fromkeys(POSITION + ATTITUDE + RANGING))
+CHOICES: Mapping[Target, tuple[str, ...]] = {
+    "position": ("enu", "up"),
+    "attitude": ("yaw_sign", "yaw_180", "transposed", "enu", "radians", "degrees"),
+    "ranging": ("azimuth_sign", "elevation_sign", "radians", "degrees"),
+}
 
 
 def conventions(sensor: Target) -> tuple[str, ...]:
@@ -35,7 +37,7 @@ def conventions(sensor: Target) -> tuple[str, ...]:
     yaw_180: facing backwards; transposed: NED to body for body to NED; radians: written where
     degrees are due; degrees: written where radians are due.
     """
-    return {"position": POSITION, "attitude": ATTITUDE, "ranging": RANGING}.get(sensor, ())
+    return CHOICES.get(sensor, ())
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:

@@ -111,7 +111,7 @@ NOTHING = Departures()
 class Parameter:
     """One parameter: its name carries the unit; [low, high] is its plausible magnitude.
 
-    choices: what a discrete parameter may be; its value is then a text.
+    choices: what a discrete parameter may be, by the sensor it acts on; its value is then a text.
     located: the error depends on it only through where along the log something happens.
     above, most: the values between which the effect exists at all, `above` left out (a factor of
     noise is more than 0, a share at most 1); one that is not signed is at least 0.
@@ -123,7 +123,7 @@ class Parameter:
     high: float
     unit: str = ""
     signed: bool = True
-    choices: tuple[str, ...] = ()
+    choices: Mapping[Target, tuple[str, ...]] = field(default_factory=dict)
     located: bool = False
     above: float = -math.inf
     most: float = math.inf
@@ -234,6 +234,7 @@ class Effect:
     tilted: acts by roll and pitch, which the simulator then draws over the horizon's tilt.
     transponder: as an effect of the position, acts on a later stage's transponder too, which has
     a place but neither stamps nor noise of its own.
+    accelerated: acts by acceleration, and is charged for that of the platform's hardest turn.
     sentence: for people, a format string over {sensor} and the parameters.
     """
 
@@ -252,6 +253,7 @@ class Effect:
     applies: Applies = everywhere
     tilted: bool = False
     transponder: bool = False
+    accelerated: bool = False
 
     def slopes(self) -> tuple[Parameter, ...]:
         """The parameters that `sensitivity` has a column for."""

@@ -13,7 +13,7 @@ from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import KeyPath, Problem, show_path
 
 if TYPE_CHECKING:
-    from syncline_design.effects.record import Parameter
+    from syncline_design.effects.record import Parameter, Target
 
 
 def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:
@@ -84,18 +84,19 @@ def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator
         place = (*at, "parameters")
         if parameter.name not in effect.parameters:
             yield _problem(loaded, place, f"missing parameter {parameter.name}", "", names)
-        elif misfit := _misfit(effect.parameters[parameter.name], parameter):
-            wanted = list(parameter.choices) or [parameter.domain]
+        elif misfit := _misfit(effect.parameters[parameter.name], parameter, effect.sensor):
+            wanted = list(parameter.choices.get(effect.sensor, ())) or [parameter.domain]
             found = str(effect.parameters[parameter.name])
             yield _problem(loaded, (*place, parameter.name), misfit, found, wanted)
 
 
-def _misfit(value: float | str, parameter: Parameter) -> str | None:
-    """What is wrong with a parameter's value."""
+def _misfit(value: float | str, parameter: Parameter, sensor: Target) -> str | None:
+    """What is wrong with a parameter's value for this sensor."""
     if isinstance(value, str) != bool(parameter.choices):
         return "wrong kind of value"
     if isinstance(value, str):
-        return None if value in parameter.choices else "not one of the choices"
+        choices = parameter.choices.get(sensor)  # none: the sensor itself was refused
+        return None if choices is None or value in choices else "not one of the choices"
     return None if parameter.holds(float(value)) else "out of range"
 
 
