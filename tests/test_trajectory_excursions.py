@@ -36,6 +36,7 @@ stages:
 """
 GRID = "[{effect: grid_scale, sensor: target, parameters: {scale: 0.0002}}]"
 DRIFT = "[{effect: clock_drift, sensor: position, parameters: {rate: 0.0001}}]"
+FLEXURE = "[{effect: flexure, sensor: ranging, parameters: {x: 0.1, y: 0, z: 0}}]"
 CODE = "trajectory-outside"
 SIGHT = ",range_m,azimuth_deg,elevation_deg"
 
@@ -108,3 +109,49 @@ def test_a_long_file_exceeds_its_own_bound_and_every_format_says_why(tmp_path: P
 def test_named_manoeuvres_keep_the_limits(tmp_path: Path) -> None:
     for name in ("straight", "circle", "lawnmower", "figure_eight"):
         assert not said(check(tmp_path, DRIFT, f"{{manoeuvre: {name}}}"))
+
+
+TILT = "[{effect: acceleration_tilt, sensor: attitude, parameters: {gain: 0.5}}]"
+
+
+@pytest.mark.parametrize(
+    ("effects", "period_s", "said_as"),
+    [
+        (TILT, 20.0, "accelerates at up to 3.1"),  # 2 pi / 20 s * 10 m/s = 3.14 m/s2
+        (FLEXURE, 35.0, "accelerates at up to 1.7"),
+        (TILT, 120.0, ""),  # 0.524 m/s2, below v_max omega_max = 0.576
+        (DRIFT, 20.0, ""),  # does not go by acceleration
+    ],
+)
+def test_a_file_that_speeds_up_harder_than_it_turns_is_said(
+    tmp_path: Path, effects: str, period_s: float, said_as: str
+) -> None:
+    """To and fro along north at up to 10 m/s, within v_max and omega_max; v_max omega_max 0.576."""
+    head = "time_s,position_north_m,position_east_m,position_down_m,roll_deg,pitch_deg,yaw_deg\n"
+    angular = 2.0 * np.pi / period_s
+    with (tmp_path / "line.csv").open("w", encoding="utf-8") as file:
+        file.write(head)
+        for t in np.arange(0.0, 600.0, 0.5):
+            file.write(f"{t},{10.0 / angular * np.sin(angular * t):.6f},0,0,0,0,0\n")
+    found = said(check(tmp_path, effects))
+    assert (said_as in found) if said_as else not found
+    if said_as:
+        assert "m/s2, 0.575959 is allowed for" in found
+
+
+@pytest.mark.parametrize("step_s", [0.1, 0.5, 1.0])
+def test_accelerations_along_a_coarse_file_are_those_of_the_path(
+    tmp_path: Path, step_s: float
+) -> None:
+    """A circle of 60 m at 10 m/s: centripetal 1.667 m/s2 always; flexure of 0.1 m per m/s2."""
+    head = "time_s,position_north_m,position_east_m,position_down_m,roll_deg,pitch_deg,yaw_deg\n"
+    with (tmp_path / "line.csv").open("w", encoding="utf-8") as file:
+        file.write(head)
+        for t in np.arange(0.0, 300.0, step_s):
+            turn = t / 6.0
+            north, east = 60.0 * np.sin(turn), -60.0 * np.cos(turn)
+            file.write(f"{t},{north:.6f},{east:.6f},0,0,0,{np.degrees(turn):.6f}\n")
+    effect = "[{effect: flexure, sensor: ranging, parameters: {x: 0, y: 0.1, z: 0}}]"
+    spread = check(tmp_path, effect)["monte_carlo"]["quantiles"]
+    assert spread["0.5"]["value_m"] == pytest.approx(1.0 / 6.0, rel=0.03)
+    assert spread["0.997"]["value_m"] < 0.1667 + 0.06  # noise of 1 cm an axis

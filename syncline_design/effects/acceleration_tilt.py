@@ -61,4 +61,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
+    accelerated=True,
 )

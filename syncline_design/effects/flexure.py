@@ -69,4 +69,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     tilted=True,
+    accelerated=True,
 )

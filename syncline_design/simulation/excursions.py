@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from syncline_design.effects.acting import by_stage
 from syncline_design.effects.kinematics import bearing, rotate
 from syncline_design.effects.record import Array
 from syncline_design.model.horizon import duration_words
@@ -32,11 +33,14 @@ def excursions(system: System, settings: SimulationSettings) -> tuple[str, ...]:
     if not follows_a_file(settings):
         return ()
     found: list[str] = []
+    acting = by_stage(system)
     for index, stage in enumerate(system.stages):
         track = stage_track(system, settings, index)
         if index == 0 and system.effects:
             found += _duration(track, system.horizon.duration_s)
         found += _motion(stage, track)
+        if any(one.effect.accelerated for one in acting.get(stage.name, ())):
+            found += _acceleration(stage, track)
         tilt = float(np.max(np.arccos(np.clip(track.rotation[:, 2, 2], -1.0, 1.0))))
         if tilt > system.horizon.tilt_rad + 1e-9:
             found.append(_over(stage, "tilts", tilt, system.horizon.tilt_rad, "deg", math.pi / 180))
@@ -69,6 +73,16 @@ def _motion(stage: Stage, track: Track) -> list[str]:
         if reach > d * (1.0 + 1e-9):
             found.append(_over(stage, "looks over", reach, d, "m"))
     return found
+
+
+def _acceleration(stage: Stage, track: Track) -> list[str]:
+    """Acceleration against v_max omega_max, the hardest turn's, which effects are charged for."""
+    between = 0.5 * (track.time_s[:-1] + track.time_s[1:])
+    found = _largest(np.linalg.norm(track.acceleration(between), axis=1))
+    allowed = float(stage.platform.v_max_mps * stage.platform.omega_max_radps)
+    if found <= allowed * _SLACK**2:
+        return []
+    return [_over(stage, "accelerates at", found, allowed, "m/s2")]
 
 
 def _extent(system: System, settings: SimulationSettings) -> list[str]:

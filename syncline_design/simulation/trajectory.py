@@ -97,6 +97,15 @@ class Track:
         turned: Array = self.rotation[index] @ rotation_exp(self.turn_rad[index] * u[:, None])
         return turned
 
+    def acceleration(self, time_s: Array) -> Array:
+        """Acceleration [m/s2], NED, (n, 3): what the velocity gains from knot to knot.
+
+        The second derivative of the interpolant jumps at the knots and is no acceleration there.
+        """
+        middle = 0.5 * (self.time_s[:-1] + self.time_s[1:])
+        gained = np.diff(self.velocity_mps, axis=0) / np.diff(self.time_s)[:, None]
+        return np.stack([np.interp(time_s, middle, axis) for axis in gained.T], axis=-1)
+
     def rate(self, time_s: Array) -> Array:
         """Body rate [rad/s], (n, 3)."""
         index, _, length = self.locate(time_s)
@@ -200,7 +209,7 @@ def _rows(
         rotation=rotation,
         euler_rad=rotation_to_euler(rotation),
         velocity_mps=rotate(down, track.position(time_s, 1)),
-        acceleration_mps2=rotate(down, track.position(time_s, 2)),
+        acceleration_mps2=rotate(down, track.acceleration(time_s)),
         rate_radps=track.rate(time_s),
         range_m=range_m,
         azimuth_rad=azimuth,
