@@ -121,6 +121,23 @@ def test_the_action_checks_every_line_and_ends_with_the_worst_code(
     assert not summary.exists() or "all is well" not in summary.read_text()
 
 
+def test_the_installation_runs_nothing_of_the_repository_under_check(repository: Path) -> None:
+    action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    step = next(s for s in action["runs"]["steps"] if s.get("name") == "Install")
+    for module in ("pip", "runpy", "pkgutil", "json", "typing", "sitecustomize"):
+        (repository / f"{module}.py").write_text("open('owned', 'w').close()\n")
+    absent = str(repository / "absent")  # nothing is installed: how pip is started is what counts
+    done = run(["bash", "-e", "-c", step["run"]], repository, GITHUB_ACTION_PATH=absent)
+    assert "absent" in done.stderr, done.stderr
+    assert not (repository / "owned").exists()
+
+
+def test_without_a_folder_for_reports_the_action_takes_its_own(repository: Path) -> None:
+    code, _, _ = run_action(repository, specs=GOOD, reports="")
+    assert code == 0
+    assert (repository / "syncline-reports" / "result.sarif").exists()
+
+
 def test_inputs_of_the_action_are_not_run(repository: Path) -> None:
     code, _, _ = run_action(repository, specs="$(touch owned) ; touch owned", args="`touch owned`")
     assert code == 2
@@ -140,7 +157,7 @@ def test_the_actions_of_the_guide_exist_in_the_action() -> None:
 def test_the_gitlab_snippet_runs(repository: Path) -> None:
     job = yaml.safe_load(snippet("yaml", ".gitlab-ci.yml"))["specs"]
     install, check = job["script"]
-    assert install.startswith("python -m pip install")
+    assert install.startswith("pip install")  # `python -m pip` would run a pip.py of the repository
     done = run(["bash", "-c", check], repository)
     assert done.returncode == 1, done.stderr
     junit = ElementTree.parse(repository / job["artifacts"]["reports"]["junit"]).getroot()

@@ -193,6 +193,44 @@ def test_a_link_that_leads_elsewhere_is_followed_anew(folder: Path, outside: boo
     assert changed.counts["refused"] == (2 if outside else 0)
 
 
+@pytest.mark.parametrize("links", [("now",), ("now", "further", "last")], ids=["one", "a chain"])
+@pytest.mark.parametrize(("name", "old", "new"), [
+    ("delays.txt", "2.1", "9.1"), ("path.csv", ",10\n", ",19\n"),
+], ids=["delays", "trajectory"])  # fmt: skip
+def test_a_folder_link_on_the_way_that_leads_elsewhere_is_followed_anew(
+    folder: Path, links: tuple[str, ...], name: str, old: str, new: str
+) -> None:
+    for version in ("v1", "v2"):
+        (folder / version).mkdir()
+        shutil.copy(folder / name, folder / version)
+    (folder / name).unlink()
+    edit(folder / "v2" / name, old, new)
+    for link, target in zip(links, (*links[1:], "v1"), strict=True):
+        (folder / link).symlink_to(target)
+    (folder / "spec.yaml").write_text(SPEC.replace(name, f"now/{name}"))
+    assert (run(folder).computed, run(folder).computed) == (2, 0)
+    (folder / links[-1]).unlink()
+    (folder / links[-1]).symlink_to("v2")
+    turned = run(folder)
+    assert turned.computed == 2
+    anew = run(folder, "another store")
+    assert render_study("json", turned) == render_study("json", anew)
+    (folder / links[-1]).unlink()
+    (folder / links[-1]).symlink_to("v1")
+    assert run(folder).computed == 0  # both are kept, each under its own content
+
+
+def test_a_study_whose_folder_moved_with_its_links_computes_nothing_anew(folder: Path) -> None:
+    (folder / "v1").mkdir()
+    (folder / "delays.txt").rename(folder / "v1" / "delays.txt")
+    (folder / "now").symlink_to("v1")
+    (folder / "spec.yaml").write_text(SPEC.replace("delays.txt", "now/delays.txt"))
+    assert run(folder).computed == 2
+    moved = folder.parent / "elsewhere"
+    folder.rename(moved)
+    assert run(moved).computed == 0
+
+
 def test_equal_specs_in_two_folders_with_other_files_are_two_cases(folder: Path) -> None:
     shutil.copytree(folder, folder / "b")
     (folder / "b" / "delays.txt").write_text("ms\n40\n")

@@ -28,16 +28,33 @@ class ReplacedInputError(Exception):
     """A result would take the place of a file that the command reads."""
 
 
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a name leads, all links followed: what is there, and its real path."""
+
+    kind: str  # file, folder, other or `missing`
+    real: Path | None = None
+
+    def seen_from(self, folder: Path) -> str:
+        """For comparison only: a link anywhere on the way that leads elsewhere shows in it.
+
+        Relative to the real place of `folder`, so that a tree may move as a whole.
+        """
+        if self.real is None:
+            return self.kind
+        return f"{self.kind} {Path(os.path.relpath(self.real, folder.resolve())).as_posix()}"
+
+
 @dataclass
 class FilesRead:
     """What was looked for and read while this was asked for.
 
     contents: absolute path to the SHA-256 of what was read there.  places: absolute path as it was
-    named, to the file that it led to (or `missing`).  outputs: files that are to be written.
+    named, to where it led.  outputs: files that are to be written.
     """
 
     contents: dict[str, str] = field(default_factory=dict)
-    places: dict[str, str] = field(default_factory=dict)
+    places: dict[str, Place] = field(default_factory=dict)
     identities: dict[Identity, str] = field(default_factory=dict)
     outputs: list[Path] = field(default_factory=list)
 
@@ -112,15 +129,15 @@ def note_place(path: Path) -> None:
             noted.add(path, path.stat())
 
 
-def place_of(path: Path) -> str:
-    """Where a name leads, relative to its folder, and to what; for comparison only."""
+def place_of(path: Path) -> Place:
+    """Where a name leads now."""
     try:
         real = path.resolve()
         mode = real.stat().st_mode
     except (OSError, RuntimeError, ValueError):
-        return MISSING
+        return Place(MISSING)
     kind = "file" if stat.S_ISREG(mode) else "folder" if stat.S_ISDIR(mode) else "other"
-    return f"{kind} {os.path.relpath(real, path.parent.resolve())}"
+    return Place(kind, real)
 
 
 def note_content(path: Path, content: bytes, status: os.stat_result | None = None) -> None:

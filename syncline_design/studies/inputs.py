@@ -23,7 +23,9 @@ def inputs_of(found: FilesRead, folder: Path) -> Inputs:
     """What a case read, in one order."""
     real, named = folder.resolve(), folder.absolute()
     read = [[CONTENT, _name(path, real), digest] for path, digest in found.contents.items()]
-    sought = [[PLACE, _name(path, named), token] for path, token in found.places.items()]
+    sought = [
+        [PLACE, _name(path, named), there.seen_from(real)] for path, there in found.places.items()
+    ]
     return sorted(read + sought)
 
 
@@ -47,7 +49,7 @@ class Looked:
             if kind == CONTENT:
                 self._known[key] = content_of(folder.resolve() / name)
             else:
-                self._known[key] = place_of(folder.absolute() / name)
+                self._known[key] = place_of(folder.absolute() / name).seen_from(folder)
         return self._known[key]
 
 
