@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -22,6 +23,7 @@ ISO = (
     r"\s*(Z|z|[+-]\d\d(?::?\d\d)?)?$"
 )
 COMMA, POINT = ",", "."
+ONE_ZONE = "a zone (Z or +01:00) in every row or in none"
 ONE_MARK = "one decimal mark, point or comma, in all of a file"
 
 
@@ -44,6 +46,28 @@ def trimmed(series: pl.Series) -> pl.Series:
         raise BadCellError(row, short, f"at most {LONGEST_CELL} characters")
     text = series.str.strip_chars()
     return text.set(text.is_in(list(NOTHING)).fill_null(True), None).cast(pl.String)
+
+
+def as_labels(pieces: Iterable[pl.Series]) -> Array:
+    """Names as numbers that differ where the names do: their own value where all are figures.
+
+    Else 52 bits of a hash of each (exact as floats), so that no more than one piece of text is held
+    at a time; two names of one scan are taken for one in one of 4.5e15 pairs.
+    """
+    import polars as pl
+
+    values: list[Array] = []
+    hashes: list[Array] = []
+    named = False
+    for text in pieces:
+        figures = text.cast(pl.Float64, strict=False)
+        named = named or figures.null_count() > text.null_count()
+        values = [] if named else [*values, figures.to_numpy().astype(float)]
+        own = (text.hash(seed=0).to_numpy() >> np.uint64(12)).astype(float)
+        own[text.is_null().to_numpy()] = np.nan
+        hashes.append(own)
+    chosen = hashes if named else values
+    return np.concatenate(chosen) if chosen else np.zeros(0)
 
 
 def numbers(text: pl.Series, comma: bool) -> tuple[Array, str]:
@@ -97,7 +121,7 @@ def iso_times(text: pl.Series) -> tuple[Stamps, bool | None]:
     bad = text.is_not_null() & at.is_null()
     mixed = at.is_not_null() & (zoned != bool(zoned.any()))
     wanted = "an ISO 8601 time such as 2026-03-01T12:00:00.125Z"
-    for wrong, expected in ((bad, wanted), (mixed, "a zone (Z or +01:00) in every row or in none")):
+    for wrong, expected in ((bad, wanted), (mixed, ONE_ZONE)):
         rows = wrong.fill_null(True).arg_true()
         if len(rows):
             raise BadCellError(int(rows[0]), str(text[int(rows[0])]), expected)

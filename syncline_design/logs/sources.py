@@ -18,8 +18,10 @@ from syncline_design.logs.cells import (
     NO_TIME,
     NOTHING,
     ONE_MARK,
+    ONE_ZONE,
     BadCellError,
     Stamps,
+    as_labels,
     iso_times,
     looks_like_a_date,
     numbers,
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 ZONE_CHECK = "POLARS_IGNORE_TIMEZONE_PARSE_ERROR"
 MOST_BYTES = 4 * 1024**3
 MOST_ROWS = 20_000_000
+PIECE = 500_000  # rows of text held at a time: a cell of text takes up to LONGEST_CELL bytes
 NANOSECONDS = 1_000_000_000
 PACKED = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd", b"PK\x03\x04": "zip", b"BZh": "bzip2"}
 
@@ -176,16 +179,17 @@ class TextSource:
         }
 
     def labels(self, name: str, keep: Mask) -> Array:
+        return as_labels(self._kept_text(self.header.index(name), keep))
+
+    def _kept_text(self, place: int, keep: Mask) -> Iterator[pl.Series]:
         import polars as pl
 
-        place, at = self.header.index(name), 0
-        found: list[pl.Series] = []
+        at = 0
         for block in delimited.blocks(self.path, self.how, self.end):
             kept = keep[at : at + block.lines.shape[0]]
             at += block.lines.shape[0]
             if np.any(kept):
-                found.append(self._text(block, place).filter(pl.Series(kept)))
-        return as_labels(pl.concat(found)) if found else np.zeros(0)
+                yield self._text(block, place).filter(pl.Series(kept))
 
     def _fast(self, block: delimited.Block, places: Sequence[int]) -> list[Array] | None:
         """Columns that are plain figures throughout; None where one is not."""
@@ -228,7 +232,7 @@ class TextSource:
         try:
             stamps, zone = iso_times(text)
             if zoned is not None and zone is not None and zone != zoned:
-                raise BadCellError(0, str(text[0]), "a zone (Z or +01:00) in every row or in none")
+                raise BadCellError(0, str(text[0]), ONE_ZONE)
         except BadCellError as bad:
             raise self._bad(block, place, bad) from None
         return stamps, zone
@@ -263,17 +267,6 @@ def _torn(cell: str) -> bool:
 
 def _finite(values: Array) -> Array:
     values[~np.isfinite(values)] = np.nan
-    return values
-
-
-def as_labels(text: pl.Series) -> Array:
-    """Names as numbers: their own value where all are figures, else their rank."""
-    import polars as pl
-
-    found = text.cast(pl.Float64, strict=False)
-    if found.null_count() > text.null_count():
-        found = text.rank("dense").cast(pl.Float64)
-    values: Array = found.to_numpy().astype(float)
     return values
 
 
@@ -320,14 +313,22 @@ class ParquetSource:
         found = (str(error).splitlines() or [type(error).__name__])[0][:160]
         return refuse(self.path, "no readable Parquet file", found=found)
 
-    def _column(self, name: str) -> pl.Series:
+    def _column(self, name: str, start: int = 0, rows: int | None = None) -> pl.Series:
         import polars as pl
 
         try:
             with any_zone():
-                return self._frame.select(name).collect().to_series(0)
+                return self._frame.slice(start, rows).select(name).collect().to_series(0)
         except (Exception, pl.exceptions.PanicException) as error:
             raise self._unreadable(error) from None
+
+    def _pieces(self, name: str) -> Iterator[tuple[int, pl.Series]]:
+        """A column of text piece by piece, each with its first row."""
+        import polars as pl
+
+        for start in range(0, max(self.rows, 1), PIECE):
+            text = self._column(name, start, PIECE).cast(pl.String)
+            yield start, self._trimmed(name, text, start)
 
     def clock(self, name: str) -> Clock:
         import polars as pl
@@ -344,63 +345,79 @@ class ParquetSource:
         if kind == pl.Duration:
             spans = self._column(name).dt.total_nanoseconds()
             return Clock(spans.cast(pl.Float64).to_numpy() / NANOSECONDS, None, spans=True)
-        series = self._plain(name)
-        if series.dtype == pl.String:
-            text = self._trimmed(name, series)
-            if looks_like_a_date(text):
-                try:
-                    return Clock(None, *iso_times(text))
-                except BadCellError as bad:
-                    raise self._bad(name, bad) from None
-        return Clock(self._figures(name, series), None)
+        if self._is_text(name):
+            return self._text_clock(name)
+        return Clock(self._figures(name), None)
+
+    def _text_clock(self, name: str) -> Clock:
+        seconds: list[Array] = []
+        dates: list[Stamps] = []
+        zoned: bool | None = None
+        for start, text in self._pieces(name):
+            try:
+                if dates or (not seconds and looks_like_a_date(text)):
+                    stamps, zone = iso_times(text)
+                    if zoned is not None and zone is not None and zone != zoned:
+                        raise BadCellError(0, str(text[0]), ONE_ZONE)
+                    zoned = zone if zoned is None else zoned
+                    dates.append(stamps)
+                else:
+                    seconds.append(numbers(text, comma=False)[0])
+            except BadCellError as bad:
+                raise self._bad(name, bad, start) from None
+        if dates:
+            return Clock(None, np.concatenate(dates), zoned)
+        return Clock(np.concatenate(seconds), None)
 
     def numbers(self, names: Sequence[str], keep: Mask) -> dict[str, Array]:
-        import polars as pl
-
-        mask = pl.Series(keep)
-        return {name: self._figures(name, self._plain(name), mask) for name in names}
+        return {name: self._figures(name, keep) for name in names}
 
     def labels(self, name: str, keep: Mask) -> Array:
         import polars as pl
 
-        series = self._plain(name).filter(pl.Series(keep))
-        if series.dtype == pl.String:
-            return as_labels(self._trimmed(name, series))
-        return series.cast(pl.Float64).to_numpy().astype(float)
+        if not self._is_text(name):
+            return self._figures(name, keep)
+        pieces = self._pieces(name)
+        return as_labels(text.filter(pl.Series(keep[at : at + PIECE])) for at, text in pieces)
 
-    def _plain(self, name: str) -> pl.Series:
-        """Numbers or text; anything else is refused."""
+    def _is_text(self, name: str) -> bool:
+        """Text, not numbers; anything else is refused."""
         import polars as pl
 
         kind = self._schema[name]
-        if kind == pl.Categorical or kind == pl.Enum:
-            return self._column(name).cast(pl.String)
-        if kind == pl.String or kind == pl.Null or kind.is_numeric():
-            return self._column(name)
+        if kind == pl.Categorical or kind == pl.Enum or kind == pl.String:
+            return True
+        if kind == pl.Null or kind.is_numeric():
+            return False
         raise refuse(self.path, "not a column of numbers", field=name, found=str(kind))
 
-    def _trimmed(self, name: str, series: pl.Series) -> pl.Series:
+    def _trimmed(self, name: str, series: pl.Series, start: int) -> pl.Series:
         try:
             return trimmed(series)
         except BadCellError as bad:
-            raise self._bad(name, bad) from None
+            raise self._bad(name, bad, start) from None
 
-    def _figures(self, name: str, series: pl.Series, keep: pl.Series | None = None) -> Array:
+    def _figures(self, name: str, keep: Mask | None = None) -> Array:
+        """A column of numbers, or of text that says numbers."""
         import polars as pl
 
-        if series.dtype == pl.String:
+        if not self._is_text(name):
+            series = self._column(name)
+            kept = series if keep is None else series.filter(pl.Series(keep))
+            return _finite(kept.cast(pl.Float64).to_numpy().astype(float))
+        found: list[Array] = []
+        for start, text in self._pieces(name):
             try:
-                values, _ = numbers(self._trimmed(name, series), comma=False)
+                values, _ = numbers(text, comma=False)
             except BadCellError as bad:
-                raise self._bad(name, bad) from None
-            return values if keep is None else values[keep.to_numpy()]
-        kept = series if keep is None else series.filter(keep)
-        return _finite(kept.cast(pl.Float64).to_numpy().astype(float))
+                raise self._bad(name, bad, start) from None
+            found.append(values if keep is None else values[keep[start : start + PIECE]])
+        return np.concatenate(found)
 
-    def _bad(self, name: str, bad: BadCellError) -> BadInput:
+    def _bad(self, name: str, bad: BadCellError, start: int) -> BadInput:
         return refuse(
             self.path,
-            f"text among numbers in row {bad.row + 1}",
+            f"text among numbers in row {start + bad.row + 1}",
             field=name,
             expected=bad.expected,
             found=repr(bad.text[:40]),

@@ -1,0 +1,97 @@
+"""Text in Parquet logs is read in pieces: the same answer whatever the pieces, little memory."""
+
+from __future__ import annotations
+
+import itertools
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from syncline_design.logs import sources
+from syncline_design.spec.load import BadInput
+
+PEAK = """
+import resource, sys
+import numpy as np
+from pathlib import Path
+from syncline_design.logs.sources import opened
+keep = np.ones(2_500_000, dtype=bool)
+opened(Path(sys.argv[1])).numbers(["number"], keep)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+labels = opened(Path(sys.argv[1])).labels("target_id", keep)
+assert len(set(labels[:5000])) == 50
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+"""
+
+
+@pytest.fixture
+def pieces_of_seven(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sources, "PIECE", 7)
+
+
+def written(path: Path, **columns: list[object]) -> sources.Source:
+    pl.DataFrame(columns).write_parquet(path)
+    return sources.opened(path)
+
+
+def test_long_names_of_targets_take_little_memory(tmp_path: Path) -> None:
+    path, rows = tmp_path / "log.parquet", 2_500_000
+    names = pl.Series([f"{k:03d}" + "q" * 190 for k in range(50)])
+    ids = names.gather(np.arange(rows) % 50)
+    pl.DataFrame({"number": np.zeros(rows), "target_id": ids}).write_parquet(path)
+    assert path.stat().st_size < 5_000_000
+    done = subprocess.run(
+        [sys.executable, "-c", PEAK, str(path)], capture_output=True, text=True, check=True
+    )
+    assert int(done.stdout) < 320_000  # kB; the names are 483 MB of text
+
+
+@pytest.mark.usefixtures("pieces_of_seven")
+def test_labels_differ_where_the_names_do(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    figures = [str(k) for k in rng.integers(0, 5, 12)]  # the first piece looks like figures
+    names = [*figures, *(f"T{k}" for k in rng.integers(0, 9, 48)), None, " T3 "]
+    source = written(tmp_path / "log.parquet", target_id=names)
+    keep = rng.random(len(names)) < 0.8
+    labels = source.labels("target_id", keep)
+    told = [None if n is None else n.strip() for n, k in zip(names, keep, strict=True) if k]
+    assert len(labels) == len(told)
+    for (a, x), (b, y) in itertools.combinations(zip(told, labels, strict=True), 2):
+        assert (a == b) == (x == y or (np.isnan(x) and np.isnan(y)))
+
+
+@pytest.mark.usefixtures("pieces_of_seven")
+def test_figures_and_times_as_text_are_the_same_in_pieces(tmp_path: Path) -> None:
+    numbers = [f" {k / 7:.9f}" for k in range(40)]
+    times = [f"2026-03-01T12:{k:02d}:07.5Z" for k in range(40)]
+    source = written(tmp_path / "log.parquet", time=times, range_m=numbers, id=["4.5"] * 40)
+    keep = np.arange(40) % 3 != 0
+    expected = np.array([float(t) for t in numbers])[keep]
+    assert np.array_equal(source.numbers(["range_m"], keep)["range_m"], expected)
+    assert np.array_equal(source.labels("id", keep), np.full(int(keep.sum()), 4.5))
+    stamps = source.clock("time").nanoseconds
+    since = np.array([t.removesuffix("Z") for t in times], "datetime64[ns]").astype(np.int64)
+    assert stamps is not None
+    assert np.array_equal(stamps, since)
+
+
+@pytest.mark.usefixtures("pieces_of_seven")
+@pytest.mark.parametrize("place", [0, 6, 7, 23])
+def test_a_bad_cell_is_named_with_its_row(tmp_path: Path, place: int) -> None:
+    cells = ["1.5"] * 30
+    cells[place] = "broken"
+    source = written(tmp_path / "log.parquet", range_m=cells)
+    with pytest.raises(BadInput, match=f"in row {place + 1}; .*'broken'"):
+        source.numbers(["range_m"], np.ones(30, dtype=bool))
+
+
+@pytest.mark.usefixtures("pieces_of_seven")
+def test_zones_agree_between_pieces(tmp_path: Path) -> None:
+    times = ["2026-03-01T12:00:00Z"] * 10 + ["2026-03-01T12:00:01"] * 10
+    source = written(tmp_path / "log.parquet", time=[*times[:7], *times[13:20]])
+    with pytest.raises(BadInput, match="a zone"):
+        source.clock("time")
