@@ -313,7 +313,7 @@ requirements:
 stages:
   - name: boat
     platform: {v_max: 1 m/s, omega_max: 1 deg/s, distance: 1 m, baseline: 1 m}
-    position: {WRITTEN, timestamping: bench}
+    position: WRITTEN
 """
 ALONE_CATALOG = """\
 sensors:
@@ -324,11 +324,26 @@ timestamping:
     timeline: host
     cost: 1 EUR
     error: {distribution: constant, value: 1 ms}
+  wire:
+    primitives: [network]
+    timeline: host
+    cost: 1 EUR
+    error: {distribution: constant, value: 1 us}
+clocks:
+  steady: {offset: {distribution: constant, value: 0 us}, cost: 1 EUR}
 """
 
 
 @pytest.mark.parametrize(("limit", "meets"), [("72 mm", True), ("70 mm", False), ("1 mm", False)])
-@pytest.mark.parametrize("written", ["candidates: [only]", "sensor: only"])
+@pytest.mark.parametrize(
+    "written",
+    [
+        "{candidates: [only], timestamping: bench}",
+        "{sensor: only, timestamping: {candidates: [bench, wire]}}",
+        "{sensor: only}\n    timestamping: {candidates: [wire, bench]}",
+        "{sensor: only}\ntimestamping: {candidates: [wire, bench]}",
+    ],
+)
 def test_one_combination_is_judged_alike_by_check_and_optimize(
     tmp_path: Path, limit: str, meets: bool, written: str
 ) -> None:
@@ -340,11 +355,51 @@ def test_one_combination_is_judged_alike_by_check_and_optimize(
     chosen = optimisation_json(optimize(loaded, OptimizeSettings()))
     if meets:
         assert verdict["verdict"] == chosen["verdict"] == "meets"
-    elif written == "sensor: only":
-        assert verdict["verdict"] == "fails"
-        assert verdict["syncline"]["total_m"] == pytest.approx(0.071, rel=1e-12)
     else:
         assert verdict["verdict"] == chosen["verdict"] == "infeasible"
         assert verdict["infeasibility"] == chosen["infeasibility"]
         (fix,) = [f for f in verdict["infeasibility"]["fixes"] if f["kind"] == "accuracy"]
         assert 0.071 <= fix["to"] <= 0.0711
+
+
+@pytest.mark.parametrize(
+    "written",
+    [
+        "{sensor: only, timestamping: bench}",
+        "{sensor: only, timestamping: bench}\n    timestamping: {candidates: [bench, wire]}",
+        "{sensor: only}\n    clock: steady\ntimestamping: bench",
+        "{sensor: only}\n    clock: {candidates: [steady]}\ntimestamping: {candidates: [bench]}",
+    ],
+)
+def test_a_spec_that_pins_every_role_is_verified_with_its_figures(
+    tmp_path: Path, written: str
+) -> None:
+    """Lists of one, and lists that no role takes from, leave nothing open."""
+    (tmp_path / "alone.yaml").write_text(ALONE_CATALOG)
+    text = ALONE.replace("LIMIT", "70 mm").replace("WRITTEN", written)
+    verdict = check_loaded(
+        load_text(text, tmp_path / "spec.yaml"), CheckSettings(monte_carlo=False)
+    )
+    assert verdict["verdict"] == "fails"
+    assert verdict["syncline"]["total_m"] == pytest.approx(0.071, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("limit", "words"), [("0.004", "exactly"), ("0.00399999996", "1.00000001")]
+)
+def test_a_role_that_misses_by_nothing_visible_says_so(
+    tmp_path: Path, limit: str, words: str
+) -> None:
+    """1 ms at 1 m/s against 25 cm of noise: a ratio of 0.004, to stay below the limit."""
+    catalog = ALONE_CATALOG.replace("[2 cm, 3 cm, 6 cm]", "[12 cm, 16 cm, 15 cm]")
+    (tmp_path / "alone.yaml").write_text(catalog)
+    text = ALONE.replace("LIMIT", "1 m").replace(
+        "WRITTEN", "{candidates: [only], timestamping: bench}"
+    )
+    text = text.replace("stages:", f"  - {{id: S, kind: sync, limit: {limit}}}\nstages:")
+    verdict = check_loaded(
+        load_text(text, tmp_path / "spec.yaml"), CheckSettings(monte_carlo=False)
+    )
+    (gap,) = verdict["infeasibility"]["roles_without_options"]
+    assert words in gap["text"]
+    assert "has 1 times" not in gap["text"]

@@ -212,14 +212,19 @@ def _gap(table: RoleTable, sync_limit: float) -> RoleGap:
         nearest = min(measured, key=lambda one: (one.ratio or 0.0, one.sensor, one.method))
         misses = (nearest.ratio or 0.0) / sync_limit
         name = f"{nearest.sensor} stamped by {nearest.method}"
-        text = (
-            f"No option for {where}: the nearest, {name}, has {misses:.3g} times the timestamp "
-            "error that its own tau_crit allows."
-        )
+        text = f"No option for {where}: the nearest, {name}, {_excess(misses)}."
         return RoleGap(table.stage_name, table.role, name, misses, text)
     reasons = "; ".join(dict.fromkeys(one.reason for one in table.excluded))
     text = f"No option for {where}: {reasons or 'no candidates'}."
     return RoleGap(table.stage_name, table.role, None, None, text)
+
+
+def _excess(misses: float) -> str:
+    """How far a timestamp error is from what is allowed, in as many digits as show it."""
+    if misses == 1.0:
+        return "has exactly the timestamp error that its own tau_crit bids it stay below"
+    shown = next(t for n in range(3, 18) if float(t := f"{misses:.{n}g}") != 1.0)
+    return f"has {shown} times the timestamp error that its own tau_crit allows"
 
 
 def _clock_gap(vehicle: VehicleTable) -> RoleGap:

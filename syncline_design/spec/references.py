@@ -20,6 +20,7 @@ from syncline_design.spec.resolve import (
 from syncline_design.spec.spec import (
     ROLE_NAMES,
     InlineTimestamping,
+    MethodChoice,
     Query,
     Role,
     RoleChoice,
@@ -279,15 +280,25 @@ def _amounts(spec: Spec, catalog: Catalog) -> Iterable[tuple[KeyPath, str, Quant
 
 
 def names_candidates(spec: Spec) -> bool:
-    """Whether a spec lists sensors or clocks to choose from, however many of them can be used."""
+    """Whether a spec lists what to choose from, however much of it can be used.
+
+    A list with one method or clock means the same as its bare id; sensors say which they mean.
+    """
     return any(
         (stage.clock is not None and len(stage.clock.candidates) > 1)
         or any(
-            (role := stage.role(name)) is not None and role.candidates is not None
+            (role := stage.role(name)) is not None
+            and (role.candidates is not None or _lists_methods(spec, stage, role))
             for name in ROLE_NAMES
         )
         for stage in spec.stages
     )
+
+
+def _lists_methods(spec: Spec, stage: StageChoice, role: RoleChoice) -> bool:
+    """Whether the timestamping in force for a role names several methods."""
+    choice = role.timestamping or stage.timestamping or spec.timestamping
+    return not role.is_empty and isinstance(choice, MethodChoice) and len(choice.candidates) > 1
 
 
 def is_open(spec: Spec, catalog: Catalog) -> bool:
