@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import random
 import re
 from dataclasses import replace
@@ -184,3 +185,44 @@ def test_no_table_of_a_study_is_wider_than_the_page(
                 assert widths
                 assert max(widths) <= 0, name
                 assert opened.console == []
+
+
+def _two_currencies(folder: Path, more: str) -> StudyResult:
+    """The same payload priced in euros and, at 1 EUR = 1.25 USD, in dollars."""
+    money = "currency: USD\nexchange_rates: {EUR: 1.25 USD}\nrequirements:\n"
+    dollars = NARROW.replace("requirements:\n", money)
+    (folder / "dollars.yaml").write_text(dollars, encoding="utf-8")
+    study = "study: 1\nname: Two\nbase: [dollars.yaml, spec.yaml]\n" + more
+    return done(folder, study + "meets_when: decided\n")
+
+
+OVER_A_GRID = 'grid:\n  "stages[uav].distance": [40 m, 90 m]\n  coverage_factor: [2, 3]\n'
+OVER_A_SAMPLE = (
+    "sample:\n  count: 3\n  seed: 2\n  over:\n"
+    '    "stages[uav].distance": 40 m .. 90 m\n    "stages[uav].v_max": 5 m/s .. 9 m/s\n'
+)
+
+
+@pytest.mark.parametrize("more", [OVER_A_GRID, OVER_A_SAMPLE], ids=["grid", "sample"])
+def test_prices_in_two_currencies_are_never_compared(tmp_path: Path, more: str) -> None:
+    """Oracle: the rate.  A price of 100 EUR stood as 100 USD and won against 125 USD."""
+    result = _two_currencies(tmp_path, more)
+    data = json.loads(render_study("json", result))
+    euros = {r["cost"] for r in data["cases"] if r["base"].endswith("spec.yaml") and r["cost"]}
+    dollars = {r["cost"] for r in data["cases"] if not r["base"].endswith("spec.yaml")} - {None}
+    assert {round(1.25 * cost, 6) for cost in euros} == {round(cost, 6) for cost in dollars}
+    assert data["heat_map"] is None
+    assert {(f["currency"], f["points"][0]["cost"] in dollars) for f in data["fronts"]} == {
+        ("EUR", False),
+        ("USD", True),
+    }
+    said = "Prices are in USD and EUR, so there is no least cost among them."
+    page = render_study("html", result).replace("\N{NO-BREAK SPACE}", " ")
+    for text in (study_text(result), render_study("markdown", result), page):
+        assert said in text
+    for cost in euros:
+        shown = f"{cost:,.2f}".replace(",", " ").removesuffix(".00")
+        assert f"{shown} EUR" in page
+        assert f"{shown} USD" not in page
+    assert "cost [" not in page
+    assert "fronts are drawn" not in page

@@ -10,6 +10,7 @@ from syncline_design.report.study_rows import reason
 from syncline_design.report.study_words import (
     MOST_KEYS,
     boundary_table,
+    currency_sentence,
     heat_table,
     outcome,
     rule_sentence,
@@ -31,9 +32,9 @@ MOST_FRONTS = 8
 def render_study_page(result: StudyResult) -> str:
     """The page of a study: what holds, least cost, who wins, where it ends, fronts, cases."""
     summary = summarise(result)
-    currency = result.study.bases[0].currency
+    currency, *others = summary.currencies
     heat = heat_map(summary)
-    sampled = scatter(summary) if heat is None else None
+    sampled = scatter(summary) if heat is None and not others else None
     shown = outcome(result)
     fronts = _distinct_fronts(summary)
     ends = boundary_table(summary)
@@ -57,7 +58,7 @@ def render_study_page(result: StudyResult) -> str:
         note=visible(result.study.note),
         contents=[(key, title) for key, title in titles.items() if parts[key]],
         outcome=shown,
-        rule=rule_sentence(result),
+        rule=rule_sentence(result) + currency_sentence(summary),
         facts=_facts(result),
         heat_figure=_svg(figures_study.cost_map(heat, currency)) if heat is not None else None,
         heat_table=heat_table(heat, currency) if heat is not None else None,
@@ -67,9 +68,9 @@ def render_study_page(result: StudyResult) -> str:
         sampled_caption="" if sampled is None else visible(_sampled_caption(sampled)),
         winners=winners_table(summary),
         ends=ends if ends.rows else None,
-        fronts_figure=_fronts_figure(summary, fronts, currency) if fronts else None,
-        fronts_table=_fronts_table(summary, currency) if fronts else None,
-        cases=_case_table(summary, currency),
+        fronts_figure=_fronts_figure(summary, fronts) if fronts else None,
+        fronts_table=_fronts_table(summary) if fronts else None,
+        cases=_case_table(summary),
         provenance=_provenance(result),
     )
 
@@ -108,15 +109,20 @@ def _common(summary: Summary, front: Front) -> str:
     return visible(", ".join(parts)) or "every case"
 
 
-def _fronts_figure(summary: Summary, chosen: list[Front], currency: str) -> Any:
+def _fronts_figure(summary: Summary, chosen: list[Front]) -> Any:
+    """The fronts on one axis of cost; None where they are in different currencies."""
+    currency, *others = dict.fromkeys(front.currency for front in chosen)
+    if others:
+        return None
     named = [figures_study.NamedFront(_common(summary, f), f.points) for f in chosen]
     return _svg(figures_study.fronts(named, currency))
 
 
-def _fronts_table(summary: Summary, currency: str) -> Table:
+def _fronts_table(summary: Summary) -> Table:
     rows = []
     for front in summary.fronts:
         (least, worst), (most, best) = front.points[0], front.points[-1]
+        currency = front.currency
         rows.append((
             Cell(_common(summary, front)),
             Cell(numbers.count(len(front.cases)), float(len(front.cases))),
@@ -146,7 +152,7 @@ def _sampled_caption(data: Scatter) -> str:
     return text + (f" Vary besides: {sentence_list(list(data.others))}." if data.others else "")
 
 
-def _case_table(summary: Summary, currency: str) -> Table:
+def _case_table(summary: Summary) -> Table:
     result = summary.result
     several = varied(summary)
     many = len(result.study.bases) > 1
@@ -160,7 +166,7 @@ def _case_table(summary: Summary, currency: str) -> Table:
             Cell(str(brief.number), float(brief.number)), *named,
             *_setting_cells(brief, several),
             Cell(brief.verdict, tone=shown.tone, mark=shown.mark),
-            Cell(numbers.money(brief.cost, currency), brief.cost),
+            Cell(numbers.money(brief.cost, brief.currency), brief.cost),
             Cell(numbers.length(brief.error_m), brief.error_m),
             Cell(why),
         ])  # fmt: skip

@@ -175,6 +175,7 @@ def study_data(result: StudyResult) -> dict[str, Any]:
         else {
             "x": heat.x.key,
             "y": heat.y.key,
+            "currency": summary.currencies[0],
             "x_values": heat.x_labels,
             "y_values": heat.y_labels,
             "least_cost": heat.cost,
@@ -186,7 +187,11 @@ def study_data(result: StudyResult) -> dict[str, Any]:
         ],
         "boundaries": [{**asdict(b), "fixed": dict(b.fixed)} for b in boundaries(summary)],
         "fronts": [
-            {"cases": f.cases, "points": [{"cost": c, "error_m": e} for c, e in f.points]}
+            {
+                "cases": f.cases,
+                "currency": f.currency,
+                "points": [{"cost": c, "error_m": e} for c, e in f.points],
+            }
             for f in summary.fronts
         ],
         "cases": list(rows(result)),

@@ -78,9 +78,9 @@ def study_text(result: StudyResult) -> str:
     summary = summarise(result)
     shown = outcome(result)
     lines = [f"{shown.mark} {visible(result.study.name)}: {shown.word}."]
-    lines += [rule_sentence(result), ""]
+    lines += [rule_sentence(result) + currency_sentence(summary), ""]
     heat = heat_map(summary)
-    costs = None if heat is None else heat_table(heat, _currency(result))
+    costs = None if heat is None else heat_table(heat, summary.currencies[0])
     if costs is not None and len(costs.rows) <= MOST_DOWN:
         lines += [plain_table(costs), ""]
     elif heat is not None:
@@ -103,17 +103,21 @@ def study_markdown(result: StudyResult) -> str:
     summary = summarise(result)
     shown = outcome(result)
     lines = [f"## {shown.mark} {markdown_safe(result.study.name)}: {shown.word}", ""]
-    lines += [markdown_safe(rule_sentence(result)), ""]
+    lines += [markdown_safe(rule_sentence(result) + currency_sentence(summary)), ""]
     heat = heat_map(summary)
-    tables = [] if heat is None else [heat_table(heat, _currency(result))]
+    tables = [] if heat is None else [heat_table(heat, summary.currencies[0])]
     for found in (*tables, winners_table(summary), boundary_table(summary)):
         if found.rows:
             lines += [f"**{markdown_safe(found.caption)}**", "", markdown_table(found)]
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _currency(result: StudyResult) -> str:
-    return result.study.bases[0].currency
+def currency_sentence(summary: Summary) -> str:
+    """Why there is no least cost; empty where all prices are in one currency."""
+    if len(summary.currencies) < 2:
+        return ""
+    names = sentence_list(list(summary.currencies))
+    return f" Prices are in {names}, so there is no least cost among them."
 
 
 def heat_table(heat: HeatMap, currency: str) -> Table:

@@ -67,11 +67,9 @@ class StudyResult:
     def case(self, index: int) -> CaseResult:
         """One case by its index, from 0."""
         place, settings = self.study.case(index)
-        base = self.study.bases[place]
-        return CaseResult(
-            index + 1, place, str(base.path), base.name, base.currency, settings,
-            self._record(index),
-        )  # fmt: skip
+        base, record = self.study.bases[place], self._record(index)
+        currency = str((record.get("design") or {}).get("currency") or base.currency)
+        return CaseResult(index + 1, place, str(base.path), base.name, currency, settings, record)
 
     def _record(self, index: int) -> Json:
         key = self.keys[index]

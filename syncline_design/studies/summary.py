@@ -33,6 +33,7 @@ class Brief:
     labels: tuple[str, ...]
     verdict: str
     cost: float | None
+    currency: str
     error_m: float | None
     picks: tuple[Pick, ...]
 
@@ -47,6 +48,7 @@ class Front:
     """One exact front of cost against error, and the cases that share it."""
 
     points: tuple[tuple[float, float], ...]
+    currency: str
     cases: tuple[int, ...]  # numbers
 
 
@@ -57,6 +59,12 @@ class Summary:
     result: StudyResult
     briefs: tuple[Brief, ...]
     fronts: tuple[Front, ...]
+
+    @property
+    def currencies(self) -> tuple[str, ...]:
+        """Of all prices; amounts in different ones cannot be compared."""
+        priced = [brief.currency for brief in self.briefs if brief.cost is not None]
+        return tuple(dict.fromkeys(priced or [self.result.study.bases[0].currency]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,20 +104,22 @@ class Boundary:
 def summarise(result: StudyResult) -> Summary:
     """One pass over all cases."""
     briefs: list[Brief] = []
-    fronts: dict[tuple[tuple[float, float], ...], list[int]] = {}
+    fronts: dict[tuple[tuple[tuple[float, float], ...], str], list[int]] = {}
     for case in result.cases():
         briefs.append(_brief(case))
         points = tuple((p["cost"], p["error_m"]) for p in case.record.get("front") or ())
-        if points and (points in fronts or len(fronts) < MOST_FRONTS):
-            fronts.setdefault(points, []).append(case.number)
-    found = tuple(Front(points, tuple(cases)) for points, cases in fronts.items())
+        key = (points, case.currency)
+        if points and (key in fronts or len(fronts) < MOST_FRONTS):
+            fronts.setdefault(key, []).append(case.number)
+    found = tuple(Front(*key, tuple(cases)) for key, cases in fronts.items())
     return Summary(result, tuple(briefs), found)
 
 
 def _brief(case: CaseResult) -> Brief:
     return Brief(
         case.number, case.base, tuple(case.labels.values()), case.verdict,
-        case.figure("design", "cost"), case.figure("syncline", "total_m"), tuple(picks_of(case)),
+        case.figure("design", "cost"), case.currency, case.figure("syncline", "total_m"),
+        tuple(picks_of(case)),
     )  # fmt: skip
 
 
@@ -141,9 +151,12 @@ def heat_map(summary: Summary) -> HeatMap | None:
     """The study's heat map: the factors it names, else its first two, those of the grid first.
 
     None where a cell of it was never computed, as between the points of a sample: an empty cell
-    would read as one that nothing meets (`scatter` shows such a study).
+    would read as one that nothing meets (`scatter` shows such a study).  None too where prices are
+    in different currencies: the least of them is not known.
     """
     study = summary.result.study
+    if len(summary.currencies) > 1:
+        return None
     if study.heat_map is not None:
         named = {f.key: f for f in study.factors}
         chosen = [named[study.heat_map.x], named[study.heat_map.y]]
