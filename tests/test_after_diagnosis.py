@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -199,3 +200,15 @@ def test_the_spec_is_never_written_over_what_the_command_reads(tmp_path: Path) -
         assert str(target) in done.stderr
         assert {path: path.read_bytes() for path in before} == before
     assert (tmp_path / "soft.yaml").is_symlink()
+
+
+def test_tails_that_no_budget_can_hold_are_said_and_not_charged() -> None:
+    """1.5 degrees of freedom have no standard deviation: no figure, no verdict, the reason."""
+    found = of("heavy_tails", {"degrees_of_freedom": 1.5, "outlier_rate": 0.0})
+    assert found.after["verdict"] == "indeterminate"
+    assert "with them, it could not be decided" in found.lines[0]
+    assert "no standard deviation" in found.lines[1]
+    assert [one.after_m for one in found.figures] == [None, None, None]
+    assert found.before["verdict"] == "meets"
+    json.dumps(found.to_json(), allow_nan=False)
+    assert "Horizon: 1 h" in found.text()

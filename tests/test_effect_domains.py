@@ -7,9 +7,11 @@ is whole, a scale of -1 leaves nothing).
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
+from scipy.stats import t as student
 from typer.testing import CliRunner
 
 from syncline_design.cli.app import app
@@ -63,6 +65,7 @@ POSSIBLE = [
     ("noise_understated", "position", "factor: 0.2"),
     ("heavy_tails", "position", "degrees_of_freedom: 0.8, outlier_rate: 1"),
     ("heavy_tails", "position", "degrees_of_freedom: 30, outlier_rate: 0"),
+    ("heavy_tails", "position", "degrees_of_freedom: 2.001, outlier_rate: 0"),
     ("timestamp_jitter", "position", "std_s: 0"),
     ("packetised_timestamps", "attitude", "interval_s: 0"),
     ("integer_second_slip", "position", "seconds: -18"),
@@ -128,3 +131,33 @@ def test_a_convention_that_a_sensor_cannot_have_is_refused_at_its_place(
         assert problem.line == LINE
         assert set(problem.expected.removeprefix("one of ").split(", ")) == MEANT[sensor]
         assert CliRunner().invoke(app, ["simulate", str(path)]).exit_code == 2
+
+
+ENDLESS = ["degrees_of_freedom: 2, outlier_rate: 0", "degrees_of_freedom: 1.2, outlier_rate: 0.3"]
+
+
+@pytest.mark.parametrize("command", ["check", "optimize", "simulate"])
+@pytest.mark.parametrize("values", ENDLESS)
+def test_tails_without_a_standard_deviation_have_no_place_in_a_budget(
+    tmp_path: Path, values: str, command: str
+) -> None:
+    """They were budgeted as 2.1 degrees of freedom without a word."""
+    path = written(tmp_path, "heavy_tails", "position", values)
+    result = CliRunner().invoke(app, [command, str(path)])
+    assert result.exit_code == 2
+    assert f"spec.yaml:{LINE}:" in result.stderr
+    assert "no standard deviation" in result.stderr
+    assert "outlier_rate, or" in result.stderr
+
+
+@pytest.mark.parametrize("freedom", [2.001, 2.03, 2.1, 3.0])
+def test_tails_are_charged_with_the_standard_deviation_of_students_t(
+    tmp_path: Path, freedom: float
+) -> None:
+    """Oracle: scipy's standard deviation; just above 2 the charge stopped at that of 2.1."""
+    values = f"degrees_of_freedom: {freedom}, outlier_rate: 0"
+    path = written(tmp_path, "heavy_tails", "position", values)
+    verdict = check_file(path, CheckSettings(monte_carlo=False))
+    rows = {row["term"]: row["value_m"] for row in verdict["syncline"]["ledger"]}
+    noise = rows["sigma_p"] + rows["heavy_tails (position)"]
+    assert noise == pytest.approx(math.sqrt(3.0) * 0.05 * float(student.std(freedom)), rel=1e-9)

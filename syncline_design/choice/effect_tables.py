@@ -19,7 +19,7 @@ from syncline_design.effects import registry
 from syncline_design.effects.acting import known_of
 from syncline_design.model.budget import Budget, budget
 from syncline_design.model.system import EffectEntry, RoleName, Sensor, System
-from syncline_design.spec.known_effects import effect_entries
+from syncline_design.spec.known_effects import demand_budget, effect_entries
 from syncline_design.spec.load import LoadedSpec
 
 Key = tuple[str, RoleName, str]  # stage, role, sensor
@@ -35,6 +35,7 @@ def problem_of(loaded: LoadedSpec) -> Problem:
     effects = effect_entries(loaded)
     if not effects:
         return bare
+    demand_budget(loaded)
     systems = _Systems(loaded, with_everything(bare), effects)
     charges = _Charges()
     for entry in effects:

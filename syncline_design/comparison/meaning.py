@@ -6,11 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
+from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis import Diagnosis
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.spec.edit import with_effects_text
+from syncline_design.spec.known_effects import NoBudget
 from syncline_design.spec.load import LoadedSpec, load_text
 from syncline_design.verdict.optimise import pinned_text
+from syncline_design.verdict.tree import frame
 from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
 
 Json = dict[str, Any]
@@ -95,6 +98,8 @@ class ErrorFigure:
 
 def as_measured(loaded: LoadedSpec) -> LoadedSpec:
     """The spec of the system that made a log: with choices open, its best design pinned."""
+    if sole_design(build_problem(loaded)) is not None:
+        return loaded
     problem, design = picked_design(loaded)
     if problem.combinations == 1:
         return loaded
@@ -109,8 +114,8 @@ def meaning(loaded: LoadedSpec, found: Diagnosis, seed: int = 0) -> DesignMeanin
         return None
     text = with_effects_text(loaded, entries)
     settings = CheckSettings(seed=seed)
-    before = check_loaded(loaded, settings)
-    after = check_loaded(load_text(text, loaded.path, loaded.builtin), settings)
+    before = _checked(loaded, settings)
+    after = _checked(load_text(text, loaded.path, loaded.builtin), settings)
     return DesignMeaning(
         text,
         before,
@@ -119,6 +124,16 @@ def meaning(loaded: LoadedSpec, found: Diagnosis, seed: int = 0) -> DesignMeanin
         error_figures(before, after),
         horizon_words(after["horizon"], given="horizon" in loaded.spec.model_fields_set),
     )
+
+
+def _checked(loaded: LoadedSpec, settings: CheckSettings) -> Json:
+    """The verdict; `indeterminate` with its `refusal` where an effect has no place in a budget."""
+    try:
+        return check_loaded(loaded, settings)
+    except NoBudget as refused:
+        words = [f"{one.message}; {one.hint}" for one in refused.problems]
+        verdict = frame(loaded, build_problem(loaded), "indeterminate", settings.seed)
+        return {**verdict, "refusal": words}
 
 
 def error_figures(before: Json, after: Json) -> tuple[ErrorFigure, ...]:
@@ -191,11 +206,12 @@ def format_duration(seconds: float) -> str:
 
 def _lines(before: Json, after: Json) -> Iterator[str]:
     yield f"Without the findings the spec {_said(before)}; with them, it {_said(after)}."
+    yield from after.get("refusal") or before.get("refusal") or []
     for row in after["requirements"]:
         if row["status"] == "fail" and row["value"] is not None:
             value, limit = _figure(row, "value"), _figure(row, "limit")
             yield f"{row['id']}: {value} against a limit of {limit}."
-    if before["spec"]["open_roles"]:
+    if before["spec"]["open_roles"] and "refusal" not in {*before, *after}:
         yield from _payload_lines(before, after)
     elif after["verdict"] == "fails":
         yield (

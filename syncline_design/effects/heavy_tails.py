@@ -39,18 +39,29 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """What the standard deviation of the mixture grows by, times sigma_p.
 
-    Var = (1 - rate) nu / (nu - 2) + rate 100, over the spec's variance.
+    Var = (1 - rate) nu / (nu - 2) + rate 100, over the spec's variance; infinite up to nu = 2.
     """
     if stage.position is None:
         return Contribution()
-    freedom = max(values["degrees_of_freedom"], LEAST_FREEDOM)
-    rate = values["outlier_rate"]
-    variance = (1.0 - rate) * freedom / (freedom - 2.0) + rate * OUTLIER_FACTOR**2
+    if _unbudgeted(values):
+        return Contribution(systematic_m=math.inf)
+    freedom, rate = values["degrees_of_freedom"], values["outlier_rate"]
+    tails = (1.0 - rate) * freedom / (freedom - 2.0) if rate < 1.0 else 0.0
+    variance = tails + rate * OUTLIER_FACTOR**2
     growth = math.sqrt(variance) - 1.0
     return Contribution(systematic_m=growth * math.hypot(*stage.position.sigma))
 
 
-LEAST_FREEDOM = 2.1  # the variance of Student's t is infinite at 2
+def _unbudgeted(values: Values) -> str:
+    """Student's t has no variance up to two degrees of freedom."""
+    if values["degrees_of_freedom"] > 2.0 or values["outlier_rate"] >= 1.0:
+        return ""
+    return (
+        "Student's t of 2 or fewer degrees of freedom has no standard deviation that a budget "
+        "could add; give more than 2, with the rows far out as outlier_rate, or the growth of the "
+        "standard deviation that your data show as noise_understated"
+    )
+
 
 EFFECT = Effect(
     name="heavy_tails",
@@ -68,4 +79,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=None,
     contribute=_contribute,
+    unbudgeted=_unbudgeted,
 )

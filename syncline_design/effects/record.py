@@ -212,6 +212,12 @@ Sensitivity = Callable[[StageRows, Values, Target], Array]
 Contribute = Callable[[Stage, Values, Target, Basis], Contribution]
 Spread = Callable[[StageRows, Values, Target], Covariance]
 Applies = Callable[[Stage, Target], bool]
+Unbudgeted = Callable[[Values], str]
+
+
+def always_budgeted(values: Values) -> str:
+    """The Syncline can charge it whatever its values; the default of `Effect.unbudgeted`."""
+    return ""
 
 
 def everywhere(stage: Stage, sensor: Target) -> bool:
@@ -235,6 +241,7 @@ class Effect:
     transponder: as an effect of the position, acts on a later stage's transponder too, which has
     a place but neither stamps nor noise of its own.
     accelerated: acts by acceleration, and is charged for that of the platform's hardest turn.
+    unbudgeted: why the Syncline cannot charge it with these values, and the way out; "" if it can.
     sentence: for people, a format string over {sensor} and the parameters.
     """
 
@@ -254,6 +261,7 @@ class Effect:
     tilted: bool = False
     transponder: bool = False
     accelerated: bool = False
+    unbudgeted: Unbudgeted = always_budgeted
 
     def slopes(self) -> tuple[Parameter, ...]:
         """The parameters that `sensitivity` has a column for."""

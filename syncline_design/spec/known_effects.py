@@ -60,6 +60,37 @@ def _transponder_problem(
     yield _problem(loaded, (*at, "sensor"), message, f"{effect.effect} of its position", known)
 
 
+def demand_budget(loaded: LoadedSpec) -> None:
+    """BadInput where an effect has no place in a budget with its values; in a log it may have."""
+    problems = list(_unbudgeted(loaded))
+    if problems:
+        raise NoBudget(tuple(problems))
+
+
+class NoBudget(BadInput):
+    """What no budget can hold, at its place in the spec."""
+
+
+def _unbudgeted(loaded: LoadedSpec) -> Iterator[Problem]:
+    from syncline_design.effects import registry
+
+    for index, entry in enumerate(effect_entries(loaded)):
+        record = registry()[entry.effect]
+        values = dict(entry.parameters)
+        if not (why := record.unbudgeted(values)):  # type: ignore[arg-type]
+            continue
+        path: KeyPath = ("effects", index, "parameters")
+        line, column = _place(loaded, path)
+        message, _, hint = why.partition("; ")
+        yield Problem(str(loaded.path), line, column, show_path(path), message, hint=hint)
+
+
+def _place(loaded: LoadedSpec, path: KeyPath) -> tuple[int, int]:
+    """Line and column of a key, or of the nearest one above it that the file holds."""
+    known = loaded.positions
+    return next(known[path[:n]] for n in range(len(path), -1, -1) if path[:n] in known)
+
+
 def _plain(value: float | str) -> float | str:
     return value if isinstance(value, str) else float(value)
 
@@ -103,9 +134,7 @@ def _misfit(value: float | str, parameter: Parameter, sensor: Target) -> str | N
 def _problem(
     loaded: LoadedSpec, path: KeyPath, message: str, found: str, known: list[str]
 ) -> Problem:
-    line, column = next(
-        loaded.positions[path[:n]] for n in range(len(path), -1, -1) if path[:n] in loaded.positions
-    )
+    line, column = _place(loaded, path)
     close = get_close_matches(found, known, 1)
     hint = f"did you mean {close[0]}?" if close else ""
     expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]
