@@ -7,8 +7,12 @@ import os
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from simulation_systems import survey
+from syncline_design.machine.deadline import Deadline, OutOfTime, within
+from syncline_design.simulation.worst_case import worst_cases
 from syncline_design.spec.load import BadInput, load_text
 from syncline_design.studies import StudySettings, load_study, run_study
 from test_study_inputs import BELOW, GRID, OWN, SPEC, STUDY, track
@@ -96,3 +100,33 @@ def test_thousands_of_effects_are_refused() -> None:
             continue
         with pytest.raises(BadInput, match=f"too many entries; expected at most 1000, .*{count}"):
             load_text(text, ROOT / "specs" / "flooded.yaml")
+
+
+def test_thousands_of_stages_and_requirements_are_refused() -> None:
+    """8 000 stages or 20 000 simulated requirements, 1 MB each, kept `check` busy for minutes."""
+    spec = (ROOT / "specs" / "position_track.yaml").read_text()
+    head, stages = spec.split("stages:\n")
+    limits = "".join(
+        f"  - {{id: Q-{k}, kind: monte_carlo, quantile: {k / 4000}, limit: 9 m}}\n"
+        for k in range(1, 1001)
+    )
+    with pytest.raises(BadInput, match="too many entries; expected at most 1000"):
+        load_text(f"{head}{limits}stages:\n{stages}", ROOT / "specs" / "flooded.yaml")
+    one = "platform: usv, attitude: {sensor: sbg_apogee}, ranging: {sensor: riegl_vux1uav}"
+    for count, taken in ((32, True), (33, False), (8_000, False)):
+        chain = "".join(f"  - {{name: s{k}, {one}}}\n" for k in range(1, count))
+        first = f"  - {{name: s0, position: {{sensor: ublox_f9p_rtk}}, {one}}}\n"
+        text = f"{head}stages:\n{first}{chain}timestamping: {{candidates: [hardware]}}\n"
+        if taken:
+            assert load_text(text, ROOT / "specs" / "flooded.yaml")
+            continue
+        with pytest.raises(BadInput, match=f"too many entries; expected at most 32, .*{count}"):
+            load_text(text, ROOT / "specs" / "flooded.yaml")
+
+
+def test_the_search_for_the_worst_case_keeps_the_time_limit() -> None:
+    """With 64 stages it took minutes beyond a limit of 3 s."""
+    system = survey()
+    assert worst_cases(system, np.array([1e-3]))
+    with within(Deadline(0.0)), pytest.raises(OutOfTime):
+        worst_cases(system, np.array([1e-3]))

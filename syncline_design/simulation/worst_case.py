@@ -16,6 +16,7 @@ import numpy as np
 
 from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import in_force
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.system import Stage, System
@@ -232,6 +233,7 @@ class _Search:
         moving = np.ones(value.shape, dtype=bool)
         before = point.copy()
         for _ in range(iterations):
+            in_force().check()
             reached = value.reshape(-1, self.starts).max(axis=1) >= enough_m
             active = np.flatnonzero(moving & ~np.repeat(reached, self.starts))
             if active.size == 0:

@@ -45,6 +45,8 @@ from syncline_design.spec.log_block import split_column as split_column
 Role = Literal["position", "attitude", "ranging"]
 ROLE_NAMES: tuple[Role, ...] = ("position", "attitude", "ranging")
 
+MOST_REQUIREMENTS = 1_000
+MOST_STAGES = 32  # the work grows with the square of their number; chains have two or three
 MOST_EFFECTS = 1_000  # each acts on every simulated sample; a system is known by a few
 
 LIMIT_DIMENSIONS: dict[str, Dimension] = {
@@ -358,9 +360,11 @@ class Spec(Record):
     catalogs: tuple[Text, ...] = ()
     currency: Literal["EUR", "USD", "GBP", "NOK", "SEK", "DKK", "CHF", "CAD", "AUD", "JPY"] = "EUR"
     exchange_rates: dict[str, PositiveMoney] = Field(default_factory=dict)  # {USD: 0.92 EUR}
-    requirements: Annotated[tuple[Requirement, ...], AtLeastOne]
+    requirements: Annotated[
+        tuple[Requirement, ...], AtLeastOne, Field(max_length=MOST_REQUIREMENTS)
+    ]
     sync_model: Literal["syncline", "per_sensor"] = "syncline"
-    stages: Annotated[tuple[StageChoice, ...], AtLeastOne]
+    stages: Annotated[tuple[StageChoice, ...], AtLeastOne, Field(max_length=MOST_STAGES)]
     timestamping: Annotated[
         MethodChoice | None, _one_or_candidates("timestamping", MethodChoice)
     ] = None
