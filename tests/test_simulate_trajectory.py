@@ -1,4 +1,4 @@
-"""Trajectories, geodesy, the text, and what bad input of the simulator ends in."""
+"""Trajectories, the text, and what bad input of the simulator ends in."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from syncline_design.simulation import (
     sample_errors,
     simulate,
 )
-from syncline_design.simulation.geodesy import ecef_from_ned, errors_in_ecef
 from syncline_design.simulation.summary import CSV_HEADER, duration, grid_csv, length, summary_text
 from syncline_design.simulation.trajectory import (
     MANOEUVRES,
@@ -31,7 +30,7 @@ from syncline_design.simulation.trajectory import (
     _manoeuvre_track,
     rotation_log,
 )
-from tests.simulation_systems import DEG, altered, fixed_wing, position_only, sensor, survey
+from tests.simulation_systems import altered, fixed_wing, position_only, sensor, survey
 
 PLATFORM = Platform(20.0, 0.5, 100.0)
 
@@ -308,7 +307,6 @@ def test_systems_that_cannot_be_simulated(system: System, says: str) -> None:
         ({"workers": 0}, "workers"),
         ({"envelope": "maximal"}, "envelope: expected one of limits, inside, trajectory"),
         ({"envelope": math.nan}, "envelope"),
-        ({"estimator": "magic"}, "estimator"),
         ({"quantiles": (0.5, 1.0)}, "quantiles"),
         ({"quantiles": (math.nan,)}, "quantiles"),
         ({"confidence": 1.0}, "confidence"),
@@ -316,7 +314,6 @@ def test_systems_that_cannot_be_simulated(system: System, says: str) -> None:
         ({"limit_m": -1.0}, "limit_m"),
         ({"tau_grid_s": (0.0, -1.0)}, "tau_grid_s"),
         ({"tau_grid_s": (math.inf,)}, "tau_grid_s"),
-        ({"estimator": "conditioned", "envelope": "trajectory"}, "conditioned"),
     ],
 )
 def test_settings_that_make_no_sense(changes: dict[str, object], says: str) -> None:
@@ -345,40 +342,6 @@ def test_effects_that_do_not_fit(entry: EffectEntry, says: str) -> None:
     system = dataclasses.replace(fixed_wing(), effects=(entry,))
     with pytest.raises(SimulationError, match=says):
         sample_errors(system, SimulationSettings(samples=10))
-
-
-def test_errors_in_ecef_keep_their_length() -> None:
-    """R_en is a rotation; at (0, 0) north is z, east is y, down is -x."""
-    np.testing.assert_allclose(
-        ecef_from_ned(0.0, 0.0), [[0, 0, -1], [0, 1, 0], [1, 0, 0]], atol=1e-15
-    )
-    errors = sample_errors(fixed_wing(), SimulationSettings(samples=500))
-    for latitude, longitude in ((63.4, 10.4), (-33.9, 151.2), (90.0, 0.0)):
-        turned = errors_in_ecef(errors, latitude * DEG, longitude * DEG)
-        lengths = np.linalg.norm(errors, axis=1)
-        np.testing.assert_allclose(np.linalg.norm(turned, axis=1), lengths, rtol=1e-12)
-        rotation = ecef_from_ned(latitude * DEG, longitude * DEG)
-        np.testing.assert_allclose(rotation @ rotation.T, np.eye(3), atol=1e-15)
-        assert np.linalg.det(rotation) == pytest.approx(1.0)
-
-
-def test_ecef_agrees_with_the_difference_of_two_geodetic_points() -> None:
-    """A metre north, east or down as pymap3d's geodetic conversion moves a point (to 1e-6)."""
-    import pymap3d
-
-    lat, lon = 63.4, 10.4
-    origin = np.array(pymap3d.geodetic2ecef(lat, lon, 50.0))
-    for axis in range(3):
-        step = np.zeros(3)
-        step[axis] = 1.0
-        moved = np.array(pymap3d.ned2ecef(*step, lat, lon, 50.0))
-        found = ecef_from_ned(lat * DEG, lon * DEG) @ step
-        np.testing.assert_allclose(found, moved - origin, atol=1e-6)
-
-
-def test_a_place_that_does_not_exist() -> None:
-    with pytest.raises(SimulationError, match="latitude of at most 90 deg"):
-        ecef_from_ned(2.0, 0.0)
 
 
 def test_summary_says_what_was_found() -> None:

@@ -1,15 +1,10 @@
-"""From random numbers to draws of a system: kinematics, noise, timestamp errors.
-
-A `Source` hands out uniform and normal numbers; pseudo-random ones (`RandomSource`) for plain
-Monte Carlo, a shifted lattice for the conditioned estimator.  What is made of them is the same.
-"""
+"""From random numbers to draws of a system: kinematics, noise, timestamp errors."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -30,31 +25,19 @@ from syncline_design.simulation.kernel import Draw
 Shifts = Mapping[tuple[str, RoleName], Array]  # timestamp error mu [s] of (stage, role)
 
 
-class Source(Protocol):
-    """n draws each of as many numbers as asked for."""
-
-    @property
-    def count(self) -> int:
-        """n."""
-
-    def uniform(self, rows: int) -> Array:
-        """(rows, n), uniform on [0, 1)."""
-
-    def normal(self, rows: int) -> Array:
-        """(rows, n), standard normal."""
-
-
 @dataclass(frozen=True, slots=True)
 class RandomSource:
-    """Pseudo-random numbers of one stream."""
+    """Pseudo-random numbers of one stream: `count` draws each of as many numbers as asked for."""
 
     generator: np.random.Generator
     count: int
 
     def uniform(self, rows: int) -> Array:
+        """(rows, count), uniform on [0, 1)."""
         return self.generator.random((rows, self.count))
 
     def normal(self, rows: int) -> Array:
+        """(rows, count), standard normal."""
         return self.generator.standard_normal((rows, self.count))
 
 
@@ -82,7 +65,7 @@ def directions(height: Array, turn: Array) -> Array:
     return out
 
 
-def timing_draws(system: System, source: Source) -> Shifts:
+def timing_draws(system: System, source: RandomSource) -> Shifts:
     """mu [s] of every sensor that enters, against true time (UTC).
 
     What a sensor stamped t on the host clock was valid at t + eps of that clock, and offset is
@@ -108,7 +91,7 @@ def entering(stage: Stage) -> tuple[Sensor, ...]:
     return tuple(s for s in stage.sensors() if stage.ranging is not None or s.role == "position")
 
 
-def timing_draw(error: TimingError, source: Source) -> Array:
+def timing_draw(error: TimingError, source: RandomSource) -> Array:
     """n draws of mu [s].
 
     With the mean calibrated out, what remains of it has unknown sign and size up to
@@ -123,13 +106,13 @@ def timing_draw(error: TimingError, source: Source) -> Array:
     return drawn
 
 
-def _either_sign(size_s: float, source: Source) -> Array:
+def _either_sign(size_s: float, source: RandomSource) -> Array:
     """n draws [s], uniform between minus and plus a size."""
     drawn: Array = size_s * (2.0 * source.uniform(1)[0] - 1.0)
     return drawn
 
 
-def _distribution_draw(distribution: Distribution, source: Source) -> Array:
+def _distribution_draw(distribution: Distribution, source: RandomSource) -> Array:
     drawn: Array
     match distribution:
         case Uniform(low, high):
@@ -148,23 +131,15 @@ def stage_draw(
     system: System,
     index: int,
     shifts: Shifts,
-    source: Source,
+    source: RandomSource,
     inside: bool,
-    noisy: bool = True,
-    from_rate: bool = False,
 ) -> Draw:
-    """n draws of a stage under the envelope `limits` or `inside` (model.md, simulator).
-
-    from_rate: the other directions are drawn relative to the rate's, which changes no
-    distribution but puts what matters, the angle between rate and line of sight, into one number.
-    """
+    """n draws of a stage under the envelope `limits` or `inside`."""
     stage = system.stages[index]
     d = 0.0 if stage.ranging is None else float(stage.platform.distance_m)
     free = 4 if position_lever_arm(stage, index == 0) is None else 3
     uniform = source.uniform(2 * free + 1 + 2 * inside)
     found = directions(uniform[:free], uniform[free : 2 * free])
-    if from_rate:
-        _express_from(found)
     cos_yaw, sin_yaw = angle(uniform[2 * free])
     speed: float | Array = float(stage.platform.v_max_mps)
     rate: float | Array = float(stage.platform.omega_max_radps)
@@ -180,24 +155,9 @@ def stage_draw(
         bearing=found[0],
         antenna_m=antenna,
         ranging_m=ranging,
-        **noise_draw(stage, source, noisy),
+        **noise_draw(stage, source),
         **stage_shifts(system, index, shifts, source.count),
     )
-
-
-def _express_from(found: Array) -> None:
-    """Turn all unit vectors (k, 3, n) but the last so that their z axis becomes the last one.
-
-    The two other axes: T. Duff et al., J. Comput. Graph. Tech. 6 (2017) 1-8.
-    """
-    x, y, z = found[-1]
-    sign = np.where(z < 0.0, -1.0, 1.0)
-    a = -1.0 / (sign + z)
-    b = x * y * a
-    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x])
-    second = np.stack([b, sign + y * y * a, -y])
-    for vector in found[:-1]:
-        vector[:] = vector[0] * first + vector[1] * second + vector[2] * found[-1]
 
 
 def lever_arms(stage: Stage, first: bool, direction: Array) -> tuple[Array, Array]:
@@ -214,16 +174,16 @@ def _column(vector: tuple[float, float, float]) -> Array:
     return np.array([[float(value)] for value in vector])
 
 
-def noise_draw(stage: Stage, source: Source, noisy: bool) -> dict[str, Array]:
+def noise_draw(stage: Stage, source: RandomSource) -> dict[str, Array]:
     """Gaussian noise of the stage's sensors as fields of `Draw`."""
     n = source.count
     position = np.zeros((3, n))
     angles = np.zeros((5, n))
     distance = np.zeros(n)
-    if noisy and stage.position is not None:
+    if stage.position is not None:
         position = source.normal(3)
         position *= _column(stage.position.sigma)
-    if noisy and stage.ranging is not None and stage.attitude is not None:
+    if stage.ranging is not None and stage.attitude is not None:
         angles = source.normal(5)
         sigma = (*stage.attitude.sigma, *stage.ranging.sigma[1:])
         angles *= np.array([[float(s)] for s in sigma])

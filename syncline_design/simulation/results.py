@@ -64,17 +64,11 @@ class Histogram:
 
 @dataclass(frozen=True, slots=True)
 class MonteCarlo:
-    """The probabilistic answer, and the worst case at the system's tau.
-
-    effective_samples: plain samples that would give the 0.95 quantile (the last one asked for if
-    it is not among them) as precisely; equal to `samples` for the plain estimator.
-    """
+    """The probabilistic answer, and the worst case at the system's tau."""
 
     samples: int
     seed: int
     envelope: str
-    estimator: str
-    effective_samples: int
     confidence: float
     quantiles: tuple[QuantileEstimate, ...]
     within_target: ProportionEstimate | None
@@ -94,8 +88,8 @@ class MonteCarlo:
             "samples": self.samples,
             "seed": self.seed,
             "envelope": self.envelope,
-            "estimator": self.estimator,
-            "effective_samples": self.effective_samples,
+            "estimator": "plain",  # the one there is: every sample drawn and counted alike
+            "effective_samples": self.samples,
             "confidence": self.confidence,
             "ensemble": None if self.ensemble is None else self.ensemble.to_json(),
             "quantiles": {repr(q.quantile): q.to_json() for q in self.quantiles},

@@ -50,12 +50,7 @@ def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS)
         iterations=CROSS_CHECK_ITERATIONS,
         enough_gap=CROSS_CHECK_GAP,
     )
-    if settings.estimator == "conditioned":
-        from syncline_design.simulation.conditioned import conditioned_monte_carlo
-
-        found = conditioned_monte_carlo(system, settings, worst)
-    else:
-        found = _monte_carlo(settings, error_distribution(system, settings), worst)
+    found = _monte_carlo(settings, error_distribution(system, settings), worst)
     drawn = ensemble_of(
         system, settings.envelope, follows_a_file(settings), excursions(system, settings)
     )
@@ -95,8 +90,6 @@ def _monte_carlo(
         samples=settings.samples,
         seed=settings.seed,
         envelope=settings.envelope,
-        estimator="plain",
-        effective_samples=settings.samples,
         confidence=settings.confidence,
         quantiles=estimates,
         within_target=within,

@@ -12,7 +12,6 @@ from syncline_design.model.system import Sensor, SimulationError, Stage, System
 from syncline_design.model.timing import Constant, Distribution, Empirical, Normal, Uniform
 
 Envelope = Literal["limits", "inside", "trajectory"]
-Estimator = Literal["plain", "conditioned"]
 DEFAULT_QUANTILES = (0.5, 0.95, 0.997)
 DEFAULT_SAMPLES = 200_000
 DEFAULT_MANOEUVRE = "figure_eight"
@@ -22,7 +21,7 @@ DEFAULT_MANOEUVRE = "figure_eight"
 class SimulationSettings:
     """How to simulate.
 
-    samples: Monte Carlo draws (for the conditioned estimator: points).  seed: of the one
+    samples: Monte Carlo draws.  seed: of the one
     SeedSequence behind every stream.  envelope: `limits` (|v| = v_max, |w| = omega_max, free
     directions), `inside` (|v|, |w| uniform below), `trajectory` (from `trajectory`: a manoeuvre's
     name or a CSV file).  quantiles: of |error|.  limit_m: target of P(|error| <= target).
@@ -38,7 +37,6 @@ class SimulationSettings:
     workers: int | None = None
     trajectory: str | Path | FileContent | None = None
     tau_grid_s: tuple[float, ...] | None = None
-    estimator: Estimator = "plain"
     confidence: float = 0.95
 
     def __post_init__(self) -> None:
@@ -47,9 +45,6 @@ class SimulationSettings:
         if self.workers is not None:
             _demand_whole("workers", self.workers, 1)
         _demand_word("envelope", self.envelope, get_args(Envelope))
-        _demand_word("estimator", self.estimator, get_args(Estimator))
-        if self.estimator == "conditioned" and self.envelope == "trajectory":
-            raise SimulationError("estimator: 'conditioned' needs the envelope limits or inside")
         for value in self.quantiles:
             _demand(0.0 < value < 1.0, "quantiles", "a number between 0 and 1", value)
         _demand(0.0 < self.confidence < 1.0, "confidence", "between 0 and 1", self.confidence)

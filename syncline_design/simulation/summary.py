@@ -37,13 +37,7 @@ def monte_carlo_lines(found: MonteCarlo, trajectory: str | None = None) -> list[
     where = ENVELOPE_WORDS[found.envelope]
     if trajectory is not None:
         where += f" {trajectory}"
-    worth = ""
-    if found.estimator != "plain":
-        worth = f", worth {found.effective_samples} plain ones"
-    lines = [
-        f"Monte Carlo: {found.samples} samples ({found.estimator}{worth}), seed {found.seed}, "
-        f"{where}"
-    ]
+    lines = [f"Monte Carlo: {found.samples} samples (plain), seed {found.seed}, {where}"]
     lines += [
         f"  {100 * q.quantile:g} % of errors below {length(q.value_m)}  "
         f"[{length(q.low_m)}, {length(q.high_m)}]"

@@ -223,7 +223,7 @@ def _rows(
 
 
 def _noise(system: System, index: int, shifts: Shifts, source: RandomSource) -> Noise:
-    drawn = noise_draw(system.stages[index], source, True)
+    drawn = noise_draw(system.stages[index], source)
     angles = drawn["angle_noise_rad"]
     return Noise(
         position_m=drawn["position_noise_m"].T,
