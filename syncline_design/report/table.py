@@ -21,6 +21,12 @@ class Cell:
     sub: str = ""  # a second, quieter line
 
 
+def cell_words(cell: Cell) -> str:
+    """A cell in one line: its symbol, what it says, and the quieter words in brackets."""
+    sub = f" ({cell.sub})" if cell.sub else ""
+    return f"{cell.mark} {cell.text}{sub}".strip()
+
+
 @dataclass(frozen=True, slots=True)
 class Head:
     """One column heading; figures are set flush right."""

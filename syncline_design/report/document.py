@@ -1,0 +1,249 @@
+"""A subject's text as data, written once: four renderers walk it (console, Markdown, page, CSV).
+
+An `on_*` file makes a Document of a result.  Nothing here is escaped: every renderer makes every
+text harmless for its own output, so what a user named can stand in any node as it is.
+
+Each node says how far it reaches: `everywhere`, only on the `page`, or only in the `text` outputs
+(console and Markdown, where a line often says what a page draws).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
+
+from syncline_design.report.table import Table, Tone
+
+if TYPE_CHECKING:
+    from syncline_design.report.svg import InlineFigure
+
+Reach = Literal["everywhere", "page", "text"]
+Style = Literal["", "strong", "muted", "code", "given"]
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A stretch of text; `given` is a user's own, kept apart from the writing direction around."""
+
+    text: str
+    style: Style = ""
+
+
+Inline: TypeAlias = "str | Span | tuple[str | Span, ...]"
+Pairs: TypeAlias = "tuple[tuple[str, Inline], ...]"
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """A result as colour, symbol and word together, so that none is needed alone."""
+
+    tone: Tone
+    mark: str
+    word: str
+
+
+@dataclass(frozen=True, slots=True)
+class Heading:
+    """A heading below a section's own; aside: quieter words behind it."""
+
+    kind: ClassVar = "heading"
+    words: Inline
+    aside: Inline = ""
+    reach: Reach = "everywhere"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A paragraph; quiet for a note, mark and tone for what must be seen."""
+
+    kind: ClassVar = "text"
+    words: Inline
+    quiet: bool = False
+    mark: str = ""
+    tone: Tone = ""
+    reach: Reach = "everywhere"
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """Labels with their values: key `facts`, an aligned `record`, or `terms` with sentences."""
+
+    kind: ClassVar = "facts"
+    pairs: Pairs
+    look: Literal["facts", "record", "terms"] = "facts"
+    reach: Reach = "everywhere"
+
+
+@dataclass(frozen=True, slots=True)
+class Items:
+    """A list; numbered where the order counts, marked where each entry warns."""
+
+    kind: ClassVar = "items"
+    entries: tuple[Inline, ...]
+    mark: str = ""
+    tone: Tone = ""
+    reach: Reach = "everywhere"
+
+
+@dataclass(frozen=True, slots=True)
+class TableNode:
+    """A table in its place; its caption is silent where a heading above says the same."""
+
+    kind: ClassVar = "table"
+    table: Table
+    silent: bool = False
+    reach: Reach = "everywhere"
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """A figure, drawn only when a page asks for it; name: unique in the document."""
+
+    kind: ClassVar = "chart"
+    name: str
+    draw: Callable[[], InlineFigure]
+    caption: str
+    reach: Reach = "page"
+
+
+@dataclass(frozen=True, slots=True)
+class Explorer:
+    """Sliders that move tau and the target of the chart so named; None where unknown."""
+
+    kind: ClassVar = "explorer"
+    chart: str
+    floor_m: float
+    rate_mps: float
+    tau_s: float
+    tau_crit_s: float | None
+    target_m: float | None
+    sync_limit: float
+    others_pass: bool
+    tau_span: tuple[float, float]
+    target_span: tuple[float, float]
+    reach: Reach = "page"
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Nodes that belong together: an article, a column, side by side (`split`, `pair`), folded."""
+
+    kind: ClassVar = "group"
+    nodes: tuple[Node, ...]
+    look: Literal["article", "column", "split", "pair", "fold"] = "column"
+    key: str = ""
+    summary: str = ""  # of a fold
+    reach: Reach = "everywhere"
+
+
+Node: TypeAlias = "Heading | Text | Facts | Items | TableNode | Chart | Explorer | Group"
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A titled part; key: its anchor, label: its word in the contents list."""
+
+    key: str
+    title: str
+    label: str
+    nodes: tuple[Node, ...]
+    reach: Reach = "everywhere"
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """The answer first (outcome, name, sentences, key facts), then what it rests on.
+
+    family: what kind of report it is; source: the file it is about, for the console's first line.
+    """
+
+    family: str
+    outcome: Outcome
+    name: str
+    sentences: tuple[Inline, ...]
+    facts: Pairs
+    sections: tuple[Section, ...]
+    source: str = ""
+    title: str = ""  # of the browser's window; by default name and outcome
+
+
+def code(text: object) -> Span:
+    """A name that a file or a program knows."""
+    return Span(str(text), "code")
+
+
+def strong(text: object) -> Span:
+    """What the eye should find."""
+    return Span(str(text), "strong")
+
+
+def muted(text: object) -> Span:
+    """What may be passed over."""
+    return Span(str(text), "muted")
+
+
+def given(text: object) -> Span:
+    """A user's own words among ours."""
+    return Span(str(text), "given")
+
+
+def spans(words: Inline) -> tuple[Span, ...]:
+    """Inline text as spans, empty ones left out."""
+    parts = words if isinstance(words, tuple) else (words,)
+    found = (part if isinstance(part, Span) else Span(part) for part in parts)
+    return tuple(span for span in found if span.text)
+
+
+def plain(words: Inline) -> str:
+    """Inline text without its styles."""
+    return "".join(span.text for span in spans(words))
+
+
+def show(table: Table | None, *, silent: bool = False, reach: Reach = "everywhere") -> list[Node]:
+    """A table as a node; none, or one without rows, as nothing."""
+    return [TableNode(table, silent, reach)] if table is not None and table.rows else []
+
+
+def section(key: str, title: str, nodes: Iterable[Node], label: str = "",
+            reach: Reach = "everywhere") -> list[Section]:  # fmt: skip
+    """A section, or nothing where nothing stands in it; its label is its title unless given."""
+    found = tuple(nodes)
+    return [Section(key, title, label or title, found, reach)] if found else []
+
+
+def provenance(pairs: Sequence[tuple[str, str]], reach: Reach = "page") -> list[Section]:
+    """The last section: what made the result."""
+    record = Facts(tuple((label, code(value)) for label, value in pairs), "record")
+    return section("provenance", "Provenance", [record] if pairs else [], reach=reach)
+
+
+def for_output(document: Document, output: Literal["page", "text"]) -> Document:
+    """The document as far as it reaches into one kind of output; empty sections are left out."""
+    kept = []
+    for part in document.sections:
+        nodes = tuple(_reaching(part.nodes, output))
+        if nodes and part.reach in ("everywhere", output):
+            kept.append(replace(part, nodes=nodes))
+    return replace(document, sections=tuple(kept))
+
+
+def _reaching(nodes: Iterable[Node], output: Reach) -> Iterator[Node]:
+    for node in nodes:
+        if node.reach not in ("everywhere", output):
+            continue
+        if isinstance(node, Group):
+            inner = tuple(_reaching(node.nodes, output))
+            if inner:
+                yield replace(node, nodes=inner)
+        else:
+            yield node
+
+
+def charts(nodes: Iterable[Node]) -> Iterator[Chart]:
+    """Every chart below these nodes."""
+    for node in nodes:
+        if isinstance(node, Group):
+            yield from charts(node.nodes)
+        elif isinstance(node, Chart):
+            yield node

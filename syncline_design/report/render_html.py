@@ -1,0 +1,84 @@
+"""A document as one offline HTML page: one template with style and script; it loads nothing."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import re
+from functools import lru_cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Any, Final
+
+from syncline_design.report.document import Document, charts, for_output, spans
+from syncline_design.report.text import visible
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+_TEMPLATES: Final = "syncline_design.templates"
+_STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
+
+
+def html(document: Document) -> str:
+    """The page of a document; the same input gives the same bytes."""
+    from markupsafe import Markup
+
+    shown = for_output(document, "page")
+    drawn = {c.name: c.draw() for part in shown.sections for c in charts(part.nodes)}
+    script = _asset("report.js")
+    return (
+        _environment()
+        .get_template("document.html.j2")
+        .render(
+            d=shown,
+            drawn=drawn,
+            style=Markup(_asset("style.css")),
+            script=Markup(script),
+            policy=content_security_policy(script),
+        )
+        .lstrip()
+    )
+
+
+def _asset(name: str) -> str:
+    """The text of a file in reports/templates."""
+    return files(_TEMPLATES).joinpath(name).read_text(encoding="utf-8")
+
+
+def content_security_policy(script: str) -> str:
+    """A policy that allows inline styles, exactly this script, and no network at all."""
+    digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
+    return (
+        f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
+        "img-src 'none'; connect-src 'none'; base-uri 'none'; form-action 'none'"
+    )
+
+
+@lru_cache(maxsize=1)
+def _environment() -> Environment:
+    from jinja2 import Environment, FunctionLoader, StrictUndefined
+    from markupsafe import Markup
+
+    def harmless(value: Any) -> Any:
+        """Every expression of the template passes here before it is escaped."""
+        return visible(value) if isinstance(value, str) and not isinstance(value, Markup) else value
+
+    environment = Environment(
+        loader=FunctionLoader(_asset),
+        autoescape=True,  # select_autoescape() would miss .html.j2
+        undefined=StrictUndefined,
+        finalize=harmless,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["spans"] = spans
+    environment.filters["breakable"] = _breakable
+    environment.filters["drawing"] = Markup  # matplotlib has escaped the texts in it
+    return environment
+
+
+def _breakable(text: str) -> Any:
+    """A key path that may go on in the next line before each of its dots and brackets."""
+    from markupsafe import Markup, escape
+
+    return Markup("<wbr>").join(escape(part) for part in _STEP.split(visible(text)))
