@@ -11,6 +11,7 @@ zeros), and a constant part of a velocity that the places do not follow.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,7 +26,7 @@ LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 LEAST_STEPS = 4  # rows in a window
 LEAST_WINDOWS = 8
 CLEAR = 20.0  # times the noise of a displacement: windows need not be longer
-MOST_TURN_RAD = 0.7  # in one window: rotation vectors add up only while they are small
+MOST_TURN_RAD = 0.7  # in one window: longer ones say no more
 LAGS_S = np.linspace(-1.0, 1.0, 41)
 MOVES = 10.0  # times its own noise: a direction that moves less is nothing but that noise
 ERRORS = 4.0  # standard errors that a disagreement must have on top of the tolerance
@@ -133,7 +134,8 @@ def disagreement(
     body = None
     if place_m is not None:
         body = spans.integral(rotate(rotation, column), float(lag))
-    return _described(moved, own, body, UNITS if place_m is not None else TURNS)
+    units = UNITS if place_m is not None else TURNS
+    return _described(moved, own, body, units, (spans.noise(column), tolerance))
 
 
 def _chosen(
@@ -156,14 +158,20 @@ def _chosen(
 
 
 def _motion(spans: Spans, place_m: Array | None, rotation: Array) -> Array:
-    """Change of place [m], or of attitude [rad, body axes], over every window."""
+    """Change of place [m], or sum of the turns [rad, body axes], over every window.
+
+    The turns are summed step by step, as rates are: the turn between a window's ends is another
+    vector where a vehicle rocks about two axes within it (coning), however small it is.
+    """
     if place_m is not None:
         place = place_m[spans.rows]
         return np.asarray(place[spans.last] - place[spans.first])
     from scipy.spatial.transform import Rotation
 
     pose = Rotation.from_matrix(rotation[spans.rows])
-    return np.asarray((pose[spans.first].inv() * pose[spans.last]).as_rotvec())
+    steps = (pose[:-1].inv() * pose[1:]).as_rotvec()
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    return np.asarray(total[spans.last] - total[spans.first])
 
 
 def _likeness(moved: Array, own: Array) -> float:
@@ -248,22 +256,53 @@ def _drifts(spans: Spans, moved: Array, own: Array, sigma_m: float, tolerance: f
 
 
 def _described(
-    moved: Array, own: Array, body: Array | None, units: dict[float, str]
+    moved: Array,
+    own: Array,
+    body: Array | None,
+    units: dict[float, str],
+    agreement: tuple[float, float],
 ) -> Disagreement:
-    """The simplest relation that fits: a factor, other axes or signs, body axes; else none."""
+    """The simplest relation that fits: a factor, other axes or signs, body axes; else none.
+
+    Of those that leave little of the motion, one that leaves no disagreement goes first: a reversed
+    vertical axis is a small part of the motion of a vehicle that flies level.  agreement: noise of
+    the column's integral, tolerance.
+    """
     whole = float(np.sum(moved**2))
+    near = [r for r in _relations(moved, own, body, units)
+            if float(np.sum((moved - r.mapped) ** 2)) < FITS * whole]  # fmt: skip
+    exact = [r for r in near if not _differs(moved, r.mapped, *agreement)]
+    if near:
+        best = (exact or near)[0]
+        return Disagreement(best.factor, best.words)
     factor = float(np.sqrt(np.sum(own**2) / max(whole, 1e-300)))
+    return Disagreement(factor, f"{factor:.3g} times in size, and in another direction")
+
+
+@dataclass(frozen=True, slots=True)
+class _Relation:
+    """A way in which a column may relate to the pose's motion; mapped: the column, so mended."""
+
+    mapped: Array
+    factor: float
+    words: str
+
+
+def _relations(
+    moved: Array, own: Array, body: Array | None, units: dict[float, str]
+) -> Iterator[_Relation]:
+    """Simplest first."""
+    factor = float(np.sqrt(np.sum(own**2) / max(float(np.sum(moved**2)), 1e-300)))
     scale = float(np.sum(moved * own)) / max(float(np.sum(own**2)), 1e-300)
-    if float(np.sum((moved - scale * own) ** 2)) < FITS * whole and scale != 0.0:
-        return Disagreement(1.0 / scale, _factor_words(1.0 / scale, units))
-    if body is not None and float(np.sum((moved - body) ** 2)) < FITS * whole:
-        return Disagreement(factor, "they look like body axes")
+    if scale != 0.0:
+        yield _Relation(scale * own, 1.0 / scale, _factor_words(1.0 / scale, units))
+    if body is not None:
+        yield _Relation(body, factor, "they look like body axes")
     for order in itertools.permutations(range(3)):
         turned = own[:, order]
         signs = np.sign(np.sum(moved * turned, axis=0))
-        if float(np.sum((moved - signs * turned) ** 2)) < FITS * whole:
-            return Disagreement(factor, f"axes or signs: {_axes_words(order, signs)}")
-    return Disagreement(factor, f"{factor:.3g} times in size, and in another direction")
+        words = f"axes or signs: {_axes_words(order, signs)}"
+        yield _Relation(signs * turned, factor, words)
 
 
 def _factor_words(factor: float, units: dict[float, str]) -> str:

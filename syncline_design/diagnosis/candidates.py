@@ -79,9 +79,37 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
                     continue
                 if view.log.kind == "position" and sensor not in ("position", "target"):
                     continue  # attitude and rates are the better system's
-                if effect.applies(stage, sensor):
+                if effect.applies(stage, sensor) and not _is_noise_of_heading(view, effect, k):
                     found.append(Candidate(effect, sensor, k))
     return tuple(found)
+
+
+def noise_of_heading(view: Scene, exclude: Sequence[str] = ()) -> tuple[str, ...]:
+    """What is no candidate because the heading hardly varies in this log, as `unseen` says it."""
+    return tuple(
+        f"{effect.name} ({sensor})"
+        for effect in registry().values()
+        if effect.name not in exclude and view.log.kind != "position"
+        for sensor in effect.sensors
+        if any(
+            effect.applies(stage, sensor) and _is_noise_of_heading(view, effect, k)
+            for k, stage in enumerate(view.system.stages)
+        )
+    )
+
+
+def _is_noise_of_heading(view: Scene, effect: Effect, index: int) -> bool:
+    """Whether the noise of the logged heading alone could pass for the effect.
+
+    A heading of spread s that is logged with white noise sigma correlates with that noise: a false
+    slope of sigma^2 / (sigma^2 + s^2), worth n/2 (sigma/s)^2 nat where heading noise is all noise.
+    It stays below half a nat from s = sigma sqrt(n) on.
+    """
+    attitude = view.system.stages[index].attitude
+    if not effect.by_heading or attitude is None:
+        return False
+    yaw = np.unwrap(view.rows[index].euler_rad[:, 2])
+    return bool(np.std(yaw) < attitude.sigma[2] * np.sqrt(len(view)))
 
 
 def commonness(label: tuple[str, str, int]) -> tuple[int, int]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from syncline_design import __version__
 from syncline_design.diagnosis.axes import without_still_axes
-from syncline_design.diagnosis.candidates import candidates, directed_parts
+from syncline_design.diagnosis.candidates import candidates, directed_parts, noise_of_heading
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.figures_data import plots
@@ -103,7 +103,7 @@ def diagnose_measured(
         regime=(regime_name, gap(data, result.model, regime)),
         placebo=_placebo(data, search, result),
         steps=_stairs(data, result),
-        unseen=_unseen(data, search, result),
+        unseen=_unseen(data, search, result, settings.exclude_effects),
         log=log_json(replace(inputs.log, notes=view.log.notes))
         | {"fitted": len(view), "motion": _motion_json(data)},
         noise=_noise_json(data, result),
@@ -172,8 +172,12 @@ def _placebo(data: Data, search: Search, result: SearchResult) -> tuple[str, Gap
     return f"{name} ({sensor})", found
 
 
-def _unseen(data: Data, search: Search, result: SearchResult) -> tuple[str, ...]:
-    return unseen(data, result.model, search.free_signatures(result.model))
+def _unseen(
+    data: Data, search: Search, result: SearchResult, exclude: Sequence[str]
+) -> tuple[str, ...]:
+    """What this log could not show, and what it would show by its noise alone."""
+    hidden = unseen(data, result.model, search.free_signatures(result.model))
+    return (*hidden, *noise_of_heading(data.view, exclude))
 
 
 def log_json(log: Log) -> Json:

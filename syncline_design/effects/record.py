@@ -242,6 +242,8 @@ class Effect:
     a place but neither stamps nor noise of its own.
     accelerated: acts by acceleration, and is charged for that of the platform's hardest turn.
     unbudgeted: why the Syncline cannot charge it with these values, and the way out; "" if it can.
+    by_heading: its size follows the heading; a log shows it only where the heading varies by far
+    more than its own noise, which otherwise passes for it (errors in variables).
     sentence: for people, a format string over {sensor} and the parameters.
     """
 
@@ -262,6 +264,7 @@ class Effect:
     transponder: bool = False
     accelerated: bool = False
     unbudgeted: Unbudgeted = always_budgeted
+    by_heading: bool = False
 
     def slopes(self) -> tuple[Parameter, ...]:
         """The parameters that `sensitivity` has a column for."""

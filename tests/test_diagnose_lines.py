@@ -1,0 +1,146 @@
+"""Straight lines and rocking hulls: sound logs in which noise or coning once passed for a fault.
+
+The logs are made here from closed forms: heading, roll and pitch are sums of sines, the place is
+the integral of a constant speed along the heading, rates are central differences of the poses.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from syncline_design.diagnosis.checks import Check, log_checks
+from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.system import measured
+from syncline_design.effects import registry
+from syncline_design.spec.load import load
+
+Array = NDArray[np.float64]
+SIGMA_DEG = (0.04, 0.04, 0.1)
+SPEC = """
+syncline: 1
+name: lines
+requirements: [{id: ACC-1, kind: accuracy, limit: 5 m}]
+stages:
+  - name: boat
+    platform: {v_max: 20 m/s, omega_max: 60 deg/s, distance: 60 m, baseline: 0.5 m}
+    position:
+      sensor: {modality: position, type: gnss, sigma_position: 0.02 m, primitives: [pps]}
+      primitive: pps
+      timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}
+    attitude:
+      sensor: {modality: attitude, sigma_attitude: [0.04 deg, 0.04 deg, 0.1 deg], primitives: [pps]}
+      primitive: pps
+      timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}
+    ranging:
+      sensor: {modality: ranging, type: lidar, sigma_range: 0.02 m,
+               sigma_bearing: [0.02 deg, 0.02 deg], primitives: [pps]}
+      primitive: pps
+      timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}
+"""
+
+
+def poses(t: Array, yaw_deg: float, rock_deg: float) -> Array:
+    """Roll, pitch, yaw [rad]: rocking about two axes a quarter turn apart, yaw around 40 deg."""
+    roll = rock_deg * np.sin(1.3 * t)
+    pitch = rock_deg * np.cos(1.3 * t)
+    yaw = 40.0 + yaw_deg * (np.sin(0.5 * t) + 0.5 * np.sin(1.7 * t))
+    return np.radians(np.stack([roll, pitch, yaw], axis=1))
+
+
+def turned(angles: Array) -> Rotation:
+    return Rotation.from_euler("ZYX", angles[:, ::-1])
+
+
+def straight(
+    seed: int, rows: int, yaw_deg: float, rock_deg: float, down_sign: float = 1.0
+) -> dict[str, Array]:
+    """A log at 10 Hz without any fault (but, wanted, a vertical velocity of the wrong sign)."""
+    draw, speed, step = np.random.default_rng(seed), 8.0, 1e-3
+    t = 0.1 * np.arange(rows)
+    fine = np.arange(0.0, t[-1] + 0.5 * step, step)
+    course = poses(fine, yaw_deg, rock_deg)[:, 2]
+    way = [np.cumsum(speed * f(course)) * step for f in (np.cos, np.sin)]
+    place = np.stack([*(np.interp(t, fine, w) for w in way), 3.0 * np.sin(0.2 * t) - 20.0], axis=1)
+    angles = poses(t, yaw_deg, rock_deg)
+    h = 1e-4
+    ends = [turned(poses(t + s * h, yaw_deg, rock_deg)) for s in (-1, 1)]
+    rate = (ends[0].inv() * ends[1]).as_rotvec() / (2 * h)
+    object_at = place + np.stack([*draw.uniform(-30, 30, (2, rows)), 20.0 - np.zeros(rows)], axis=1)
+    beam = turned(angles).inv().apply(object_at - place)
+    reach = np.linalg.norm(beam, axis=1)
+    velocity = [speed * np.cos(angles[:, 2]), speed * np.sin(angles[:, 2])]
+    velocity.append(down_sign * 0.6 * np.cos(0.2 * t))
+    angles = angles + draw.normal(0.0, 1.0, (rows, 3)) * np.radians(SIGMA_DEG)
+    place = place + draw.normal(0.0, 0.02, (rows, 3))
+    noise = draw.normal(0.0, 1.0, (3, rows)) * np.array([[0.02], [0.02], [0.02]])
+    columns = {"time_s": t, "range_m": reach + noise[0]}
+    columns["azimuth_deg"] = np.degrees(np.arctan2(beam[:, 1], beam[:, 0])) + noise[1]
+    columns["elevation_deg"] = np.degrees(-np.arcsin(beam[:, 2] / reach)) + noise[2]
+    for k, axis in enumerate(("north", "east", "down")):
+        columns[f"position_{axis}_m"] = place[:, k]
+        columns[f"velocity_{axis}_mps"] = velocity[k] + draw.normal(0.0, 0.01, rows)
+        columns[f"target_{axis}_m"] = object_at[:, k]
+    for k, (angle, axis) in enumerate(zip(("roll", "pitch", "yaw"), "xyz", strict=True)):
+        columns[f"{angle}_deg"] = np.degrees(angles[:, k])
+        columns[f"rate_{axis}_degps"] = np.degrees(rate[:, k]) + draw.normal(0.0, 0.05, rows)
+    return columns
+
+
+def written(columns: dict[str, Array], folder: Path) -> tuple[Any, Path]:
+    (folder / "s.yaml").write_text(SPEC)
+    table = np.stack(list(columns.values()), axis=1)
+    path = folder / "l.csv"
+    np.savetxt(path, table, "%.6f", delimiter=",", header=",".join(columns), comments="")
+    return load(folder / "s.yaml"), path
+
+
+def checked(columns: dict[str, Array], folder: Path) -> tuple[Check, ...]:
+    loaded, path = written(columns, folder)
+    inputs = measured(loaded, [path])
+    return log_checks(scene(inputs.system, inputs.log))
+
+
+def asked(columns: dict[str, Array], folder: Path, only: tuple[str, ...]) -> Diagnosis:
+    loaded, path = written(columns, folder)
+    others = tuple(name for name in registry() if name not in only)
+    return diagnose(loaded, [path], DiagnosisSettings(exclude_effects=others))
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_noise_of_a_heading_is_no_hard_iron(seed: int, tmp_path: Path) -> None:
+    """A heading that varies by 0.2 deg, logged with 0.1 deg, errs with itself: by its noise."""
+    found = asked(straight(seed, 800, 0.25, 2.0), tmp_path, ("heading_hard_iron", "range_bias"))
+    assert [f.effect.name for f in found.findings] == []
+    assert "heading_hard_iron (attitude)" in found.unseen
+
+
+def test_hard_iron_is_found_in_turns(tmp_path: Path) -> None:
+    """Where the heading swings by 60 deg a true hard iron has its name and its size."""
+    columns = straight(3, 800, 60.0, 2.0)
+    yaw = np.radians(columns["yaw_deg"])
+    columns["yaw_deg"] = columns["yaw_deg"] + np.degrees(0.02 * np.sin(yaw) - 0.01 * np.cos(yaw))
+    (finding,) = asked(columns, tmp_path, ("heading_hard_iron", "range_bias")).findings
+    for name, truth in (("sin_rad", 0.02), ("cos_rad", -0.01)):
+        figure = finding.parameters[name]
+        assert figure.standard_uncertainty is not None
+        # 5e-4: the truth is of the wrong argument, the logged heading, by 0.02 rad of itself
+        assert abs(float(figure.value) - truth) < 4.0 * figure.standard_uncertainty + 5e-4
+
+
+@pytest.mark.parametrize("rock_deg", [4.0, 8.0, 12.0])
+def test_rocking_about_two_axes_is_no_contradiction(rock_deg: float, tmp_path: Path) -> None:
+    """Coning: on a straight line the turns about the down axis add up to no change of heading."""
+    assert checked(straight(4, 800, 0.25, rock_deg), tmp_path) == ()
+
+
+def test_a_reversed_vertical_velocity_is_said(tmp_path: Path) -> None:
+    (found,) = checked(straight(5, 800, 20.0, 2.0, down_sign=-1.0), tmp_path)
+    assert found.code == "velocity_columns"
+    assert found.message.endswith("axes or signs: third is -third")
