@@ -285,7 +285,7 @@ def test_a_share_of_next_to_nothing_is_not_given(
     before, after, floor = (Fit(r, 1.0, n, 0.95) for r, n in zip(rms_m, nll, strict=True))
     closed = closed_share(before, after, floor)
     assert closed == (None if share is None else pytest.approx(share))
-    text = gap_text(Gap(before, after, floor, closed, 0.0, 0.0, 0.05))
+    text = gap_text(Gap(before, after, floor, closed, 0.0, None, 0.05, floor))
     assert ("too little for a share" in text) == (share is None)
     assert ("% of the gap is closed" in text) == (share is not None and share > 0.0)
 

@@ -6,6 +6,7 @@ the integral of a constant speed along the heading, rates are central difference
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose, summary_text
 from syncline_design.diagnosis.checks import Check, log_checks
+from syncline_design.diagnosis.findings import AliasFigure
 from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.summary import lookalike_lines
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
+from syncline_design.model.estimates import figure
+from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
 from syncline_design.spec.load import load
 
 Array = NDArray[np.float64]
@@ -144,3 +149,80 @@ def test_a_reversed_vertical_velocity_is_said(tmp_path: Path) -> None:
     (found,) = checked(straight(5, 800, 20.0, 2.0, down_sign=-1.0), tmp_path)
     assert found.code == "velocity_columns"
     assert found.message.endswith("axes or signs: third is -third")
+
+
+def raw_error(columns: dict[str, Array], ahead_s: float = 0.0) -> Array:
+    """Georeferencing error (n, 3) by NumPy and SciPy alone, positions carried ahead."""
+    vectors = {
+        stem: np.stack([columns[f"{stem}_{axis}{unit}"] for axis in ("north", "east", "down")], 1)
+        for stem, unit in (("position", "_m"), ("velocity", "_mps"), ("target", "_m"))
+    }
+    angles = np.radians(np.stack([columns[f"{a}_deg"] for a in ("roll", "pitch", "yaw")], 1))
+    az, el = np.radians(columns["azimuth_deg"]), np.radians(columns["elevation_deg"])
+    beam = np.stack([np.cos(az) * np.cos(el), np.sin(az) * np.cos(el), -np.sin(el)], 1)
+    seen = turned(angles).apply(columns["range_m"][:, None] * beam)
+    return vectors["position"] + ahead_s * vectors["velocity"] + seen - vectors["target"]
+
+
+def rms_m(error: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(error**2, axis=1))))
+
+
+def test_at_best_is_what_the_effects_reach(tmp_path: Path) -> None:
+    """Least squares over all rows is the best that a latency can do, however lucky the noise."""
+    columns = straight(6, 600, 40.0, 2.0)
+    for axis in ("north", "east", "down"):
+        late = 0.03 * columns[f"velocity_{axis}_mps"]
+        columns[f"position_{axis}_m"] = columns[f"position_{axis}_m"] - late
+    found = asked(columns, tmp_path, ("latency", "range_bias"))
+    velocity = raw_error(columns, 1.0) - raw_error(columns)
+    error = raw_error(columns)
+    best_s = -float(np.sum(velocity * error) / np.sum(velocity**2))
+    held_out = found.to_json()["gap"]["held_out"]
+    assert held_out["fitted"]["rms_m"] == pytest.approx(rms_m(raw_error(columns, best_s)), rel=2e-3)
+    assert held_out["after"]["rms_m"] >= 0.999 * held_out["fitted"]["rms_m"]
+    assert found.to_json()["gap"]["regime"]["nll_saved_per_sample"]["standard_error"] is None
+
+
+def test_more_noise_has_no_better_best(tmp_path: Path) -> None:
+    """A finding that only says that the noise is larger leaves the errors as large as they are."""
+    columns = straight(7, 600, 40.0, 2.0)
+    draw = np.random.default_rng(8)
+    for axis in ("north", "east", "down"):
+        columns[f"position_{axis}_m"] = columns[f"position_{axis}_m"] + draw.normal(0, 0.08, 600)
+    found = asked(columns, tmp_path, ("noise_understated", "range_bias"))
+    assert [f.effect.name for f in found.findings] == ["noise_understated"]
+    held_out = found.to_json()["gap"]["held_out"]
+    for part in ("before", "after", "fitted"):
+        assert held_out[part]["rms_m"] == pytest.approx(rms_m(raw_error(columns)), rel=1e-3)
+    assert f"{figure(rms_m(raw_error(columns)), None, 'm')} at best" in summary_text(found)
+
+
+def test_what_contradicts_itself_need_not_leave_anything(tmp_path: Path) -> None:
+    """Velocities 1.3 times too large on a log without any fault: nothing remains but noise."""
+    columns = straight(9, 600, 40.0, 2.0)
+    for axis in ("north", "east", "down"):
+        columns[f"velocity_{axis}_mps"] = 1.3 * columns[f"velocity_{axis}_mps"]
+    found = asked(columns, tmp_path, ("latency", "range_bias"))
+    data = found.to_json()
+    assert data["verdict"] == "unexplained"
+    assert not data["sound"]
+    assert not data["findings"]
+    assert data["remaining"]["beyond_noise"] is False
+    text, page = summary_text(found), render_diagnosis_markdown(data)
+    assert "Where it remains" not in text
+    assert "still there" not in page
+    assert "contradict" in text
+    assert "contradict" in page
+
+
+def test_other_signatures_do_not_look_alike() -> None:
+    """The console's words for two that fit worse: one along the named signature, one across it."""
+    along = AliasFigure("filter_lag", "position", "boat", 0.999, 31.6)
+    across = AliasFigure("flexure", "ranging", "boat", 0.0019, 7.2)
+    assert lookalike_lines((along, across)) == [
+        "   looks alike, fits worse: filter_lag (position) by 31.6 nat",
+        "   of another signature, fits worse in its place: flexure (ranging) by 7.2 nat",
+    ]
+    entry = {"effect": "latency", "sensor": "position", "lookalikes": [asdict(along)]}
+    assert "filter lag" in render_diagnosis_markdown({"findings": [entry]})

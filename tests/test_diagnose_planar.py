@@ -180,3 +180,31 @@ def test_a_height_that_is_wrong_everywhere_is_still_found(tmp_path: Path) -> Non
         if name in f.parameters
     ]
     assert [abs(v) for v in values] == pytest.approx([0.8], abs=0.02)
+
+
+def test_what_a_plane_log_does_not_show_has_no_figure(tmp_path: Path) -> None:
+    """A lever arm in the plane: its part along the plane's normal is not seen, not 0 +- 0."""
+    rng = np.random.default_rng(31)
+    columns = drive(rng)
+    yaw, noise = np.radians(columns["yaw_deg"]), normal(rng, ROWS)
+    north, east = columns.pop("north"), columns.pop("east")
+    arm_x, arm_y = 0.20, -0.12
+    columns["position_north_m"] = north + arm_x * np.cos(yaw) - arm_y * np.sin(yaw) + noise[:, 0]
+    columns["position_east_m"] = east + arm_x * np.sin(yaw) + arm_y * np.cos(yaw) + noise[:, 1]
+    columns["position_down_m"] = np.zeros(ROWS)
+    columns |= {"reference_north_m": north, "reference_east_m": east}
+    columns["reference_down_m"] = np.zeros(ROWS)
+    settings = DiagnosisSettings(max_effects=1)
+    found = diagnose(*(p if k == 0 else [p] for k, p in enumerate(write(tmp_path, columns, False))),
+                     settings)  # fmt: skip
+    (finding,) = found.findings
+    assert finding.effect.name == "lever_arm"
+    data = found.to_json()
+    shown = data["findings"][0]["parameters"]
+    assert shown["x_m"]["value"] == pytest.approx(arm_x, abs=0.01)
+    assert shown["y_m"]["value"] == pytest.approx(arm_y, abs=0.01)
+    assert shown["z_m"]["standard_uncertainty"] is None
+    assert not shown["z_m"]["seen"]
+    assert "0 m down" not in finding.sentence
+    assert "(not seen) down" in finding.sentence
+    assert "lever_arm (position): z_m" in data["unseen"]

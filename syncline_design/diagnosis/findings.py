@@ -21,21 +21,28 @@ from syncline_design.model.estimates import figure
 Label = tuple[str, str, int]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
+NOT_SEEN = "(not seen)"
 
 
 @dataclass(frozen=True, slots=True)
 class Figure:
-    """One parameter: its value and standard uncertainty in SI; a convention is a word."""
+    """One parameter: its value and standard uncertainty in SI; a convention is a word.
+
+    seen: whether the log says anything of it; a lever arm has no seen down part in a planar log.
+    """
 
     value: float | str
     standard_uncertainty: float | None
     unit: str
+    seen: bool = True
 
 
 def figure_text(shown: Figure) -> str:
     """A parameter as every output prints it."""
     if isinstance(shown.value, str):
         return shown.value
+    if not shown.seen:
+        return NOT_SEEN
     return figure(shown.value, shown.standard_uncertainty, shown.unit)
 
 
@@ -107,11 +114,12 @@ def _deterministic(final: Settled, index: int) -> Finding:
     at = sum(len(a.effect.slopes()) for a in model.acting[:index])
     figures: dict[str, Figure] = {}
     for p in one.effect.parameters:
-        spread = None
+        spread, seen = None, True
         if p in one.effect.slopes():
-            spread = float(np.sqrt(max(model.covariance[at, at], 0.0)))
+            seen = bool(model.covariance[at, at] > 0.0)
+            spread = float(np.sqrt(model.covariance[at, at])) if seen else math.inf
             at += 1
-        figures[p.name] = Figure(float(one.values[p.name]), spread, p.unit)
+        figures[p.name] = Figure(float(one.values[p.name]), spread, p.unit, seen)
     return _finding(final, one.effect, one.label, figures)
 
 

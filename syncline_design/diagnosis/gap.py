@@ -48,12 +48,13 @@ class Fit:
 class Gap:
     """Before, after and floor on held-out rows.
 
-    floor: the same effects fitted to all rows, the held-out ones too, or what the spec's own noise
-    would give, whichever is lower, in RMS and in NLL.  expected_rms_m: what the spec's noise gives.
+    fitted: at best, the same effects fitted to all rows, the held-out ones too.  floor: that, or
+    what the spec's own noise would give, whichever is lower, in RMS and in NLL: down to where
+    closed_fraction counts, which no model need reach.  expected_rms_m: what the spec's noise gives.
     closed_fraction: (before - after) / (before - floor), in NLL or in RMS, whichever is less; None
     where nothing was held out (findings that only change the noise), and where there was no gap to
     speak of (`slight`: 2 % of the RMS at most, which is what an effect of a fifth of it makes).
-    difference: NLL per sample saved, with its standard error over the blocks.
+    difference: NLL per sample saved, with its standard error over the blocks, None of one block.
     """
 
     before: Fit
@@ -61,8 +62,9 @@ class Gap:
     floor: Fit
     closed_fraction: float | None
     difference: float
-    difference_error: float
+    difference_error: float | None
     expected_rms_m: float
+    fitted: Fit
 
     @property
     def slight(self) -> bool:
@@ -169,10 +171,10 @@ def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> G
         rms_m=min(fitted.rms_m, expected.rms_m),
         nll_per_sample=min(fitted.nll_per_sample, expected.nll_per_sample),
     )
-    spread = float(np.std(saved, ddof=1) / np.sqrt(len(saved))) if len(saved) > 1 else 0.0
+    spread = float(np.std(saved, ddof=1) / np.sqrt(len(saved))) if len(saved) > 1 else None
     closed = closed_share(before, after, floor) if held_out else None
     gained = before.nll_per_sample - after.nll_per_sample
-    return Gap(before, after, floor, closed, gained, spread, expected.rms_m)
+    return Gap(before, after, floor, closed, gained, spread, expected.rms_m, fitted)
 
 
 def closed_share(before: Fit, after: Fit, floor: Fit) -> float | None:

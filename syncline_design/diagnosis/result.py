@@ -36,6 +36,7 @@ class Diagnosis:
     checks: tuple[Check, ...]
     findings: tuple[Finding, ...]
     remaining: Remainder
+    left: bool  # whether what remains is more than noise
     where_before: tuple[Cell, ...]
     where_after: tuple[Cell, ...]
     first_disagreement_s: float | None
@@ -80,6 +81,7 @@ class Diagnosis:
             "remaining": {
                 "unexplained": self.unexplained,
                 "spec_m": None if self.gap is None else self.gap.expected_rms_m,
+                "beyond_noise": self.left,
                 "p": self.remaining.p,
                 "where": [_cell_json(c) for c in self.where_after],
             },
@@ -157,6 +159,7 @@ def _gap_json(gap: Gap | None) -> Json:
             "before": asdict(gap.before),
             "after": asdict(gap.after),
             "floor": asdict(gap.floor),
+            "fitted": asdict(gap.fitted),
         },
         "expected_rms_m": gap.expected_rms_m,
         "closed_fraction": gap.closed_fraction,

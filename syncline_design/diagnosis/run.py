@@ -96,6 +96,7 @@ def diagnose_measured(
         checks=checks,
         findings=shown,
         remaining=rest,
+        left=left,
         where_before=strongest(cells),
         where_after=strongest(cells_after),
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
@@ -177,7 +178,20 @@ def _unseen(
 ) -> tuple[str, ...]:
     """What this log could not show, and what it would show by its noise alone."""
     hidden = unseen(data, result.model, search.free_signatures(result.model))
-    return (*hidden, *noise_of_heading(data.view, exclude))
+    return (*hidden, *_unseen_parts(result), *noise_of_heading(data.view, exclude))
+
+
+def _unseen_parts(result: SearchResult) -> tuple[str, ...]:
+    """Parameters of what was found that no row depends on."""
+    model, at, found = result.model, 0, []
+    for one in model.acting:
+        names = []
+        for p in one.effect.slopes():
+            names += [p.name] if not model.covariance[at, at] > 0.0 else []
+            at += 1
+        if names:
+            found.append(f"{one.effect.name} ({one.sensor}): {', '.join(names)}")
+    return tuple(found)
 
 
 def log_json(log: Log) -> Json:

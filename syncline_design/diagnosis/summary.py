@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from syncline_design.diagnosis.findings import AliasFigure, Finding
 from syncline_design.diagnosis.gap import Gap
+from syncline_design.diagnosis.identify import SAME
 from syncline_design.diagnosis.regimes import Cell
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.model.estimates import figure
@@ -20,6 +21,7 @@ UNSOUND = (
     "UNEXPLAINED: the log contradicts itself or the limits of the spec's platform. "
     "Mend that first: every figure below rests on it."
 )
+OTHER = "of another signature, fits worse in its place"
 NOWHERE = "  in no regime on average: it shows in how the errors vary, not in their mean"
 BEYOND = " CAUTION: the log goes beyond the limits of the spec's platform."
 
@@ -32,7 +34,7 @@ def summary_text(diagnosis: Diagnosis) -> str:
     for number, finding in enumerate(diagnosis.findings, 1):
         lines += _finding_lines(number, finding, diagnosis)
     lines += _gap_lines(diagnosis)
-    if diagnosis.unexplained:
+    if diagnosis.left:
         where = [_cell_line(c) for c in diagnosis.where_after] or [NOWHERE]
         lines += ["", "Where it remains:", *where]
         lines.append(f"  chance that noise does this: {diagnosis.remaining.p:.1g}")
@@ -79,13 +81,14 @@ def _finding_lines(number: int, finding: Finding, diagnosis: Diagnosis) -> list[
 
 def lookalike_lines(found: Sequence[AliasFigure]) -> list[str]:
     """Three at most of those that fit worse, only with impossible values, or as well."""
-    worse = [a for a in found if a.nats_worse >= 0.0][:3]
+    alike = [a for a in found if a.nats_worse >= 0.0 and a.cosine > SAME][:3]
+    other = [a for a in found if a.nats_worse >= 0.0 and a.cosine <= SAME][:3]
     impossible = [a for a in found if a.nats_worse < 0.0 and not a.possible][:3]
     as_well = [a for a in found if a.nats_worse < 0.0 and a.possible][:3]
     lines = []
-    if worse:
+    for words, worse in (("looks alike, fits worse", alike), (OTHER, other)):
         named = ", ".join(f"{_name(a)} by {a.nats_worse:.3g} nat" for a in worse)
-        lines.append(f"   looks alike, fits worse: {named}")
+        lines += [f"   {words}: {named}"] if worse else []
     if impossible:
         named = ", ".join(f"{_name(a)} by {-a.nats_worse:.3g} nat" for a in impossible)
         lines.append(f"   fits better, but only with impossible values: {named}")
@@ -123,7 +126,7 @@ def gap_text(gap: Gap) -> str:
         closed += "; less than 2 % of it could be closed, too little for a share"
     return (
         f"RMS {figure(gap.before.rms_m, None, 'm')} before, {figure(gap.after.rms_m, None, 'm')} "
-        f"after, {figure(gap.floor.rms_m, None, 'm')} at best{closed}"
+        f"after, {figure(gap.fitted.rms_m, None, 'm')} at best{closed}"
     )
 
 

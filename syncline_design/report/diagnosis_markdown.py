@@ -57,3 +57,5 @@ def _finding(number: int, entry: Json) -> Iterator[str]:
     if words["aliases"]:
         separated = f"; to separate them: {words['separated_by']}" if words["separated_by"] else ""
         yield f"   - not told apart from {markdown_safe(words['aliases'] + separated)}"
+    if words["lookalikes"]:
+        yield f"   - similar: {markdown_safe(words['lookalikes'])}"

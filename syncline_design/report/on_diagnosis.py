@@ -65,6 +65,8 @@ def render_diagnosis(data: Json) -> str:
 def parameter_text(entry: Json) -> str:
     """`87.1 ± 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
     value, unit = numbers.finite(entry.get("value")), str(entry.get("unit") or "")
+    if entry.get("seen") is False:
+        return "not seen in this log"
     if value is None:
         return plain_text(entry.get("value"))
     return numbers.with_uncertainty(value, numbers.finite(entry.get("standard_uncertainty")), unit)
@@ -155,10 +157,9 @@ def sentence_text(data: Json) -> str:
 def _found_text(data: Json) -> str:
     found = items(data, "findings")
     if not found:
-        remaining = part(data, "remaining").get("unexplained")
         return (
             "No effect of the dictionary explains what differs."
-            if remaining
+            if _left(data)
             else "Nothing beyond the spec's own noise was found."
         )
     return " ".join(_full_stop(str(e.get("sentence") or _effect_text(e))) for e in found)
@@ -170,7 +171,7 @@ def _facts(data: Json) -> list[tuple[str, str]]:
     closed = part(data, "gap").get("closed_fraction")
     if numbers.finite(closed) is not None:
         facts.append(("Gap closed on held-out data", numbers.percent(closed)))
-    for key, label in (("before", "RMS before"), ("after", "RMS after"), ("floor", "Floor")):
+    for key, label in (("before", "RMS before"), ("after", "RMS after"), ("fitted", "RMS at best")):
         rms = part(held_out, key).get("rms_m")
         if numbers.finite(rms) is not None:
             facts.append((label, _length(rms)))
@@ -230,7 +231,7 @@ def gap_table(data: Json) -> Table | None:
     sources = (
         ("held-out blocks, before", part(gap, "held_out"), "before"),
         ("held-out blocks, after", part(gap, "held_out"), "after"),
-        ("held-out blocks, floor", part(gap, "held_out"), "floor"),
+        ("held-out blocks, at best (fitted to all rows)", part(gap, "held_out"), "fitted"),
         ("held-out regime, before", part(part(gap, "regime"), "held_out"), "before"),
         ("held-out regime, after", part(part(gap, "regime"), "held_out"), "after"),
     )
@@ -279,9 +280,15 @@ def _cell_text(entry: object) -> str:
     return text + (f", {abs(score):.3g} standard errors" if score is not None else "")
 
 
+def _left(data: Json) -> bool:
+    """Whether more than noise remains; a log can be unexplained by what it contradicts alone."""
+    remaining = part(data, "remaining")
+    return bool(remaining.get("beyond_noise", remaining.get("unexplained")))
+
+
 def remaining_text(data: Json) -> str:
     remaining = part(data, "remaining")
-    if not remaining.get("unexplained"):
+    if not _left(data):
         return ""
     where = "; ".join(_cell_text(entry) for entry in remaining.get("where") or ())
     return "Unexplained and still there" + (f": {where}." if where else ".")
