@@ -147,8 +147,10 @@ def test_a_sensor_of_type_gnss(keys: Stage, has: bool, tmp_path: Path) -> None:
 
 
 RECEIVERS = ["gnss", " GNSS ", "gnss_rtk", "rtk gnss", "GNSS/INS", "gnss-compass", "GPS", "dgps",
-             "Galileo", "rtk", "ppp"]  # fmt: skip
-OTHERS = ["", "ins", "usbl", "total_station", "total station", "pingpong", "artkit", "lbl"]
+             "Galileo", "rtk", "ppp", "QZSS", "navic", "psrtk", "network RTK", "PPK", "satnav",
+             "satellite_compass", "Global Positioning System", "egnos", "satellite"]  # fmt: skip
+OTHERS = ["", "ins", "usbl", "total_station", "total station", "pingpong", "artkit", "lbl",
+          "local positioning", "pppp", "uwb"]  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", [*RECEIVERS, *OTHERS])
@@ -162,6 +164,20 @@ def test_a_receiver_by_any_of_its_names(kind: str, tmp_path: Path) -> None:
              for role in ("position", "attitude", "ranging")]  # fmt: skip
     named = impossible(load(path), Selection(tuple(roles), (ClockSelection("fish", None),)))
     assert len(named) == (kind in RECEIVERS)
+
+
+@pytest.mark.parametrize(("keys", "has"), SINGLE)
+@pytest.mark.parametrize("kind", ["", " ", "lbl"])
+def test_a_position_sensor_of_no_type_is_told_of_where_gnss_is_not(
+    kind: str, keys: Stage, has: bool, tmp_path: Path
+) -> None:
+    """Only its type tells that a receiver is one: a silent entry met 50 m down without a word."""
+    antenna = single(**keys)["position"]
+    antenna = antenna | {"sensor": antenna["sensor"] | {"type": kind}}
+    verdict = check_file(written(tmp_path, single(**keys, position=antenna)), QUICK)
+    told = [one for one in verdict["warnings"] if one["code"] == "unknown-fact"]
+    assert bool(told) == (not has and not kind.strip())
+    assert all((one["key"], "GNSS" in one["message"]) == ("type", True) for one in told)
 
 
 ship = {"clock": "pps_gpio"}

@@ -152,3 +152,72 @@ def test_no_other_headline_does() -> None:
     for limit in ("1.9 m", "0.2 m"):
         for form, line in headlines(verdict(limit)).items():
             assert "exceeds the limit of" not in line, form
+
+
+EXCEEDED = {0.5: "61.7 %", 1.0: "31.7 %", 1.96: "5 %", 1e-9: "100 %"}  # tables of the normal law
+
+
+@pytest.mark.parametrize("factor", [*EXCEEDED, 2.0, 3.0])
+@pytest.mark.parametrize("where", ["stamp", "clock", "jitter", "nowhere"])
+def test_a_bound_that_normal_errors_often_exceed_is_told_of(factor: float, where: str) -> None:
+    """coverage_factor 1e-9 made every normal error a bound of nothing, without a word."""
+    text = SPEC.format(limit="1.9 m", more=f"coverage_factor: {factor}")
+    normal = "{distribution: normal, mean: 0 s, std: 1 us}"
+    uniform = "{distribution: uniform, low: -20 ms, high: 20 ms}"
+    if where == "stamp":
+        text = text.replace(uniform, normal)
+    if where == "clock":
+        text = text.replace("    position:\n", "    clock: pps_gpio\n    position:\n")
+    if where == "jitter":
+        text += "effects:\n  - {effect: timestamp_jitter, sensor: attitude, "
+        text += "parameters: {std_s: 1 us}}\n"
+    found = check_loaded(load_text(text, "boat.yaml"), CheckSettings(monte_carlo=False))
+    told = [one["message"] for one in found["warnings"] if one["code"] == "coverage-factor"]
+    assert len(told) == (where != "nowhere" and factor in EXCEEDED)
+    assert all(f"{EXCEEDED[factor]} of normal timestamp errors" in words for words in told)
+
+
+CHAIN_OF_ONE_VEHICLE = """\
+syncline: 1
+name: mast and winch
+requirements: [{{id: A, kind: accuracy, limit: 10 m}}]
+stages:
+  - name: mast
+    vehicle: ship
+    platform: {{v_max: 2 m/s, omega_max: 3 deg/s, distance: 10 m, baseline: 1 m}}
+    position: {{sensor: {{modality: position, sigma_position: 5 cm, primitives: []}}, {0}}}
+    attitude: {{sensor: {{modality: attitude, sigma_attitude: 1 deg, primitives: []}}, {0}}}
+    ranging:
+      sensor: {{modality: ranging, sigma_range: 1 cm, sigma_bearing: 1 deg, primitives: []}}
+      {0}
+  - name: winch
+    vehicle: ship
+    platform: {{v_max: 2 m/s, omega_max: 3 deg/s, distance: 10 m, baseline: 1 m}}
+    attitude: {{sensor: {{modality: attitude, sigma_attitude: 1 deg, primitives: []}}, {1}}}
+    ranging:
+      sensor: {{modality: ranging, sigma_range: 1 cm, sigma_bearing: 1 deg, primitives: []}}
+      {1}
+"""
+
+
+@pytest.mark.parametrize(
+    ("lines", "told"), [("uh", True), ("hu", True), ("uu", False), ("hh", False)]
+)
+@pytest.mark.parametrize("clock", [True, False])
+def test_timelines_that_differ_between_stages_of_one_vehicle_are_told_of(
+    lines: str, told: bool, clock: bool
+) -> None:
+    """The two ranging sensors meet: without a named clock their offset is taken as 0."""
+    names = {"u": "utc", "h": "host"}
+    stamps = [
+        f"timestamping: {{error: {{distribution: constant, value: 1 ms}}, timeline: {names[line]}}}"
+        for line in lines
+    ]
+    text = CHAIN_OF_ONE_VEHICLE.format(*stamps)
+    if clock:
+        text = text.replace("    vehicle: ship\n", "    vehicle: ship\n    clock: ntp_internet\n")
+    found = check_loaded(load_text(text, "ship.yaml"), CheckSettings(monte_carlo=False))
+    codes = [one["code"] for one in found["warnings"]]
+    assert ("common-clock" in codes) == (told and not clock)
+    offset = 0.005 if told and clock else 0.0  # ntp_internet: within 5 ms
+    assert found["syncline"]["tau_s"] == pytest.approx(0.002 + offset, rel=1e-12)

@@ -10,13 +10,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 from syncline_design.spec.catalog import Catalog, ClockEntry, SensorEntry, TimestampingEntry
 from syncline_design.spec.spec import Spec, StageChoice
 
-GENERIC = ("gnss", "gps")  # inside a word too: dgps, GnssCompass
-NAMES = {"glonass", "galileo", "beidou", "rtk", "ppp", "sbas"}
+GENERIC = ("gnss", "gps", "satnav")  # inside a word too: dgps, GnssCompass
+ENDINGS = ("rtk", "ppk")  # nrtk, psrtk
+SYSTEMS = {"glonass", "galileo", "beidou", "bds", "qzss", "navic", "irnss"}
+NAMES = SYSTEMS | {"ppp", "sbas", "egnos", "waas", "satellite", "global positioning"}
 Code = Literal["gnss"]
 
 
@@ -62,7 +65,11 @@ def is_receiver(kind: str) -> bool:
     gnss/ins counts: without its receiver it is an INS, and its type says so.
     """
     words = re.split(r"[^a-z0-9]+", kind.casefold())
-    return any(word in NAMES or any(part in word for part in GENERIC) for word in words)
+    words += [" ".join(pair) for pair in pairwise(words)]
+    return any(
+        word in NAMES or word.endswith(ENDINGS) or any(part in word for part in GENERIC)
+        for word in words
+    )
 
 
 def barred_sensor(spec: Spec, stage: StageChoice, name: str, sensor: SensorEntry) -> Barred | None:

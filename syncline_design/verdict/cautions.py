@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,10 +10,13 @@ from typing import Any
 from syncline_design.model.budget import differs
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
+from syncline_design.model.timing import Normal
+from syncline_design.spec.gnss import has_gnss
 from syncline_design.spec.load import LoadedSpec
 from syncline_design.verdict.tree import Verified
 
 Json = dict[str, Any]
+LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed their bound
 
 
 def cautions(
@@ -25,6 +29,8 @@ def cautions(
             *_worst_case(verified),
             *_lever_arm(verified),
             *_clocks(loaded, verified),
+            *_coverage(verified),
+            *_untyped(loaded, verified),
             *_waivers(verified),
             *_simulation(verified),
             *_assumptions(assumed),
@@ -112,23 +118,58 @@ def _clocks(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
             "holdover drift is the honest figure",
         )
         return
-    for stage in verified.system.stages:
-        if stage.vehicle not in silent:
-            continue
-        if stage.ranging is None:
-            if stage.position is not None and stage.position.timeline != UTC:
-                yield Caution(
-                    "common-clock",
-                    f"{stage.name} is stamped on the host clock and held against true time, and "
-                    "no `clock` says how far these are apart: the offset is taken as 0",
-                )
-            continue
-        lines = {"utc" if s.timeline == UTC else "host" for s in stage.sensors()}
-        if len(lines) > 1:
+    if silent:  # one vehicle, whose stages share one host clock
+        yield from _one_clock(verified)
+
+
+def _one_clock(verified: Verified) -> Iterator[Caution]:
+    """One vehicle without a named clock: what of it is held against UTC."""
+    stages = verified.system.stages
+    first, names = stages[0], " and ".join(stage.name for stage in stages)
+    if first.ranging is None:
+        if first.position is not None and first.position.timeline != UTC:
             yield Caution(
                 "common-clock",
-                f"{stage.name} has sensors on the host clock and on UTC, and no `clock` says how "
-                "far these are apart: the offset is taken as 0",
+                f"{first.name} is stamped on the host clock and held against true time, and "
+                "no `clock` says how far these are apart: the offset is taken as 0",
+            )
+        return
+    if len({s.timeline == UTC for stage in stages for s in stage.sensors()}) > 1:
+        has = "has" if len(stages) == 1 else "have"
+        yield Caution(
+            "common-clock",
+            f"{names} {has} sensors on the host clock and on UTC, and no `clock` says how "
+            "far these are apart: the offset is taken as 0",
+        )
+
+
+def _coverage(verified: Verified) -> Iterator[Caution]:
+    """A small coverage factor bounds a normal timestamp error by what it often exceeds."""
+    system = verified.system
+    errors = [s.timing for stage in system.stages for s in stage.sensors()]
+    errors += [offset for _, offset in system.clock_offsets]
+    normal = any(isinstance(e.distribution, Normal) and e.distribution.std_s > 0.0 for e in errors)
+    jitter = any(entry.effect == "timestamp_jitter" for entry in system.effects)
+    k = system.coverage_factor
+    if k < LEAST_COVERAGE and (normal or jitter):
+        yield Caution(
+            "coverage-factor",
+            f"coverage_factor {k:g}: {100.0 * math.erfc(k / math.sqrt(2.0)):.3g} % of normal "
+            "timestamp errors lie beyond the bound that tau is made of; with 3 it is 0.27 %",
+        )
+
+
+def _untyped(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
+    """Without GNSS only its type tells whether a position sensor works."""
+    for stage, choice in zip(verified.system.stages, loaded.spec.stages, strict=True):
+        sensor = stage.position
+        if sensor is not None and not sensor.type.strip() and not has_gnss(loaded.spec, choice):
+            yield Caution(
+                "unknown-fact",
+                f"{sensor.id} does not say its `type`, and {stage.name} has no GNSS: "
+                "if it is a GNSS receiver it does not work there",
+                sensor.id,
+                "type",
             )
 
 

@@ -15,8 +15,11 @@ from typing import Any
 from syncline_design.spec.load import LoadedSpec
 from syncline_design.spec.selection import Selection
 
-# Types of sensors that receive GNSS: gnss or gps anywhere, systems and methods as whole words.
-RECEIVER = re.compile(r"gnss|gps|(?<![a-z0-9])(?:glonass|galileo|beidou|rtk|ppp|sbas)(?![a-z0-9])")
+# Types of sensors that receive GNSS: parts of words, ends of words, the rest as whole words.
+RECEIVER = re.compile(
+    r"gnss|gps|satnav|(?:rtk|ppk)(?![a-z0-9])|(?<![a-z0-9])(?:glonass|galileo|beidou|bds|qzss|navic|irnss"
+    r"|ppp|sbas|egnos|waas|satellite|global[^a-z0-9]+positioning)(?![a-z0-9])"
+)
 
 
 def impossible(loaded: LoadedSpec, selection: Selection) -> list[str]:
