@@ -13,7 +13,14 @@ from typing import Any
 import numpy as np
 
 from syncline_design.choice.outcome import TooLarge
-from syncline_design.choice.pareto import Bools, Column, Columns, Floats, Indices, undominated
+from syncline_design.choice.pareto import (
+    Bools,
+    Column,
+    Columns,
+    Floats,
+    Indices,
+    undominated,
+)
 from syncline_design.choice.table import RESOURCES, Option, Problem, ResourceName, RoleTable
 
 MARGIN = 1e-12  # sums of floats are trusted to this; what lies closer to a limit is decided exactly
@@ -62,6 +69,7 @@ class Scaled:
     name: ResourceName
     denominator: int
     dtype: Any
+    known: bool = True  # whether every amount is given
 
     def whole(self, amount: Fraction | None) -> int | float:
         """An amount in that unit; infinite where the catalog does not say."""
@@ -81,6 +89,11 @@ class Tables:
     keys: tuple[Scaled, ...]
     ties: tuple[Scaled, ...]
     tracked: tuple[int, ...]  # infrastructure indices that some option or clock requires
+
+    @property
+    def has_unknown_ties(self) -> bool:
+        """Whether some design does not say a sum that may settle a tie."""
+        return not all(scaled.known for scaled in (*self.keys[1:], *self.ties))
 
 
 def tabulate(problem: Problem, primary: ResourceName) -> Tables:
@@ -133,7 +146,7 @@ class _Amounts:
         largest = max(largest * denominator, *(int(abs(a * denominator)) for a in rest), 0)
         self.matter = any(any(tops) for tops, _ in ratios) or any(rest) or not known
         fits = known and largest * _most_terms(problem) < INT64_ROOM
-        self.scaled = Scaled(name, denominator, np.int64 if fits else object)
+        self.scaled = Scaled(name, denominator, np.int64 if fits else object, known)
         self.columns = [
             _whole(*ratio, len(role), self.scaled)
             for ratio, role in zip(ratios, spent, strict=True)
@@ -238,6 +251,8 @@ def useful_options(
             [k[rows] for k in keys],
             [w[rows] for w in (*weak, *role.channels)],
             [t[rows] for t in tie_order(tables, role.resources, role.ties)],
+            unknown=tables.has_unknown_ties,
+            amount_unknown=not tables.keys[0].known,
         )
         if len(rows):
             kept.append(rows[undominated(columns)])

@@ -26,7 +26,7 @@ from syncline_design.choice.arrays import MARGIN, Tables, tabulate, tie_order, u
 from syncline_design.choice.evaluate import Rank, error_key, evaluate, known_or_more, rank
 from syncline_design.choice.labels import Labels, concatenate, total_m
 from syncline_design.choice.merge import Ceiling, Merge, lowered
-from syncline_design.choice.narrowed import stated
+from syncline_design.choice.narrowed import says_all, stated
 from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
 from syncline_design.choice.pareto import Bools, Columns, Floats, Indices, undominated
 from syncline_design.choice.rounded_once import total_errors_m
@@ -203,13 +203,14 @@ def _designs(tables: Tables, finished: _Finished, rows: Indices) -> list[Design]
 def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
     """Clock indices per vehicle, without clocks that another one of the vehicle replaces."""
     useful = []
+    known = says_all(problem)
     for vehicle in problem.vehicles:
         order = sorted(range(len(vehicle.clocks)), key=lambda i: vehicle.clocks[i].id or "")
         kept: list[int] = []
         for i in order:
             clock = vehicle.clocks[i]
             if not any(
-                _replaces(vehicle.clocks[j], clock, j in order[: order.index(i)])
+                _replaces(vehicle.clocks[j], clock, j in order[: order.index(i)], known)
                 for j in order
                 if j != i
             ):
@@ -218,8 +219,11 @@ def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
     yield from itertools.product(*useful)
 
 
-def _replaces(one: ClockOption, other: ClockOption, earlier: bool) -> bool:
-    """Whether a clock is nowhere worse, and better in resources or earlier by name."""
+def _replaces(one: ClockOption, other: ClockOption, earlier: bool, known: bool) -> bool:
+    """Whether a clock is nowhere worse, and better in resources or earlier by name.
+
+    known: whether every sum is known; one that is not tells no two designs apart.
+    """
     ours = [known_or_more(getattr(one.resources, n)) for n in ("cost", "mass", "power")]
     theirs = [known_or_more(getattr(other.resources, n)) for n in ("cost", "mass", "power")]
     worse = any(a > b for a, b in zip(ours, theirs, strict=True))
@@ -227,7 +231,7 @@ def _replaces(one: ClockOption, other: ClockOption, earlier: bool) -> bool:
         return False
     if set(one.requires) - set(other.requires):
         return False
-    return ours != theirs or earlier
+    return (known and ours != theirs) or earlier
 
 
 def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoint, ...]:

@@ -266,11 +266,12 @@ class Merge:
         if self.safety is not None:
             safe = self.safety.safe(labels, role, timing)
             guard = Guard(safe, labels.noise, labels.bound)
-        value, weak = (labels.error, [total])
+        value, weak = labels.error, [total]
         if self.per_sensor or role == len(self.problem.roles) - 1:
             value, weak = total, []
         ties = tie_order(self.tables, labels.resources, labels.ties)
-        return Columns((*labels.resources, value), [*weak, *used], ties, guard)
+        unknown, silent = self.tables.has_unknown_ties, not self.tables.keys[0].known
+        return Columns((*labels.resources, value), [*weak, *used], ties, guard, unknown, silent)
 
     def _within_budgets(self, labels: Labels, role: int) -> Bools:
         mask = np.ones(len(labels), dtype=bool)

@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from syncline_design.choice.table import (
+    RESOURCES,
     ClockOption,
     Design,
     Option,
@@ -84,3 +85,11 @@ def stated(problem: Problem, resource: ResourceName) -> Narrowed:
         return resources.of(resource) is not None and not silent & needed
 
     return kept(problem, lambda _, one: says(one), lambda _, one: says(one))
+
+
+def says_all(problem: Problem) -> bool:
+    """Whether every option, clock and shared hardware says its cost, mass and power."""
+    spent = [item.resources for item in problem.infrastructure]
+    spent += [option.resources for table in problem.roles for option in table.options]
+    spent += [clock.resources for table in problem.vehicles for clock in table.clocks]
+    return not any(resources.of(name) is None for resources in spent for name in RESOURCES)

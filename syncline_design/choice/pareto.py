@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -16,11 +16,13 @@ Column = NDArray[Any]
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.intp]
+Also = Callable[[int, int], bool] | None
 
 BLOCK = 256
 MOST_GROUPS = 32  # combinations of columns of few values
 THIN_ABOVE = 3000  # rows from which a sample thins them out first
 SAMPLE = 1000
+DUST = 1e-13  # share by which sums of the same floats differ with the order of adding, and more
 ROWS_PER_LOOK = 8192  # rows between two looks at the clock
 
 
@@ -46,15 +48,29 @@ class Columns:
     when it is nowhere worse and either smaller in the amount, smaller in every error, or earlier in
     the tie order.  Less of a limited amount, or of the error that may not count in the end, does
     not settle a tie: whatever follows, both may end with the same amount and error.
+
+    unknown: whether what follows may make the sum of a tie column unknown, which then no longer
+    tells rows apart; amount_unknown: the same of the amount.
     """
 
     keys: Sequence[Column]
     weak: Sequence[Column] = ()
     tie: Sequence[Column] = ()
     guard: Guard | None = None
+    unknown: bool = False
+    amount_unknown: bool = False
 
     def __len__(self) -> int:
         return len(self.keys[0])
+
+    def without_dust(self) -> Columns:
+        """The same rows, with errors that only the order of adding keeps apart as the same."""
+        keys, weak = list(self.keys), list(self.weak)
+        if keys[-1].dtype == np.float64:
+            keys[-1] = without_dust(keys[-1])
+        if _is_error(weak):
+            weak[0] = without_dust(weak[0])
+        return replace(self, keys=keys, weak=weak)
 
     def take(self, rows: Indices) -> Columns:
         """Some of the rows."""
@@ -66,6 +82,8 @@ class Columns:
             [column[rows] for column in self.weak],
             [column[rows] for column in self.tie],
             guard,
+            self.unknown,
+            self.amount_unknown,
         )
 
 
@@ -80,11 +98,31 @@ def undominated(columns: Columns) -> Indices:
     return _exactly_undominated(columns)
 
 
+def without_dust(errors: Floats) -> Floats:
+    """Errors of which those that only the order of adding keeps apart are the same.
+
+    Each takes the least of its cluster, so that equal errors are decided by the tie order.
+    """
+    if len(errors) < 2:
+        return errors
+    order = np.argsort(errors, kind="stable")
+    rising = errors[order]
+    starts = np.ones(len(errors), dtype=bool)
+    starts[1:] = rising[:-1] < rising[1:] * (1.0 - DUST)
+    if starts.all():
+        return errors
+    place = np.maximum.accumulate(np.where(starts, np.arange(len(errors)), 0))
+    out = np.empty_like(errors)
+    out[order] = rising[place]
+    return out
+
+
 def _exactly_undominated(columns: Columns) -> Indices:
-    count = len(columns)
+    columns, count = columns.without_dust(), len(columns)
     ties = tie_rank(columns.tie, count)
     order = np.lexsort((ties, *_sortable(columns.weak), *_sortable(columns.keys)))
-    if len(columns.keys) == 2 and not columns.weak and columns.guard is None:
+    plain = not columns.weak and not columns.amount_unknown and columns.guard is None
+    if len(columns.keys) == 2 and plain and not columns.unknown:
         return np.sort(order[_staircase(columns.keys[1][order])])
     table = _Sorted(columns, order, ties[order])
     return np.sort(order[table.survivors()])
@@ -109,7 +147,7 @@ def _thinned(columns: Columns) -> Indices:
 
 def _clearly_replaces(columns: Columns, first: Indices, second: Indices) -> Bools:
     """Whether rows replace others without any question of ties."""
-    out = _settled(columns.keys, columns.weak, first, second)
+    out = _settled(columns, first, second, DUST)
     for column in (*columns.keys, *columns.weak):
         out &= np.asarray(column[first] <= column[second], dtype=bool)
     guard = columns.guard
@@ -120,14 +158,22 @@ def _clearly_replaces(columns: Columns, first: Indices, second: Indices) -> Bool
     return out
 
 
-def _settled(
-    keys: Sequence[Column], weak: Sequence[Column], first: Indices, second: Indices
-) -> Bools:
+def _settled(columns: Columns, first: Indices, second: Indices, margin: float = 0.0) -> Bools:
     """Whether rows that are nowhere worse end smaller in amount or error than others for sure."""
+    keys, weak = columns.keys, columns.weak
     errors = [keys[-1], *weak[: 1 if _is_error(weak) else 0]]
-    out = np.asarray(keys[0][first] < keys[0][second], dtype=bool)
-    below = [np.asarray(column[first] < column[second], dtype=bool) for column in errors]
-    return np.asarray(out | np.logical_and.reduce(below))
+    below = [_below(column[first], column[second], margin) for column in errors]
+    out = np.logical_and.reduce(below)
+    if not columns.amount_unknown:
+        out = out | np.asarray(keys[0][first] < keys[0][second], dtype=bool)
+    return np.asarray(out)
+
+
+def _below(first: Column, second: Column, margin: float) -> Bools:
+    """Whether figures are smaller by more than a share of themselves."""
+    if margin and second.dtype == np.float64:
+        second = second * (1.0 - margin)  # errors are not negative
+    return np.asarray(first < second, dtype=bool)
 
 
 def tie_rank(tie: Sequence[Column], count: int) -> Indices:
@@ -156,7 +202,7 @@ def _staircase(column: Column) -> Bools:
 
 
 def _one_staircase(
-    amount: list[Any], first: list[float], second: list[float], ties: list[int]
+    amount: list[Any], first: list[float], second: list[float], ties: list[int], also: Also
 ) -> list[int]:
     """Rows by rising amount that no earlier row replaces: the inner loop of the merge."""
     one_at: list[float] = []
@@ -168,7 +214,8 @@ def _one_staircase(
         if place and two_at[place - 1] <= two:
             other = row_at[place - 1]
             less = first[other] < one and second[other] < two
-            if not (less or amount[other] < amount[row] or ties[other] < ties[row]):
+            ahead = ties[other] < ties[row] and (also is None or also(other, row))
+            if not (less or amount[other] < amount[row] or ahead):
                 kept.append(row)
             continue
         kept.append(row)
@@ -219,28 +266,41 @@ class _Sorted:
     """Rows in sorted order: a row can only be replaced by an earlier one."""
 
     def __init__(self, columns: Columns, order: Indices, ties: Indices) -> None:
-        self.keys = [column[order] for column in columns.keys]
-        self.weak = [column[order] for column in columns.weak]
-        self.columns = self.keys + self.weak
-        self.ties = ties
+        self.given, self.place, self.ties = columns.take(order), order, ties
+        self.keys = self.given.keys
+        self.columns = [*self.keys, *self.given.weak]
         # The error, and the weak column beside it (the error again where there is none).
         value = len(self.keys) - 1
         self.stepped = (value, len(self.keys) if _is_error(columns.weak) else value)
-        given = columns.guard
-        self.guard = given and Guard(given.safe[order], given.error[order], given.bound[order])
+        self.guard = self.given.guard
 
     def replaces(self, first: Indices, second: Indices) -> Bools:
         """Whether rows `first` replace rows `second` (shapes broadcast)."""
         worse = np.zeros(np.broadcast_shapes(first.shape, second.shape), dtype=bool)
         for column in self.columns:
             worse |= np.asarray(column[first] > column[second], dtype=bool)
-        settled = _settled(self.keys, self.weak, first, second)
-        out: Bools = (settled | (self.ties[first] < self.ties[second])) & ~worse
+        out: Bools = (_settled(self.given, first, second) | self._ahead(first, second)) & ~worse
         if self.guard is not None:
             g = self.guard
             alike = (g.error[first] >= g.error[second]) & (g.bound[first] <= g.bound[second])
             out = out & (g.safe[first] | alike)
         return out
+
+    def _ahead(self, first: Indices, second: Indices) -> Bools:
+        """Whether rows come before others in the tie order, whichever sums end unknown."""
+        out = np.asarray(self.ties[first] < self.ties[second])
+        if self.given.unknown:
+            out &= self.place[first] < self.place[second]
+            for column in self.given.tie:
+                out &= np.asarray(column[first] <= column[second], dtype=bool)
+        return out
+
+    def _also_ahead(self, left: Indices) -> Also:
+        """What `_ahead` asks besides the rank of two of the remaining rows; None: nothing."""
+        if not self.given.unknown:
+            return None
+        columns = [c[left].tolist() for c in (self.place, *self.given.tie)]
+        return lambda first, second: all(c[first] <= c[second] for c in columns)
 
     def survivors(self) -> Indices:
         """Indices into the sorted order of the rows that stay."""
@@ -287,9 +347,10 @@ class _Sorted:
     def _in_staircases(self, left: Indices, group: list[int], below: list[list[int]]) -> Indices:
         """Rows by rising first key against the staircases of the other two columns so far."""
         first, second = (self.columns[k][left].tolist() for k in self.stepped)
-        amount, ties = self.keys[0][left].tolist(), self.ties[left].tolist()
+        ties, also = self.ties[left].tolist(), self._also_ahead(left)
+        amount = [0] * len(left) if self.given.amount_unknown else self.keys[0][left].tolist()
         if len(below) == 1:
-            return left[_one_staircase(amount, first, second, ties)]
+            return left[_one_staircase(amount, first, second, ties, also)]
         stairs = [_Stairs() for _ in below]
         kept = []
         deadline = in_force()
@@ -301,7 +362,7 @@ class _Sorted:
                 if other is not None and (
                     amount[other] < amount[row]
                     or (first[other] < one and second[other] < two)
-                    or ties[other] < ties[row]
+                    or (ties[other] < ties[row] and (also is None or also(other, row)))
                 ):
                     break
             else:
