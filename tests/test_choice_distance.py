@@ -13,6 +13,7 @@ import random
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from syncline_design.spec.load import load_text
@@ -131,3 +132,86 @@ def test_the_nearest_distance_to_either_side_is_found(seed: int, tmp_path: Path)
         assert above * (1 - 1e-9) <= offered["above"] <= above * 1.015
     if above is None:
         assert offered["above"] is None
+
+
+SIMULATED = """\
+syncline: 1
+name: distances between a sync limit and a simulated one
+catalogs: [own.yaml]
+requirements:
+  - {id: S, kind: sync, limit: 0.004}
+  - {id: Q, kind: monte_carlo, quantile: 0.95, limit: LIMIT m}
+stages:
+  - name: boat
+    platform: {v_max: 5 m/s, omega_max: 0.01 deg/s, distance: BEFORE m, baseline: 1 m}
+    position: {candidates: [p], lever_arm: [0 m, 0 m, 0 m]}
+    attitude: {candidates: [a]}
+    ranging: {candidates: [coarse, fine]}
+timestamping: {candidates: [still]}
+monte_carlo: {samples: 4000}
+"""
+SIMULATED_CATALOG = """\
+sensors:
+  p: {modality: position, sigma_position: 1 cm, primitives: [pps], cost: 1 EUR}
+  a: {modality: attitude, sigma_attitude: [TILT, TILT, TILT], primitives: [pps], cost: 1 EUR}
+  coarse: {modality: ranging, sigma_range: COARSE m, sigma_bearing: [B, B], primitives: [pps],
+    cost: 1 EUR}
+  fine: {modality: ranging, sigma_range: 1 mm, sigma_bearing: [B, B], primitives: [pps],
+    cost: 2 EUR}
+timestamping:
+  still: {primitives: [pps], timeline: host, cost: 1 EUR,
+    error: {distribution: uniform, low: -10 us, high: 10 us}}
+"""
+
+
+def noise_quantile(distance: float, spread: float, attitude: float, bearing: float) -> float:
+    """95 % of |e|: range noise along an isotropic line of sight, the angles' noise across it.
+
+    Timestamps of 10 us at 5 m/s move it by less than 0.1 mm.
+    """
+    rng = np.random.default_rng(5)
+    noise = 0.01 * rng.standard_normal((400_000, 3))
+    up = rng.uniform(-1, 1, 400_000)
+    noise[:, 0] += spread * rng.standard_normal(400_000)
+    sideways = attitude**2 + bearing**2 * (1 - up**2)
+    noise[:, 1] += distance * np.sqrt(sideways) * rng.standard_normal(400_000)
+    noise[:, 2] += distance * math.hypot(attitude, bearing) * rng.standard_normal(400_000)
+    return float(np.quantile(np.linalg.norm(noise, axis=1), 0.95))
+
+
+def simulated(folder: Path, catalog: dict[str, str], limit: float, before: str) -> dict[str, Any]:
+    text, own = SIMULATED, SIMULATED_CATALOG
+    text = text.replace("LIMIT", f"{limit:.6g}").replace("BEFORE", before)
+    for name, value in catalog.items():
+        own = own.replace(name, value)
+    (folder / "own.yaml").write_text(own)
+    return check_loaded(load_text(text, folder / "spec.yaml"), CheckSettings())
+
+
+def the_distance_fix(verdict: dict[str, Any]) -> tuple[float, str]:
+    """The only one: its figure, and the number as it is printed."""
+    (fix,) = [f for f in verdict["infeasibility"]["fixes"] if f["figure"] == "distance"]
+    return fix["to"], fix["text"].rsplit(" to ")[1].removesuffix(" m")
+
+
+def test_a_window_between_sync_and_simulation_is_found(tmp_path: Path) -> None:
+    """The attitude's tau_crit asks for 5e-5 m / (0.004 sqrt(3) 0.2 deg); 4 % more is simulated."""
+    attitude, bearing = math.radians(0.2), math.radians(1e-3)
+    nearest = 5e-5 / (0.004 * math.sqrt(3) * attitude)
+    limit = noise_quantile(1.04 * nearest, 0.02, attitude, bearing)
+    catalog = {"TILT": "0.2 deg", "COARSE": "0.02", "B": "0.001 deg"}
+    to, shown = the_distance_fix(simulated(tmp_path, catalog, limit, "200"))
+    assert nearest < to < 1.08 * nearest
+    assert noise_quantile(to, 0.02, attitude, bearing) < 1.015 * limit
+    assert simulated(tmp_path, catalog, limit, shown)["verdict"] == "meets"
+
+
+def test_a_sensor_that_works_from_afar_helps_against_simulation(tmp_path: Path) -> None:
+    """30 cm of range noise fail; the fine sensor's tau_crit asks for 11.5 mm / bearing."""
+    attitude, bearing = math.radians(0.6), math.radians(0.3)
+    nearest = (5e-5 / 0.004 - 0.001) / (math.sqrt(2) * bearing)
+    limit = noise_quantile(1.1 * nearest, 0.001, attitude, bearing)
+    catalog = {"TILT": "0.6 deg", "COARSE": "0.3", "B": "0.3 deg"}
+    to, shown = the_distance_fix(simulated(tmp_path, catalog, limit, "1"))
+    assert nearest < to < 1.02 * nearest
+    assert simulated(tmp_path, catalog, limit, shown)["verdict"] == "meets"

@@ -32,9 +32,11 @@ from syncline_design.spec.load import LoadedSpec
 LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
 LARGEST_SHARE = 10.0  # nor a distance raised above this multiple
 MOST_RANGES = 400
+MOST_WINDOWS = 4  # that the sums leave and simulation is asked in
 SIMULATED_CLOSE = 1e-2  # where simulation decides
 MOST_DIGITS = 6
 UNITS_OF: dict[PlatformFigure, str] = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}
+Named = tuple[int, str, str, str]
 SHARES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.01, LEAST_SHARE)
 
 
@@ -82,10 +84,9 @@ class _Asked:
         if found is None or self._simulation_rules_out(end):
             return None
         fails, works = found
-        if not self._holds(works):  # simulation decides: nearer helps, farther does not
-            if end > self.before:
-                return None
-            fails, works = self._by_shares(works, end)
+        if not self._holds(works):  # simulation decides
+            search = self._farther if end > self.before else self._nearer
+            fails, works = search(works, end)
             if not self._holds(works):
                 return None
         return self._rounded(self._edge(fails, works), end)
@@ -120,24 +121,68 @@ class _Asked:
             if not is_feasible(best):
                 continue
             if abs(other - one) <= CLOSE * max(one, other):
-                if is_feasible(without_simulation(self._problem(other))):
+                if self._keeps_sums(other):
                     return one, other
                 continue
             middle = math.sqrt(one * other)
             ranges += [(middle, other), (one, middle)]
         return None
 
-    def _by_shares(self, start: float, end: float) -> tuple[float, float]:
-        """(last value that fails, first that holds) on a coarse grid; both fail where none does."""
+    def _nearer(self, start: float, end: float) -> tuple[float, float]:
+        """(last value that fails, first that holds); both fail where none is found.
+
+        The smaller the figure, the smaller the simulated errors, so the search goes on to the far
+        edge of the window that the sums leave, and into the next one.
+        """
         last = start
-        for share in SHARES:
-            value = start * share if end < start else start / share
-            if (value - end) * (start - end) < 0:
+        for _ in range(MOST_WINDOWS):
+            far, beyond = self._far_edge(start, end)
+            for value in (*_shares(start, far), far):
+                if self._holds(value):
+                    return last, value
+                last = value
+            following = None if far == end else self._window(beyond, end)
+            if following is None:
                 break
-            if self._holds(value):
-                return last, value
+            start = following[1]
+        return last, last
+
+    def _farther(self, start: float, end: float) -> tuple[float, float]:
+        """As `_nearer` to the other side, where only options that were not there before help."""
+        last, seen = start, self._options(start)
+        for value in (*_shares(start, end), end):
+            while not self._options(value) <= seen:
+                outside, inside = last, value
+                while inside - outside > CLOSE * inside:
+                    middle = math.sqrt(outside * inside)
+                    new = not self._options(middle) <= seen
+                    outside, inside = (outside, middle) if new else (middle, inside)
+                if self._holds(inside):
+                    return outside, inside
+                seen |= self._options(inside)
+                last = inside
             last = value
         return last, last
+
+    def _far_edge(self, start: float, end: float) -> tuple[float, float]:
+        """Last value on the way to an end that keeps the sums, and one close by that does not."""
+        keeps, breaks = start, end
+        if self._keeps_sums(end):
+            return end, end
+        while abs(breaks - keeps) > CLOSE * max(keeps, breaks):
+            middle = math.sqrt(keeps * breaks)
+            keeps, breaks = (middle, breaks) if self._keeps_sums(middle) else (keeps, middle)
+        return keeps, breaks
+
+    def _keeps_sums(self, value: float) -> bool:
+        return is_feasible(without_simulation(self._problem(value)))
+
+    def _options(self, value: float) -> set[Named]:
+        return {
+            (table.stage, table.role, one.sensor, one.method)
+            for table in self._problem(value).roles
+            for one in table.options
+        }
 
     def _edge(self, fails: float, works: float) -> float:
         """The value nearest to one that fails that holds, to 1e-4."""
@@ -156,6 +201,14 @@ class _Asked:
             if is_feasible(self.build(self._changed(shown))):
                 return shown
         return None
+
+
+def _shares(start: float, end: float) -> Iterator[float]:
+    """Values between two, at fixed shares of the first or of its reciprocal."""
+    for share in SHARES:
+        value = start * share if end < start else start / share
+        if (value - end) * (start - end) > 0:
+            yield value
 
 
 def better_of(one: Problem, other: Problem) -> Problem:
