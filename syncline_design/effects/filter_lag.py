@@ -20,8 +20,10 @@ from syncline_design.effects.record import (
 from syncline_design.model.system import Stage
 
 
-def _lag(rows: StageRows, time_constant_s: float) -> Array:
+def lag_of_the_present(rows: StageRows, time_constant_s: float) -> Array:
     """Output minus input of T dy/dt + y = x(t), x the antenna's path [m], NED, (n, 3).
+
+    The past is what the present motion makes of it.
 
     y - x is minus the integral over the past of exp(-u / T) dx/dt(t - u) du.  With M(a) =
     (1 + T S(a))^-1, for a velocity that has long been turning at k w while it changes at c in
@@ -56,8 +58,12 @@ def _turned_back(turn: Array, vector: Array) -> Array:
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
-    """The antenna reading lags by a first-order low pass."""
-    return Departures(position_m=_lag(rows, values["time_constant_s"]))
+    """The antenna reading lags by a first-order low pass, of the path itself where it is known."""
+    time_constant_s = values["time_constant_s"]
+    if rows.lagged is None:
+        return Departures(position_m=lag_of_the_present(rows, time_constant_s))
+    place, turn = rows.lagged(time_constant_s)
+    return Departures(position_m=place + rotate(turn, rows.antenna_m))
 
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:

@@ -36,6 +36,8 @@ class StageRows:
     start_s: when the mission began, on the clock of time_s; None: at the first row, as in a log.
     independent: each row is a sample of a mission of its own, so what is correlated in time is
     drawn anew in each; False: the rows follow each other in time.
+    lagged: of a time constant T [s], by how much a low pass of the path up to each row lags
+    behind the place (n, 3) and behind R_nb (n, 3, 3), NED; None: only the present is known.
     """
 
     time_s: Array
@@ -53,6 +55,7 @@ class StageRows:
     target_m: Array
     start_s: float | None = None
     independent: bool = False
+    lagged: Callable[[float], tuple[Array, Array]] | None = None
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])

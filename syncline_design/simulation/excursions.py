@@ -12,7 +12,8 @@ from syncline_design.effects.record import Array
 from syncline_design.model.horizon import duration_words
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation.settings import SimulationSettings
-from syncline_design.simulation.trajectory import MANOEUVRES, Track, stage_track
+from syncline_design.simulation.track import Track
+from syncline_design.simulation.trajectory import MANOEUVRES, stage_track
 
 _SLACK = 1.01  # of speed and turn rate: derivatives of a rounded file are no better
 

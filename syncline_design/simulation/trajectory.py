@@ -17,11 +17,10 @@ import io
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.kinematics import bearing, rotate
@@ -32,7 +31,6 @@ from syncline_design.simulation import known_effects
 from syncline_design.simulation.chain import (
     Noise,
     euler_to_rotation,
-    rotation_exp,
     rotation_to_euler,
 )
 from syncline_design.simulation.draws import (
@@ -47,80 +45,13 @@ from syncline_design.simulation.draws import (
 )
 from syncline_design.simulation.settings import DEFAULT_MANOEUVRE, SimulationSettings
 from syncline_design.simulation.surroundings import Moment, moment_draw, on_the_level
+from syncline_design.simulation.track import Track, lagged
 
 _FIGURE_EIGHT_RAD = 2.404825557695773  # first zero of the Bessel function J_0
 _KNOT_TURN_RAD = 0.01  # turn from knot to knot of a named manoeuvre
 _MOST_KNOTS = 100_000
 _LARGEST_STEP_RAD = 0.5 * math.pi  # of a file, from row to row
 _UNITS = {"": 1.0, "s": 1.0, "ms": 1e-3, "m": 1.0, "mm": 1e-3, "rad": 1.0, "deg": math.pi / 180.0}
-
-
-@dataclass(frozen=True, slots=True)
-class Track:
-    """A path through knots: cubic Hermite in position, constant body rate between knots.
-
-    time_s (k,) rising; position_m, velocity_mps (k, 3) NED; rotation (k, 3, 3) R_nb;
-    turn_rad (k - 1, 3): rotation vector from each knot to the next, body axes.
-    sight: range_m, azimuth_rad, elevation_rad (k,) where the file has them.
-    """
-
-    time_s: Array
-    position_m: Array
-    velocity_mps: Array
-    rotation: Array
-    turn_rad: Array
-    sight: tuple[Array, Array, Array] | None = None
-
-    def locate(self, time_s: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """(interval, fraction 0 to 1, its length [s]) of each time."""
-        index = np.searchsorted(self.time_s, time_s, side="right") - 1
-        index = np.clip(index, 0, self.time_s.shape[0] - 2)
-        length = self.time_s[index + 1] - self.time_s[index]
-        return index, (time_s - self.time_s[index]) / length, length
-
-    def position(self, time_s: Array, derivative: int = 0) -> Array:
-        """Position [m] (or its first or second derivative by time), NED, (n, 3)."""
-        index, u, length = self.locate(time_s)
-        weights = _hermite(u, derivative)
-        h = length[:, None]
-        p0, p1 = self.position_m[index], self.position_m[index + 1]
-        v0, v1 = self.velocity_mps[index], self.velocity_mps[index + 1]
-        value = weights[0] * (p0 - p1) + h * (weights[1] * v0 + weights[2] * v1)
-        if derivative == 0:
-            value += p1
-        scaled: Array = value / h**derivative
-        return scaled
-
-    def attitude(self, time_s: Array) -> Array:
-        """R_nb, (n, 3, 3)."""
-        index, u, _ = self.locate(time_s)
-        turned: Array = self.rotation[index] @ rotation_exp(self.turn_rad[index] * u[:, None])
-        return turned
-
-    def acceleration(self, time_s: Array) -> Array:
-        """Acceleration [m/s2], NED, (n, 3): what the velocity gains from knot to knot.
-
-        The second derivative of the interpolant jumps at the knots and is no acceleration there.
-        """
-        middle = 0.5 * (self.time_s[:-1] + self.time_s[1:])
-        gained = np.diff(self.velocity_mps, axis=0) / np.diff(self.time_s)[:, None]
-        return np.stack([np.interp(time_s, middle, axis) for axis in gained.T], axis=-1)
-
-    def rate(self, time_s: Array) -> Array:
-        """Body rate [rad/s], (n, 3)."""
-        index, _, length = self.locate(time_s)
-        rate: Array = self.turn_rad[index] / length[:, None]
-        return rate
-
-
-def _hermite(u: Array, derivative: int) -> tuple[Array, Array, Array]:
-    """Weights of p0 - p1, h v0, h v1 in the cubic Hermite interpolant, (n, 1) each."""
-    u = u[:, None]
-    if derivative == 0:
-        return 1 + u * u * (2 * u - 3), u * (1 - u) ** 2, u * u * (u - 1)
-    if derivative == 1:
-        return 6 * u * (u - 1), (1 - u) * (1 - 3 * u), u * (3 * u - 2)
-    return 12 * u - 6, 6 * u - 4, 6 * u - 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,6 +150,7 @@ def _rows(
         target_m=position + rotate(rotation, vector),
         start_s=float(track.time_s[0]),
         independent=True,
+        lagged=partial(lagged, track, time_s),
     )
 
 
@@ -304,7 +236,7 @@ def _manoeuvre_track(platform: Platform, name: str, margin_s: float) -> Track:
     position = np.concatenate([np.zeros((1, 3)), np.cumsum(moved, axis=0)])
     rotation = euler_to_rotation(np.stack([zero, zero, yaw], axis=-1))
     turn = np.stack([zero[1:], zero[1:], np.diff(yaw)], axis=-1)
-    return Track(time_s, position, velocity, rotation, turn)
+    return Track(time_s, position, velocity, rotation, turn, period_s=period)
 
 
 def _content(path: Path) -> FileContent:
