@@ -396,3 +396,14 @@ def test_findings_count_what_counts() -> None:
 def test_unknown_format_is_refused() -> None:
     with pytest.raises(ValueError, match="unknown format pdf"):
         render_checks("pdf", [samples.fixed_wing()])
+
+
+def test_one_remedy_is_not_offered_as_a_choice() -> None:
+    verdict = samples.infeasible()
+    fixes = verdict["infeasibility"]["fixes"]
+    for count, lead in ((1, "This would do: "), (3, "Any one of these would do: ")):
+        verdict["infeasibility"]["fixes"] = [dict(fixes[0], text=f"way {k}") for k in range(count)]
+        ways = "; ".join(f"way {k}" for k in range(count))
+        said = [finding.message for finding in findings(verdict) if "would do" in finding.message]
+        assert said
+        assert all(f"{lead}{ways}." in message for message in said)

@@ -205,6 +205,15 @@ def test_money_is_converted_exactly() -> None:
     )
 
 
+def test_a_rate_of_the_specs_own_currency_is_one() -> None:
+    """1 EUR is worth 1 EUR: another rate was taken in and left aside without a word."""
+    text = HEAD + "  - {id: C, kind: cost, limit: 100000 EUR}\n"
+    assert loaded(text + "exchange_rates: {EUR: 1 EUR}\n" + STAGE)
+    said = complaint(text + "exchange_rates: {EUR: 2 EUR}\n" + STAGE)
+    assert "exchange_rates.EUR" in said
+    assert "found 2 EUR" in said
+
+
 def test_stages_of_one_vehicle_have_one_clock() -> None:
     second = """  - name: arm
     vehicle: uav

@@ -129,7 +129,8 @@ def _conflict_text(row: Json, others: list[str], verdict: Json) -> str:
 def _fixes(verdict: Json) -> str:
     texts = [str(entry.get("text")) for entry in items(part(verdict, "infeasibility"), "fixes")]
     if texts:
-        return f" Either of these would do: {'; '.join(texts)}."
+        lead = "This" if len(texts) == 1 else "Any one of these"
+        return f" {lead} would do: {'; '.join(texts)}."
     joint = part(verdict, "infeasibility").get("joint_fixes")
     sets = [" and ".join(str(f.get("text")) for f in fixes) for fixes in joint or ()]
     return f" Together these would do: {'; or '.join(sets)}." if sets else ""
