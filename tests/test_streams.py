@@ -53,6 +53,9 @@ def shell(folder: Path, line: str) -> subprocess.CompletedProcess[bytes]:
         ("DESIGN check absent.yaml > /dev/full 2>&1", 2),
         ("DESIGN check --nonsense 2> /dev/full", 2),
         ("DESIGN check --nonsense 2>&-", 2),
+        ("DESIGN check bad.yaml -o json:- >&-", 2),
+        ("DESIGN check bad.yaml absent.yaml -o github:- >/dev/full", 2),
+        ("DESIGN check bad.yaml good.yaml -o json:- >&-", 3),  # its verdict was not told
         ("DESIGN check missed.yaml --quiet >&-", 1),
         ("DESIGN check good.yaml --quiet >&- 2>&-", 0),
         ("DESIGN check good.yaml >&-", 3),
@@ -70,7 +73,9 @@ def test_the_state_of_a_stream_is_no_verdict(folder: Path, line: str, code: int)
     assert b"internal error" not in done.stderr
     assert b"Exception ignored" not in done.stderr
     if code == 3 and b"2>" not in line.encode():
-        assert done.stderr.startswith(b"syncline-design: standard output: cannot write: ")
+        assert done.stderr.splitlines()[-1].startswith(
+            b"syncline-design: standard output: cannot write: "
+        )
     if "r.json" in line:
         assert json.loads((folder / "r.json").read_text())["verdict"] == "meets"
 

@@ -352,6 +352,34 @@ def test_a_dask_cluster_gives_the_same_bytes_with_a_worker_killed(
     assert bytes_of(result) == wanted
 
 
+STOPPED = """
+import asyncio, logging
+from syncline_design.studies.cluster import _quiet_when_stopped
+
+async def lost():
+    raise KeyError("a worker that has gone")
+
+async def stopped():
+    try:
+        with _quiet_when_stopped():
+            task = asyncio.get_running_loop().create_task(lost())
+            await asyncio.sleep(0)
+            raise KeyboardInterrupt
+    except KeyboardInterrupt:
+        pass
+
+asyncio.run(stopped())
+"""
+
+
+def test_a_stopped_cluster_tells_of_no_task_that_failed_with_it() -> None:
+    done = subprocess.run([sys.executable, "-c", STOPPED], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "")
+    told = STOPPED.replace("            raise KeyboardInterrupt\n", "")
+    done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True)
+    assert "KeyError" in done.stderr  # as it is where nobody stops it
+
+
 def test_no_scheduler_is_a_clear_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
     monkeypatch.setattr("syncline_design.studies.cluster.TIMEOUT", "1s")

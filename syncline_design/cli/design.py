@@ -46,7 +46,7 @@ def check(
     from syncline_design.report.checks import CHECK_FORMATS, render_checks
     from syncline_design.report.console import verdict_text
     from syncline_design.report.several import skipped_text, summary_line
-    from syncline_design.report.write import STDOUT
+    from syncline_design.report.write import STDOUT, OutputError
     from syncline_design.spec.folders import spec_files
     from syncline_design.verdict.verify import CheckSettings, check_files, exit_code
 
@@ -66,7 +66,12 @@ def check(
         text = f"{text}\n{summary}\n" if text else f"{summary}\n"
     if found.skipped and not quiet:
         say(skipped_text(found.skipped))
-    emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
+    try:
+        emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
+    except OutputError as error:
+        if len(refused) < len(verdicts):
+            raise
+        say(f"syncline-design: {error}")  # nothing was computed: that the specs are bad stands
     return max((exit_code(verdict) for verdict in verdicts), default=0)
 
 

@@ -20,6 +20,9 @@ from syncline_design.studies.pool import Result, encoded_case
 IN_HAND = 8  # cases given to the scheduler per thread of the cluster
 RETRIES = 5
 TIMEOUT = "15s"
+_TALKATIVE = (  # asyncio tells of tasks whose failure nobody waited for any more
+    "distributed", "distributed.scheduler", "distributed.nanny", "tornado", "asyncio",
+)  # fmt: skip
 
 
 class ClusterError(Exception):
@@ -69,7 +72,7 @@ def _quiet_when_stopped() -> Iterator[None]:
     try:
         yield
     except (KeyboardInterrupt, SystemExit):
-        for name in ("distributed", "distributed.scheduler", "distributed.nanny", "tornado"):
+        for name in _TALKATIVE:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         raise
 
