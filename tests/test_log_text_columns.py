@@ -12,6 +12,7 @@ import polars as pl
 import pytest
 
 from syncline_design.logs import sources
+from syncline_design.logs.parquet_footer import chunks
 from syncline_design.spec.load import BadInput
 
 PEAK = """
@@ -95,3 +96,31 @@ def test_zones_agree_between_pieces(tmp_path: Path) -> None:
     source = written(tmp_path / "log.parquet", time=[*times[:7], *times[13:20]])
     with pytest.raises(BadInput, match="a zone"):
         source.clock("time")
+
+
+def test_text_that_unpacks_to_gigabytes_is_refused_unopened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "log.parquet"
+    cells = ["z" * 30_000 + str(k) for k in range(300)]
+    pl.DataFrame({"target_id": cells}).write_parquet(path, compression="zstd")
+    assert path.stat().st_size < 200_000
+    source = sources.opened(path)
+    monkeypatch.setattr(sources.ParquetSource, "_column", None)  # not a byte of it is unpacked
+    with pytest.raises(BadInput, match="text too long; expected at most 200 characters a cell"):
+        source.labels("target_id", np.ones(300, dtype=bool))
+
+
+@pytest.mark.parametrize("compression", ["zstd", "snappy", "gzip", "uncompressed"])
+@pytest.mark.parametrize("rows", [1, 999, 5000])
+def test_sizes_in_the_footer_bound_the_text(tmp_path: Path, rows: int, compression: str) -> None:
+    path = tmp_path / "log.parquet"
+    cells = [f"{k:0150d}" for k in range(rows)]  # all of them different: no dictionary helps
+    frame = pl.DataFrame({"a": np.zeros(rows), "id": cells, "flag": [True] * rows})
+    frame.write_parquet(path, compression=compression, row_group_size=1000)
+    found = list(chunks(path, "id"))
+    assert [values for values, _ in found] == [min(1000, rows - k) for k in range(0, rows, 1000)]
+    for values, size in found:
+        assert 150 * values <= size <= 2 * 160 * values + 2000
+    labels = sources.opened(path).labels("id", np.ones(rows, dtype=bool))
+    assert len(set(labels)) == rows

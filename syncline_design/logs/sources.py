@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from syncline_design.effects.record import Array
 from syncline_design.logs import delimited
 from syncline_design.logs.cells import (
+    LONGEST_CELL,
     NO_TIME,
     NOTHING,
     ONE_MARK,
@@ -27,6 +28,7 @@ from syncline_design.logs.cells import (
     numbers,
     trimmed,
 )
+from syncline_design.logs.parquet_footer import FooterError, chunks
 from syncline_design.logs.refusals import refuse
 from syncline_design.spec.load import BadInput
 
@@ -37,6 +39,8 @@ ZONE_CHECK = "POLARS_IGNORE_TIMEZONE_PARSE_ERROR"
 MOST_BYTES = 4 * 1024**3
 MOST_ROWS = 20_000_000
 PIECE = 500_000  # rows of text held at a time: a cell of text takes up to LONGEST_CELL bytes
+MOST_TEXT = 4 * LONGEST_CELL + 16  # bytes of a cell in UTF-8, its length and what goes with it
+DICTIONARY = 2**21  # bytes of a chunk besides: its dictionary, the heads of its pages
 NANOSECONDS = 1_000_000_000
 PACKED = {b"\x1f\x8b": "gzip", b"\x28\xb5\x2f\xfd": "zstd", b"PK\x03\x04": "zip", b"BZh": "bzip2"}
 
@@ -326,9 +330,21 @@ class ParquetSource:
         """A column of text piece by piece, each with its first row."""
         import polars as pl
 
+        self._demand_short(name)
         for start in range(0, max(self.rows, 1), PIECE):
             text = self._column(name, start, PIECE).cast(pl.String)
             yield start, self._trimmed(name, text, start)
+
+    def _demand_short(self, name: str) -> None:
+        """Refuse text that unpacks to more than figures or names do: few kB may hold gigabytes."""
+        try:
+            for values, size in chunks(self.path, name):
+                if size > values * MOST_TEXT + DICTIONARY:
+                    found = f"{size} bytes in {values} rows"
+                    most = f"at most {LONGEST_CELL} characters a cell"
+                    raise refuse(self.path, "text too long", field=name, expected=most, found=found)
+        except FooterError as error:
+            raise self._unreadable(error) from None
 
     def clock(self, name: str) -> Clock:
         import polars as pl
