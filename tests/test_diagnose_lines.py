@@ -6,6 +6,7 @@ the integral of a constant speed along the heading, rates are central difference
 
 from __future__ import annotations
 
+import re
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -226,3 +227,27 @@ def test_other_signatures_do_not_look_alike() -> None:
     ]
     entry = {"effect": "latency", "sensor": "position", "lookalikes": [asdict(along)]}
     assert "filter lag" in render_diagnosis_markdown({"findings": [entry]})
+
+
+@pytest.mark.parametrize("offset_degps", [-2.0, 3.0])
+@pytest.mark.parametrize("axis", "xyz")
+def test_a_constant_part_of_the_rates_is_said(
+    axis: str, offset_degps: float, tmp_path: Path
+) -> None:
+    columns = straight(10, 600, 6.0, 2.0)
+    columns[f"rate_{axis}_degps"] = columns[f"rate_{axis}_degps"] + offset_degps
+    (found,) = checked(columns, tmp_path)
+    assert found.code == "rate_columns"
+    which = {"x": "first", "y": "second", "z": "third"}[axis]
+    words = re.search(r"a constant (\S+) deg/s about the (\w+) axis", found.message)
+    assert words is not None
+    assert float(words[1]) == pytest.approx(offset_degps, abs=0.1)
+    assert words[2] == which
+
+
+@pytest.mark.parametrize("offset_degps", [0.0, 0.2])
+def test_the_bias_of_a_gyro_is_no_contradiction(offset_degps: float, tmp_path: Path) -> None:
+    """0.2 deg/s turns an attitude by 0.01 deg in a delay of 50 ms: nothing that a name rests on."""
+    columns = straight(11, 600, 6.0, 2.0)
+    columns["rate_z_degps"] = columns["rate_z_degps"] + offset_degps
+    assert checked(columns, tmp_path) == ()

@@ -33,6 +33,7 @@ ERRORS = 4.0  # standard errors that a disagreement must have on top of the tole
 LEAST_PART = 0.5  # of a clear motion of the pose that a column must show
 ARM_M = 1.0  # by which places may be off in a turn: a wrong lever arm
 SHIFT_S = 1.0  # by which stamps may step within a log
+LEAST_BIAS_RADPS = 0.5 * np.pi / 180.0  # a constant of the rates that is none of our business
 FITS = 0.1  # share of the motion that a named relation may leave
 AXES = ("first", "second", "third")
 UNITS = {3.6: "km/h", 1.943844: "knots", 3.28084: "ft/s", 1e3: "mm/s", 100.0: "cm/s"}
@@ -126,11 +127,13 @@ def disagreement(
     places, words = place_m is not None, ""
     if not _differs(moved, own, spans.noise(column), tolerance):
         words = _missing(moved, own, sigma)
-        if not words and places and _drifts(spans, moved, own, sigma, tolerance):
-            words = _offset_words(spans, moved, own)
+        if not words and _drifts(
+            spans, moved, own, _allowed(spans, moved, sigma, places, tolerance)
+        ):
+            words = _offset_words(spans, moved, own, places)
         return Disagreement(_ratio(moved, own), words) if words else None
-    if places and _is_offset(spans, moved, own):
-        return Disagreement(_ratio(moved, own), _offset_words(spans, moved, own))
+    if _is_offset(spans, moved, own):
+        return Disagreement(_ratio(moved, own), _offset_words(spans, moved, own, places))
     body = None
     if place_m is not None:
         body = spans.integral(rotate(rotation, column), float(lag))
@@ -236,23 +239,30 @@ def _constant(spans: Spans, moved: Array, own: Array) -> Array:
     return np.asarray(np.sum(own - moved, axis=0) / float(np.sum(spans.length_s)))
 
 
-def _offset_words(spans: Spans, moved: Array, own: Array) -> str:
+def _offset_words(spans: Spans, moved: Array, own: Array, places: bool) -> str:
     mean = _constant(spans, moved, own)
     k = int(np.argmax(np.abs(mean)))
-    return f"they hold a constant {figure(float(mean[k]), None, 'm/s')} along the {AXES[k]} axis"
+    size = figure(float(mean[k]), None, "m/s" if places else "rad/s")
+    return f"they hold a constant {size} {'along' if places else 'about'} the {AXES[k]} axis"
 
 
-def _drifts(spans: Spans, moved: Array, own: Array, sigma_m: float, tolerance: float) -> bool:
-    """Whether a constant part is larger than the places may be off by.
+def _drifts(spans: Spans, moved: Array, own: Array, allowed: float) -> bool:
+    """Whether a constant part of the column is larger than the pose may be off by."""
+    return bool(np.linalg.norm(_constant(spans, moved, own)) > allowed)
 
-    They may at both ends of every unbroken stretch: by noise, by a wrong lever arm, and by what the
-    vehicle moves while its stamps step.
+
+def _allowed(spans: Spans, moved: Array, sigma: float, places: bool, tolerance: float) -> float:
+    """Constant part [m/s or rad/s] that the poses leave room for.
+
+    They may be off at both ends of every unbroken stretch: by noise, by what the vehicle moves
+    while its stamps step, places also by a wrong lever arm.  A gyro may have a bias: LEAST_BIAS
+    turns no attitude by more than 0.05 deg in a delay of 0.1 s.
     """
     speed = _size(moved / spans.length_s[:, None])
     stretches = 1 + int(np.sum(spans.first[1:] != spans.last[:-1]))
-    ends_m = 2.0 * ARM_M + ERRORS * np.sqrt(2.0) * sigma_m + SHIFT_S * speed
-    allowed = tolerance * speed + stretches * ends_m / float(np.sum(spans.length_s))
-    return bool(np.linalg.norm(_constant(spans, moved, own)) > allowed)
+    ends = (2.0 * ARM_M if places else 0.0) + ERRORS * np.sqrt(2.0) * sigma + SHIFT_S * speed
+    allowed = tolerance * speed + stretches * ends / float(np.sum(spans.length_s))
+    return float(allowed + (0.0 if places else LEAST_BIAS_RADPS))
 
 
 def _described(
