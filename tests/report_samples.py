@@ -7,6 +7,11 @@ import itertools
 import math
 from typing import Any
 
+from syncline_design.report.document import Document
+from syncline_design.report.on_simulation import on_simulation
+from syncline_design.simulation import SimulationResult, SimulationSettings, simulate
+from tests.simulation_systems import fixed_wing as fixed_wing_system
+
 HOSTILE = (
     "</script><script>alert(1)</script>",
     r"$\frac{$",
@@ -447,20 +452,12 @@ def reproduction() -> dict[str, Any]:
     }  # fmt: skip
 
 
-def simulation() -> dict[str, Any]:
-    part = monte_carlo_section(0.094)
-    grid = [{**row, "reason": "lever arms swing", "bound_m": 1.0, "gap": 0.0}
-            for row in part.pop("grid")]  # fmt: skip
-    part["probability_within_target"]["target_m"] = 0.3
-    part["worst_case"]["certificate"] = {"gap": 0.001, "text": "nothing gives more than the bound"}
-    return {
-        "schema": "syncline-design/simulation/v1",
-        "spec": {"name": "UAV", "file": "specs/uav.yaml"},
-        "monte_carlo": part,
-        "grid": grid,
-        "trajectory": None,
-        "versions": {"numpy": "2.0"},
-    }
+def simulation() -> tuple[Document, SimulationResult]:
+    """A simulated system whose name is hostile; real figures."""
+    system = fixed_wing_system()
+    settings = SimulationSettings(samples=500, limit_m=0.3, tau_grid_s=(1e-5, 0.1, 1.0))
+    result = simulate(system, settings)
+    return on_simulation(result, system, "".join(HOSTILE), "specs/uav.yaml"), result
 
 
 def diagnosis() -> dict[str, Any]:

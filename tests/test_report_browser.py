@@ -14,10 +14,10 @@ import report_samples as samples
 from syncline_design.report.pages import (
     render_diagnosis,
     render_reproduction,
-    render_simulation,
     render_verdict,
     render_verdicts,
 )
+from syncline_design.report.render_html import html
 
 pytestmark = pytest.mark.browser
 
@@ -266,7 +266,7 @@ WIDE, NARROW = ("light", 1280), ("dark", 400)
         (lambda: render_verdict(samples.infeasible()), NARROW),
         (lambda: render_verdicts([samples.fixed_wing(), samples.failing()]), NARROW),
         (lambda: render_reproduction(samples.reproduction()), NARROW),
-        (lambda: render_simulation(samples.simulation()), NARROW),
+        (lambda: html(samples.simulation()[0]), NARROW),
         (lambda: render_diagnosis(samples.diagnosis()), WIDE),
     ],
 )

@@ -11,12 +11,12 @@ import pytest
 import report_samples as samples
 from html_page import Page
 from syncline_design.report import numbers
-from syncline_design.report.pages import render_diagnosis, render_reproduction, render_simulation
+from syncline_design.report.pages import render_diagnosis, render_reproduction
+from syncline_design.report.render_html import html
 from syncline_design.report.text import visible
 
 CASES = (
     (samples.reproduction, render_reproduction),
-    (samples.simulation, render_simulation),
     (samples.diagnosis, render_diagnosis),
 )
 
@@ -84,11 +84,21 @@ def test_a_failed_reproduction_says_so() -> None:
 
 
 def test_simulation_tells_ratio_reason_and_certificate() -> None:
-    page = Page(render_simulation(samples.simulation()))
-    ratios = [row["ratio"] for row in samples.simulation()["grid"]]
-    assert f"{100 * min(ratios):.2f}\u00a0%" in page.text
-    for words in ("lever arms swing", "nothing gives more than the bound", "30.9\u00a0mm"):
+    document, result = samples.simulation()
+    page = Page(html(document))
+    assert (page.unbalanced, len(page.scripts)) == ([], 1)
+    ratios = [row.worst_case.ratio for row in result.grid]
+    assert f"{100 * min(ratios):.4g}\u00a0%" in page.text
+    for row in result.grid:
+        assert row.reason in page.text
+    found = result.monte_carlo
+    for words in (
+        "a turn moves the object along a chord", "nothing exceeds the bound", "specs/uav.yaml",
+        numbers.length(found.quantile(0.95).value_m), numbers.length(found.worst_case.bound_m),
+        numbers.length(found.worst_case.syncline_m),
+    ):  # fmt: skip
         assert words in page.text
+    assert html(document) == html(samples.simulation()[0])
 
 
 @pytest.fixture(scope="module")

@@ -16,14 +16,18 @@ from scipy.spatial.transform import Rotation
 from syncline_design.machine.input_files import FileContent
 from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
+from syncline_design.report import numbers
+from syncline_design.report.on_simulation import on_simulation
+from syncline_design.report.render_console import console
+from syncline_design.report.simulations import CSV_HEADER, grid_csv
 from syncline_design.simulation import (
     SimulationError,
+    SimulationResult,
     SimulationSettings,
     cross_check,
     sample_errors,
     simulate,
 )
-from syncline_design.simulation.summary import CSV_HEADER, duration, grid_csv, length, summary_text
 from syncline_design.simulation.trajectory import (
     MANOEUVRES,
     _file_track,
@@ -344,36 +348,42 @@ def test_effects_that_do_not_fit(entry: EffectEntry, says: str) -> None:
         sample_errors(system, SimulationSettings(samples=10))
 
 
+def told(result: SimulationResult, system: System) -> str:
+    """The console's text, its columns and lines closed up."""
+    return " ".join(console(on_simulation(result, system)).split())
+
+
 def test_summary_says_what_was_found() -> None:
     system = fixed_wing()
     result = simulate(
         system, SimulationSettings(samples=3000, limit_m=0.05, tau_grid_s=(1e-5, 1.0))
     )
-    text = summary_text(result, system)
+    text = told(result, system)
     worst = result.monte_carlo.worst_case
     for part in (
-        "3000 samples (plain), seed 0",
-        f"95 % of errors below {length(result.monte_carlo.quantile(0.95).value_m)}",
-        "P(error <= 50 mm)",
-        f"{worst.ratio:.4f} of the Syncline's",
-        "do not contradict it",
+        "Samples 3 000",
+        "Seed 0",
+        f"95 % {numbers.length(result.monte_carlo.quantile(0.95).value_m)}",
+        "Within the target of 50 mm",
+        f"{numbers.percent(worst.ratio, 4)} of the Syncline's",
+        "do not contradict the Syncline",
         "range noise acts along the line of sight",
         "a turn moves the object along a chord",
     ):
-        assert part in text
+        assert part.replace("\u00a0", " ") in text
     entry = EffectEntry("range_bias", "ranging", "uav", (("bias_m", 1.0),))
-    told = summary_text(result, dataclasses.replace(system, effects=(entry,)))
-    assert "range_bias (ranging)" in told
+    acting = told(result, dataclasses.replace(system, effects=(entry,)))
+    assert "range_bias of the ranging sensor" in acting
 
 
 def test_summary_says_when_the_ratio_never_leaves_one() -> None:
     result = simulate(survey(), SimulationSettings(samples=500, tau_grid_s=(1e-5, 1e-3)))
-    assert "within 2 % of the Syncline over the whole grid" in summary_text(result, survey())
+    assert "within 2 % of the Syncline over the whole grid" in told(result, survey())
 
 
 def test_trajectory_is_named_in_text_and_json() -> None:
     result = simulate(fixed_wing(), settings("circle", 500, tau_grid_s=(1e-4,)))
-    assert "along the trajectory circle" in summary_text(result, fixed_wing())
+    assert "the Syncline, along circle." in told(result, fixed_wing())
     assert result.to_json()["trajectory"] == "circle"
 
 
@@ -385,15 +395,6 @@ def test_grid_as_csv() -> None:
     assert [float(r["tau_s"]) for r in rows] == [0.0, 1e-3]
     assert float(rows[1]["worst_case_m"]) == result.grid[1].worst_case.value_m
     assert rows[0]["reason"] == result.grid[0].reason
-
-
-def test_lengths_and_durations_read_well() -> None:
-    assert length(1.5) == "1.5 m"
-    assert length(0.0123456) == "12.346 mm"
-    assert length(0.0) == "0 m"
-    assert length(math.inf) == "inf m"
-    assert duration(2.5e-6) == "2.5 us"
-    assert duration(0.0) == "0 s"
 
 
 def test_a_sensor_on_utc_ignores_host_clocks() -> None:

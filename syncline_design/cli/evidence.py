@@ -38,17 +38,19 @@ def simulate(
     ] = None,
 ) -> int:
     """Simulate the nonlinear chain against the Syncline over a grid of tau."""
-    from syncline_design.report.simulations import SIMULATE_FORMATS, render_simulate
-    from syncline_design.report.text import visible
-    from syncline_design.simulation.summary import summary_text
+    from syncline_design.report.render_console import console
+    from syncline_design.report.simulations import (
+        SIMULATE_FORMATS,
+        render_simulate,
+        simulated_document,
+    )
     from syncline_design.spec.load import load
     from syncline_design.verdict.simulated_spec import simulate_spec
 
     targets = output_targets(output, SIMULATE_FORMATS, [spec])
     loaded = load(spec)
     run = simulate_spec(loaded, seed=seed, samples=samples, workers=workers)
-    head = f"{visible(loaded.spec.name)} ({visible(spec)})"
-    text = f"{head}\n\n{summary_text(run.result, run.system)}"
+    text = console(simulated_document(run))
     emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
     return 0
 

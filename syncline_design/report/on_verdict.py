@@ -14,6 +14,12 @@ from syncline_design.report import (
     verdict_tables,
     verdict_words,
 )
+from syncline_design.report.simulated import (
+    certificate,
+    ensemble,
+    quantiles,
+    simulation_facts,
+)
 from syncline_design.report.svg import InlineFigure
 from syncline_design.report.text import harmless
 from syncline_design.report.verdict_figures import (
@@ -62,8 +68,8 @@ def render_verdict(verdict: Json) -> str:
         numbers=numbers,
         explorer=_explorer(verdict),
         syncline_facts=_syncline_facts(verdict),
-        simulation_facts=simulation_facts(verdict),
-        simulation_notes=simulation_notes(verdict),
+        simulation_facts=_simulation_facts(verdict),
+        simulation_notes=_simulation_notes(verdict),
         proof=_proof(verdict),
     )
 
@@ -94,7 +100,7 @@ def _sections(verdict: Json, drawn: dict[str, InlineFigure]) -> dict[str, Any]:
     """Content of every section by key; empty where the verdict has none."""
     tables = verdict_tables
     has_roles = next(tables.roles(verdict), None) is not None
-    choice = part(verdict, "choice")
+    choice, simulated = part(verdict, "choice"), part(verdict, "monte_carlo")
     candidates: dict[str, Any] = {
         "infeasibility": part(verdict, "infeasibility"),
         "requirements": tables.requirements(verdict) if verdict.get("requirements") else None,
@@ -103,7 +109,7 @@ def _sections(verdict: Json, drawn: dict[str, InlineFigure]) -> dict[str, Any]:
         "timing": tables.taus(verdict) if has_roles else None,
         "syncline": tables.models(verdict) if "syncline" in drawn else None,
         "ledger": tables.ledger(verdict) if "ledger" in drawn else None,
-        "simulation": tables.quantiles(verdict) if part(verdict, "monte_carlo") else None,
+        "simulation": quantiles(simulated) if simulated else None,
         "choice": choice_tables.choice_tables(verdict) if choice else None,
         "effects": items(verdict, "effects"),
         "basis": _basis(verdict),
@@ -177,44 +183,18 @@ def _syncline_facts(verdict: Json) -> list[tuple[str, str]]:
     return facts
 
 
-def simulation_facts(verdict: Json) -> list[tuple[str, str]]:
-    """Samples, envelope, probability and worst case of a Monte Carlo part."""
-    monte_carlo = part(verdict, "monte_carlo")
-    facts = [
-        ("Samples", numbers.count(monte_carlo.get("samples"))),
-        ("Envelope", str(monte_carlo.get("envelope") or numbers.MISSING)),
-        ("Seed", str(monte_carlo.get("seed", numbers.MISSING))),
-    ]
-    within = part(monte_carlo, "probability_within_target")
-    if within.get("value") is not None:
-        interval = (
-            f"{numbers.percent(within.get('low'), 5)} to {numbers.percent(within.get('high'), 5)}"
-        )
-        facts.append(
-            ("Within the target", f"{numbers.percent(within['value'], 5)} (95 %: {interval})")
-        )
-    worst = part(monte_carlo, "worst_case")
-    if worst.get("value_m") is not None:
-        ratio = numbers.percent(worst.get("ratio_to_syncline"))
-        facts.append(
-            ("Worst case found", f"{numbers.length(worst['value_m'])}, {ratio} of the Syncline")
-        )
-    if part(worst, "certificate"):
-        facts.append(("Upper bound", numbers.length(worst.get("bound_m"))))
-    horizon = part(verdict, "horizon")
-    if horizon:
+def _simulation_facts(verdict: Json) -> list[tuple[str, str]]:
+    """The facts of the Monte Carlo part, and the horizon that it runs over."""
+    facts = simulation_facts(part(verdict, "monte_carlo"))
+    if horizon := part(verdict, "horizon"):
         facts.append(("Horizon", numbers.horizon(horizon)))
     return facts
 
 
-def simulation_notes(verdict: Json) -> list[str]:
+def _simulation_notes(verdict: Json) -> list[str]:
     """For what the upper bound holds, and over what the quantiles run, in sentences."""
     monte_carlo = part(verdict, "monte_carlo")
-    told = (
-        part(part(monte_carlo, "worst_case"), "certificate").get("text"),
-        part(monte_carlo, "ensemble").get("text"),
-    )
-    return [f"{str(text)[0].upper()}{str(text)[1:].rstrip('.')}." for text in told if text]
+    return [text for text in (certificate(monte_carlo), ensemble(monte_carlo)) if text]
 
 
 def _proof(verdict: Json) -> str:

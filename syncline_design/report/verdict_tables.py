@@ -181,20 +181,6 @@ def models(verdict: Json) -> Table:
     return table("Total error by model", heads, rows)
 
 
-def quantiles(verdict: Json) -> Table:
-    """Quantiles of the simulated error with their confidence intervals."""
-    rows = []
-    for key, entry in named(part(verdict, "monte_carlo"), "quantiles"):
-        rows.append((
-            Cell(numbers.percent(float(key), 4), float(key)),
-            Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
-            f"{numbers.length(entry.get('low_m'))} to {numbers.length(entry.get('high_m'))}",
-        ))  # fmt: skip
-    confidence = part(verdict, "monte_carlo").get("confidence") or 0.95
-    heads = ("Quantile", "Error #", f"{numbers.percent(confidence)} confidence interval")
-    return table("Quantiles of the simulated error", heads, rows)
-
-
 def assumptions(verdict: Json) -> Table | None:
     """Figures without a public source that this verdict rests on, a row per catalog entry."""
     figures: dict[tuple[str, str], list[str]] = {}

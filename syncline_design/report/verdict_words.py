@@ -3,23 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Final
 
 from syncline_design.report import numbers
-from syncline_design.report.table import Tone
+from syncline_design.report.document import Outcome as Outcome
 from syncline_design.report.text import sentence_list, visible
 
 Json = Mapping[str, Any]
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """A result as colour, symbol and word together, so that none is needed alone."""
-
-    tone: Tone
-    mark: str
-    word: str
 
 
 OUTCOMES: Final[dict[str, Outcome]] = {
