@@ -81,6 +81,15 @@ def test_figures_and_times_as_text_are_the_same_in_pieces(tmp_path: Path) -> Non
 
 
 @pytest.mark.usefixtures("pieces_of_seven")
+def test_times_may_begin_with_empty_cells(tmp_path: Path) -> None:
+    times = [*[None] * 16, *["2026-03-01T12:00:00.5Z"] * 9]
+    stamps = written(tmp_path / "log.parquet", time=times).clock("time").nanoseconds
+    assert stamps is not None
+    assert np.all(stamps[:16] == np.iinfo(np.int64).min)
+    assert np.all(stamps[16:] == 1_772_366_400_500_000_000)
+
+
+@pytest.mark.usefixtures("pieces_of_seven")
 @pytest.mark.parametrize("place", [0, 6, 7, 23])
 def test_a_bad_cell_is_named_with_its_row(tmp_path: Path, place: int) -> None:
     cells = ["1.5"] * 30

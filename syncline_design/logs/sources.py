@@ -371,7 +371,10 @@ class ParquetSource:
         zoned: bool | None = None
         for start, text in self._pieces(name):
             try:
-                if dates or (not seconds and looks_like_a_date(text)):
+                blank = all(bool(np.all(np.isnan(piece))) for piece in seconds)
+                if dates or (blank and looks_like_a_date(text)):
+                    dates += [np.full(len(piece), NO_TIME) for piece in seconds]
+                    seconds = []
                     stamps, zone = iso_times(text)
                     if zoned is not None and zone is not None and zone != zoned:
                         raise BadCellError(0, str(text[0]), ONE_ZONE)
