@@ -25,6 +25,7 @@ from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
 from syncline_design.model.estimates import figure
 from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
+from syncline_design.report.on_diagnosis import finding_words
 from syncline_design.spec.load import load
 
 Array = NDArray[np.float64]
@@ -179,6 +180,10 @@ def test_at_best_is_what_the_effects_reach(tmp_path: Path) -> None:
     velocity = raw_error(columns, 1.0) - raw_error(columns)
     error = raw_error(columns)
     best_s = -float(np.sum(velocity * error) / np.sum(velocity**2))
+    others = found.to_json()["findings"][0]
+    assert {a["refitted"] for a in others["excluded"]} == {False}
+    assert all(a["refitted"] for a in others["aliases"] + others["lookalikes"])
+    assert "with the noise kept" in finding_words(others)["excluded"]
     held_out = found.to_json()["gap"]["held_out"]
     assert held_out["fitted"]["rms_m"] == pytest.approx(rms_m(raw_error(columns, best_s)), rel=2e-3)
     assert held_out["after"]["rms_m"] >= 0.999 * held_out["fitted"]["rms_m"]

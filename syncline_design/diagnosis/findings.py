@@ -50,7 +50,8 @@ def figure_text(shown: Figure) -> str:
 class AliasFigure:
     """Another effect beside the named one; nats_worse counts the freedom of both.
 
-    possible: whether it fits with values that the effect can have.
+    possible: whether it fits with values that the effect can have.  refitted: with noise fitted
+    anew, as the evidence is; otherwise to first order with the named effect's noise.
     """
 
     effect: str
@@ -59,6 +60,7 @@ class AliasFigure:
     cosine: float
     nats_worse: float
     possible: bool = True
+    refitted: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +146,9 @@ def _finding(
 def _alias(view: Scene, alias: Alias) -> AliasFigure:
     name, sensor, stage = alias.candidate.label
     where = view.system.stages[stage].name
-    return AliasFigure(name, sensor, where, alias.cosine, alias.loss, alias.possible)
+    return AliasFigure(
+        name, sensor, where, alias.cosine, alias.loss, alias.possible, alias.refitted
+    )
 
 
 def _gross(view: Scene, fault: Gross) -> Finding:

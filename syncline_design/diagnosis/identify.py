@@ -33,6 +33,8 @@ class Alias:
     cosine: of the whitened angle between the named signature and the span of the other's.
     fit: how much worse the other fits [nat]; loss: the same with what each pays for its freedom.
     possible: whether it fits with values that the effect can have.
+    refitted: whether it was re-simulated with its noise fitted anew, as evidence is; otherwise the
+    figures are of first order, with the named effect's noise, and larger than what a refit leaves.
     """
 
     candidate: Candidate
@@ -40,6 +42,7 @@ class Alias:
     fit: float
     loss: float
     possible: bool = True
+    refitted: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,7 +120,7 @@ def _sorted_out(
         if model is not None:
             worse = model.nll - named.nll
             loss = worse + _price(data, one.candidate.effect) - own
-            one = replace(one, fit=worse, loss=loss, possible=plausible(model))
+            one = replace(one, fit=worse, loss=loss, possible=plausible(model), refitted=True)
         lists[_place(one)].append(one)
     aliases, lookalikes, excluded = lists
     return Comparison(tuple(aliases), tuple(lookalikes), tuple(excluded))

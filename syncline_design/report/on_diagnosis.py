@@ -130,7 +130,8 @@ def _excluded_text(entry: Json) -> str:
     if worse is None:
         return _effect_text(entry)
     if worse >= 0.0:
-        return f"{_effect_text(entry)}, {worse:.3g} nat worse"
+        kept = " with the noise kept" if entry.get("refitted") is False else ""
+        return f"{_effect_text(entry)}, {worse:.3g} nat worse{kept}"
     if entry.get("possible") is False:
         return f"{_effect_text(entry)}, {-worse:.3g} nat better, but only with impossible values"
     return f"{_effect_text(entry)}, as well in its place"
