@@ -18,6 +18,7 @@ from scipy.stats import chi
 
 from syncline_design.choice.table import Design
 from syncline_design.choice.tolerance import ToleranceVerdict, tolerance_verdict
+from syncline_design.report.optimisations import render_optimize
 from syncline_design.spec.load import LoadedSpec, load_text
 from syncline_design.verdict import acceptance, verify
 from syncline_design.verdict import optimise as optimisation
@@ -323,6 +324,8 @@ def test_lists_that_simulation_cuts_short_say_so(
     assert len(data["designs"]) <= 3
     assert {"front", "next best designs"} <= set(data["gave_up"])
     assert "not complete: front, next best designs" in optimisation_text(found)
+    assert "not complete: front, next best designs" in render_optimize("html", found)
+    assert "gave up" not in render_optimize("html", whole)
     verdict = check_loaded(loaded, CheckSettings())
     assert verdict["verdict"] == "meets"
     (said,) = [w["message"] for w in verdict["warnings"] if w["code"] == "search-gave-up"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import mpmath
@@ -11,6 +12,7 @@ import pytest
 import report_samples as samples
 from html_page import Page
 from syncline_design.report import numbers
+from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
 from syncline_design.report.pages import render_diagnosis, render_reproduction
 from syncline_design.report.render_html import html
 from syncline_design.report.text import visible
@@ -227,7 +229,24 @@ def test_a_page_says_fits_worse_only_of_what_does() -> None:
          "possible": False},
         {"effect": "filter_lag", "sensor": "position", "nats_worse": 31.6, "possible": True},
     ]  # fmt: skip
-    text = " ".join(Page(render_diagnosis(data)).text.split())
-    assert "fits worse" not in text
-    assert "157 nat better, but only with impossible values" in text
-    assert "filter lag (position), 31.6 nat worse" in text
+    page = " ".join(Page(render_diagnosis(data)).text.split())
+    markdown = re.sub(r"\\(.)", r"\1", render_diagnosis_markdown(data))
+    for text in (page, markdown):
+        assert "fits worse" not in text
+        assert "157 nat better, but only with impossible values" in text
+        assert "filter lag (position), 31.6 nat worse" in text
+        assert re.search("told apart on this log from filter lag .*141 nat worse", text, re.I)
+
+
+def test_markdown_of_a_diagnosis_says_what_the_page_says_of_gap_and_log() -> None:
+    """They stood on the page and the console only."""
+    data = samples.diagnosis()
+    data["gap"]["expected_rms_m"] = 0.0217
+    data["log"] |= {"fitted": 2900, "thinned": 5000, "notes": ["heading_deg was read as yaw"]}
+    text = re.sub(r"\\(.)", r"\1", render_diagnosis_markdown(data)).replace("\u00a0", " ")
+    for words in (
+        "The spec's noise expects 2.17 cm", "Gap closed on held-out data: 98.1 %",
+        "Log: 2 987 of 3 000 rows used, 2 900 fitted", "5 000 rows are between windows",
+        "Left out: 13 (missing values)", "heading_deg was read as yaw",
+    ):  # fmt: skip
+        assert words in text

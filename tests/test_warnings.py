@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import math
 from typing import Any
 
@@ -221,3 +223,28 @@ def test_timelines_that_differ_between_stages_of_one_vehicle_are_told_of(
     assert ("common-clock" in codes) == (told and not clock)
     offset = 0.005 if told and clock else 0.0  # ntp_internet: within 5 ms
     assert found["syncline"]["tau_s"] == pytest.approx(0.002 + offset, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("limit_m", "expires", "state", "said"),
+    [
+        (0.2, "2999-01-01", "WAIVED", "waived until 2999-01-01: trial"),
+        (0.2, "2021-01-01", "FAIL", "waiver expired on 2021-01-01: trial"),
+        (9.0, "2999-01-01", "PASS", "waived until 2999-01-01: trial"),
+    ],
+)
+def test_console_and_csv_tell_a_waived_requirement_from_a_failed_one(
+    limit_m: float, expires: str, state: str, said: str
+) -> None:
+    """Both said FAIL alone; the boat's Syncline is above 0.2 m and below 9 m."""
+    found = verdict(f"{limit_m} m, waiver: {{reason: trial, expires: {expires}}}")
+    (line,) = [x for x in verdict_text(found, colour=False).splitlines() if "  NEAR  " in x]
+    assert line.split()[0] == state
+    rows = {row["requirement"]: row for row in csv.DictReader(io.StringIO(csv_of(found)))}
+    assert rows["NEAR"]["status"] == ("pass" if limit_m > 1.0 else "fail")
+    assert rows["NEAR"]["waiver"] == said
+    assert rows["FAR"]["waiver"] == ""
+
+
+def csv_of(found: dict[str, Any]) -> str:
+    return render_checks("csv", [found])

@@ -12,7 +12,7 @@ from typing import Any
 from syncline_design.model.horizon import duration_words
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import qualification
+from syncline_design.report.verdict_words import is_waived, qualification
 
 Data = Mapping[str, Any]
 
@@ -61,7 +61,8 @@ def _painter(colour: bool | None) -> Any:
 
 
 def _tone(verdict: str) -> str:
-    return {"meets": "good", "pass": "good", "indeterminate": "open"}.get(verdict, "bad")
+    tones = {"meets": "good", "pass": "good", "indeterminate": "open", "waived": "open"}
+    return tones.get(verdict, "bad")
 
 
 def _headline(data: Data, paint: Any) -> list[str]:
@@ -181,7 +182,7 @@ def _requirements(data: Data, paint: Any) -> list[str]:
         note = f"  {visible(r['note'])}" if r.get("note") else ""
         rows.append(
             [
-                STATUS[r["status"]],
+                "WAIVED" if _waived(r) else STATUS[r["status"]],
                 visible(r["id"]),
                 what,
                 f"{value} {sign} {_figure(kind, r['limit'], unit)}",
@@ -193,10 +194,14 @@ def _requirements(data: Data, paint: Any) -> list[str]:
         return []
     lines = table(rows)
     painted = [
-        line.replace(row[0], paint(row[0], _tone(r["status"])), 1)
+        line.replace(row[0], paint(row[0], _tone("waived" if _waived(r) else r["status"])), 1)
         for line, row, r in zip(lines, rows, data["requirements"], strict=True)
     ]
     return ["Requirements", *painted]
+
+
+def _waived(row: Data) -> bool:
+    return row["status"] == "fail" and is_waived(row)
 
 
 def _signed(kind: str, value: float, unit: str) -> str:

@@ -10,10 +10,10 @@ from typing import Any
 from syncline_design.report.ci import spec_file, spec_name
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import spreadsheet_safe
-from syncline_design.report.verdict_words import Json, items
+from syncline_design.report.verdict_words import Json, items, waiver_text
 
 _COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value", "limit", "unit",
-            "margin", "line", "warnings")  # fmt: skip
+            "margin", "line", "warnings", "waiver")  # fmt: skip
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
@@ -50,7 +50,8 @@ def render_csv(verdicts: Sequence[Json]) -> str:
 
 
 def _about(verdict: Json, row: Json) -> dict[str, Any]:
-    """A requirement's id, and the codes of the warnings about it."""
+    """A requirement's id, the codes of the warnings about it, and what its waiver does."""
     name = row.get("id")
     found = [w for w in items(verdict, "warnings") if name and w.get("requirement") == name]
-    return {"requirement": name, "warnings": " ".join(str(w.get("code")) for w in found)}
+    codes = " ".join(str(w.get("code")) for w in found)
+    return {"requirement": name, "warnings": codes, "waiver": waiver_text(row)}

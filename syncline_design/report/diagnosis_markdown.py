@@ -9,7 +9,9 @@ from syncline_design.report.on_diagnosis import (
     check_sentences,
     design_lines,
     finding_words,
+    gap_lines,
     gap_table,
+    log_lines,
     meaning_table,
     outcome_of,
     remaining_text,
@@ -37,6 +39,8 @@ def render_diagnosis_markdown(data: Json) -> str:
     gap = gap_table(data)
     if gap is not None:
         lines += [f"**{markdown_safe(gap.caption)}**", "", markdown_table(gap)]
+        lines += [*(f"- {markdown_safe(line)}" for line in gap_lines(data)), ""]
+    lines += [*(f"- {markdown_safe(line)}" for line in log_lines(data)), ""]
     means = design_lines(data)
     if means:
         lines += ["**What it means for the design**", ""]
@@ -59,3 +63,5 @@ def _finding(number: int, entry: Json) -> Iterator[str]:
         yield f"   - not told apart from {markdown_safe(words['aliases'] + separated)}"
     if words["lookalikes"]:
         yield f"   - similar: {markdown_safe(words['lookalikes'])}"
+    if words["excluded"]:
+        yield f"   - told apart on this log from {markdown_safe(words['excluded'])}"

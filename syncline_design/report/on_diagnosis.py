@@ -245,6 +245,29 @@ def gap_table(data: Json) -> Table | None:
     return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
 
 
+def gap_lines(data: Json) -> list[str]:
+    """What the spec's noise expects on the held-out blocks, and the share of the gap closed."""
+    gap = part(data, "gap")
+    expected, closed = (numbers.finite(gap.get(k)) for k in ("expected_rms_m", "closed_fraction"))
+    lines = [] if expected is None else [f"The spec's noise expects {_length(expected)}."]
+    if closed is not None:
+        lines.append(f"Gap closed on held-out data: {numbers.percent(closed)}.")
+    return lines
+
+
+def log_lines(data: Json) -> list[str]:
+    """How many rows were read, used, fitted and left out, and how the log was read."""
+    log = part(data, "log")
+    if log.get("rows") is None:
+        return []
+    used, rows = numbers.count(log.get("used")), numbers.count(log.get("rows"))
+    lines = [f"Log: {used} of {rows} rows used, {numbers.count(log.get('fitted'))} fitted."]
+    if log.get("thinned"):
+        lines.append(f"Too long to hold: {numbers.count(log['thinned'])} rows are between windows.")
+    lines += [f"Left out: {numbers.count(n)} ({why})" for why, n in part(log, "rejected").items()]
+    return [*lines, *map(str, log.get("notes") or ())]
+
+
 def gap_steps(data: Json) -> list[tuple[str, Json]]:
     """(label, scores on held-out data), the spec as it is first, then each addition."""
     found: list[tuple[str, Json]] = []

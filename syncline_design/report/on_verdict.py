@@ -71,6 +71,7 @@ def render_verdict(verdict: Json) -> str:
         simulation_facts=_simulation_facts(verdict),
         simulation_notes=_simulation_notes(verdict),
         proof=_proof(verdict),
+        incomplete=part(verdict, "choice").get("incomplete") or (),
     )
 
 

@@ -5,7 +5,12 @@ from __future__ import annotations
 from typing import Final
 
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
-from syncline_design.verdict.optimise import Optimisation, optimisation_csv, optimisation_json
+from syncline_design.verdict.optimise import (
+    Optimisation,
+    incomplete_lines,
+    optimisation_csv,
+    optimisation_json,
+)
 
 _HINGES: Final = ("staircase", "slack", "tolerances", "measure_next")
 
@@ -24,4 +29,5 @@ def render_optimize(name: str, found: Optimisation) -> str:
     told = optimisation_json(found)
     choice = dict(verdict.get("choice") or {})
     choice |= {key: told[key] for key in _HINGES if told.get(key)}
+    choice["incomplete"] = incomplete_lines(found)
     return render_verdict({**verdict, "choice": choice})

@@ -300,12 +300,17 @@ def optimisation_text(found: Optimisation) -> str:
         missing = left_out(found.loaded, problem, found.settings.resource)
         blocks += [[left_out_text(missing, found.settings.resource)]] if missing else []
     blocks += _hinge_blocks(found.hinges)
-    if found.cut_short and not found.unfinished:
-        blocks.append([f"The time limit ended this too early: {', '.join(found.cut_short)}."])
-    if found.gave_up:
-        blocks.append([gave_up_line(found.gave_up)])
+    blocks += [[line] for line in incomplete_lines(found)]
     shown = ["\n".join(printable(line, len(line)) for line in block) for block in blocks]
     return "\n\n".join(shown) + "\n"
+
+
+def incomplete_lines(found: Optimisation) -> list[str]:
+    """Which parts lack designs: by the time limit, or because simulation is bounded."""
+    lines = []
+    if found.cut_short and not found.unfinished:
+        lines.append(f"The time limit ended this too early: {', '.join(found.cut_short)}.")
+    return [*lines, gave_up_line(found.gave_up)] if found.gave_up else lines
 
 
 def gave_up_line(pieces: Sequence[str]) -> str:
