@@ -78,9 +78,17 @@ def cut_rows(rows: StageRows, index: Rows) -> StageRows:
 
     Elapsed time counts from the first row of what an effect is given, so the first row is kept.
     """
-    kept = ("antenna_m", "ranging_m", "start_s", "independent")
+    kept = ("antenna_m", "ranging_m", "start_s", "independent", "lagged")
     cut = {n: getattr(rows, n)[index] for n in StageRows.__slots__ if n not in kept}
-    return replace(rows, **cut)
+    behind = rows.lagged
+    if behind is None:
+        return replace(rows, **cut)
+
+    def lagged(constant_s: float) -> tuple[Array, Array]:
+        place, turn = behind(constant_s)
+        return place[index], turn[index]
+
+    return replace(rows, **cut, lagged=lagged)
 
 
 def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
