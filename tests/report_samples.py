@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import copy
+import functools
 import itertools
 import math
 from typing import Any
 
+from syncline_design.paper.reproduce import Reproduction, reproduce
 from syncline_design.report.document import Document
 from syncline_design.report.on_simulation import on_simulation
 from syncline_design.simulation import SimulationResult, SimulationSettings, simulate
@@ -409,47 +411,10 @@ def with_hostile_text(text: str) -> dict[str, Any]:
     return verdict
 
 
-def reproduction() -> dict[str, Any]:
-    taus = [10.0 ** (-5 + 0.5 * i) for i in range(9)]
-    one = {
-        "label": "Car",
-        "sensor_error_m": 0.1,
-        "sync_rate_mps": 45.1,
-        "tau_crit_s": 0.1 / 45.1,
-        "error_m": [0.1 + 45.1 * tau for tau in taus],
-    }
-    cell = {
-        "table": "tau_crit_georeferencing",
-        "row": "ublox_f9p_pvt",
-        "column": "usv",
-        "printed": 520.0,
-        "printed_text": "520 ms",
-        "computed": 519.6152422706632,
-        "unit": "ms",
-        "status": "agrees",
-        "note": "",
-    }
-    return {
-        "schema": "syncline-design/reproduction/v1",
-        "version": "0.1.0",
-        "ok": True,
-        "counts": {"tau_crit": {"printed": 2, "agrees": 1, "erratum": 1, "differs": 0}},
-        "cells": [
-            cell,
-            {**cell, "column": "car", "status": "erratum", "computed": 80.0, "note": "rounded"},
-        ],
-        "inputs": [{**cell, "table": "platforms", "row": "usv", "column": "v_max"}],
-        "errata": [{"id": "x", "where": "table 2", "reason": "printed twice", "cells": []}],
-        "figures": [
-            {"number": 1, "title": "A Syncline", "note": "", "tau_s": taus, "curves": [one],
-             "simulated": []},
-            {"number": 2, "title": "Several", "note": "chosen", "tau_s": taus,
-             "curves": [one, {**one, "label": "A payload with a name far too long for a legend"}],
-             "simulated": []},
-            {"number": 3, "title": "Simulated", "note": "", "tau_s": taus, "curves": [one],
-             "simulated": [{"tau_s": 1e-3, "worst_case_m": 0.14, "ratio_to_syncline": 0.965}]},
-        ],
-    }  # fmt: skip
+@functools.cache
+def reproduction() -> Reproduction:
+    """The paper, computed for real; without the two figures that are simulated."""
+    return reproduce(simulate=False)
 
 
 def simulation() -> tuple[Document, SimulationResult]:

@@ -10,7 +10,8 @@ import pytest
 from study_specs import SPEC
 from syncline_design.comparison.diff import diff
 from syncline_design.report.json_out import json_text
-from syncline_design.report.on_difference import DIFF_FORMATS, diff_text, headline, render_diff
+from syncline_design.report.on_difference import DIFF_FORMATS, headline, on_difference, render_diff
+from syncline_design.report.render_console import console
 from syncline_design.spec.load import BadInput
 from syncline_design.verdict.verify import CheckSettings, check_file
 
@@ -82,7 +83,7 @@ def test_several_changes_say_which_one_does_it(files: tuple[Path, Path]) -> None
         "stages[uav].distance": "meets",
     }
     assert data["exit_code"] == 0
-    assert "alone: now no design meets the requirements" in diff_text(data)
+    assert "alone: now no design meets the requirements" in console(on_difference(data))
 
 
 def test_the_exit_code_is_that_of_the_new_one(files: tuple[Path, Path]) -> None:
@@ -201,7 +202,9 @@ def test_each_side_keeps_its_currency(
     data = diff(*sides, PLAIN)
     euros, dollars = (f"{v['design']['cost']:,.2f}".replace(",", " ") for v in verdicts)
     first, second = ("USD", "EUR") if back else ("EUR", "USD")
-    shown = [render_diff(name, data) for name in ("markdown", "html")] + [diff_text(data)]
+    shown = [render_diff(name, data) for name in ("markdown", "html")] + [
+        console(on_difference(data))
+    ]
     for text in shown:
         plain = text.replace("\N{NO-BREAK SPACE}", " ")
         assert f"{euros} {first}" in plain
@@ -221,7 +224,7 @@ def test_what_was_taken_out_reads_as_it_was_written(files: tuple[Path, Path]) ->
     change(old, ("requirements:\n", "requirements:\n" + line))
     drift = "effects:\n  - {effect: latency, sensor: position, parameters: {latency_s: 0.0010}}\n"
     new.write_text(new.read_text(encoding="utf-8") + drift, encoding="utf-8")
-    text = diff_text(diff(old, new, PLAIN))
+    text = console(on_difference(diff(old, new, PLAIN)))
     assert '"quantile": 0.950, "limit": "0.90 m"' in text
     assert '"parameters": {"latency_s": 0.0010}' in text
     assert '"number"' not in text

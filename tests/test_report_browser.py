@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 import report_samples as samples
+from syncline_design.report.on_paper import on_paper
 from syncline_design.report.pages import (
     render_diagnosis,
-    render_reproduction,
     render_verdict,
     render_verdicts,
 )
@@ -265,7 +265,7 @@ WIDE, NARROW = ("light", 1280), ("dark", 400)
         (lambda: render_verdict(samples.fixed_wing()), NARROW),
         (lambda: render_verdict(samples.infeasible()), NARROW),
         (lambda: render_verdicts([samples.fixed_wing(), samples.failing()]), NARROW),
-        (lambda: render_reproduction(samples.reproduction()), NARROW),
+        (lambda: html(on_paper(samples.reproduction())), NARROW),
         (lambda: html(samples.simulation()[0]), NARROW),
         (lambda: render_diagnosis(samples.diagnosis()), WIDE),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import re
 from typing import Any
@@ -11,16 +12,17 @@ import pytest
 
 import report_samples as samples
 from html_page import Page
+from syncline_design.paper.figures import Comparison
+from syncline_design.paper.reproduce import reproduce
 from syncline_design.report import numbers
 from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
-from syncline_design.report.pages import render_diagnosis, render_reproduction
+from syncline_design.report.on_paper import on_paper
+from syncline_design.report.pages import render_diagnosis
+from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.text import visible
 
-CASES = (
-    (samples.reproduction, render_reproduction),
-    (samples.diagnosis, render_diagnosis),
-)
+CASES = ((samples.diagnosis, render_diagnosis),)
 
 
 def with_text(value: Any, text: str) -> Any:
@@ -69,20 +71,34 @@ def test_any_part_may_be_null(make: Any, render: Any) -> None:
 
 
 def test_reproduction_shows_printed_beside_computed() -> None:
-    page = Page(render_reproduction(samples.reproduction()))
+    result = samples.reproduction()
+    page = Page(html(on_paper(result)))
+    assert (page.unbalanced, len(page.scripts)) == ([], 1)
+    for cell in (*result.cells, *result.inputs):
+        assert f"printed {numbers.typeset(cell.printed_text)}" in page.text
     for words in (
-        "519.615 ms", "printed 520 ms", "1 of 2 agree, 1 documented errata", "printed twice",
-        "10 per metre", "96.5\u00a0%", "B \u00b7 A payload with a name",
+        "519.62\u00a0ms", "44 of 46 agree, 2 documented errata", "Printed 1.67 m.", "10 per metre",
+        "B \u00b7 ",
     ):  # fmt: skip
         assert words in page.text
-    assert page.attribute("article", "id") == ["figure-1", "figure-2", "figure-3"]
+    assert page.attribute("article", "id") == [f"figure-{number}" for number in range(1, 8)]
+    assert html(on_paper(result)) == html(on_paper(reproduce(simulate=False)))
+
+
+def test_reproduction_says_how_near_the_simulation_comes() -> None:
+    result = samples.reproduction()
+    points = (Comparison(1e-3, 0.14, 0.14 / 0.965), Comparison(1e-2, 0.5, 0.5))
+    told = dataclasses.replace(result, comparisons={3: points})
+    for text in (Page(html(on_paper(told))).text, console(on_paper(told)).replace(" %", "\u00a0%")):
+        assert "96.5\u00a0% to 100\u00a0% of the Syncline" in text
 
 
 def test_a_failed_reproduction_says_so() -> None:
-    data = samples.reproduction()
-    data["ok"] = False
-    data["cells"][0]["status"] = "differs"
-    assert "Some printed figures differ" in Page(render_reproduction(data)).text
+    result = samples.reproduction()
+    wrong = dataclasses.replace(result.cells[0], status="differs", note="by much")
+    told = on_paper(dataclasses.replace(result, cells=(wrong, *result.cells[1:])))
+    assert "Some printed figures differ" in Page(html(told)).text
+    assert "\u2717 differs, by much" in console(told)
 
 
 def test_simulation_tells_ratio_reason_and_certificate() -> None:

@@ -26,8 +26,9 @@ from syncline_design.paper.reproduce import (
     as_json,
     reproduce,
     tau_crit_cells,
-    text,
 )
+from syncline_design.report.on_paper import on_paper
+from syncline_design.report.render_console import console
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.load import load_builtin
 
@@ -130,9 +131,9 @@ def test_a_wrong_sensor_figure_fails_its_cells_and_its_input(catalog: Catalog) -
     assert not wrong.ok
     assert cell_of(wrong, "sensors", "kongsberg_mru5", "yaw").status == "differs"
     assert cell_of(wrong, "tau_crit_survey", "kongsberg_mru5", "large_sv").status == "differs"
-    said = text(wrong)
-    assert "NOT accounted for" in said
-    assert "DIFFERS, neither agrees nor is a documented erratum" in said
+    said = console(on_paper(wrong))
+    assert "Some printed figures differ" in said
+    assert "\u2717 differs, neither agrees nor is a documented erratum" in said
 
 
 @pytest.mark.parametrize(
@@ -239,13 +240,14 @@ def test_json_has_the_agreed_keys_and_is_plain(result: Reproduction) -> None:
     ]  # fmt: skip
 
 
-def test_text_shows_every_cell_and_counts_at_the_end(result: Reproduction) -> None:
-    lines = text(result).splitlines()
-    assert lines[-1] == "Every printed figure is accounted for."
-    assert lines[-4].startswith("46 of 46 printed tau_crit cells accounted for")
-    assert lines[-3].startswith("4 of 4 ")
-    assert lines[-2].startswith("65 of 65 ")
-    rows = [line.split()[:4] for line in lines]
+def test_text_says_the_counts_first_and_shows_every_cell(result: Reproduction) -> None:
+    lines = console(on_paper(result)).splitlines()
+    assert lines[0].endswith("\u2713 Every printed figure is accounted for")
+    told = [" ".join(line.split()) for line in lines[:8]]
+    assert "\u03c4_crit cells 44 of 46 agree, 2 documented errata" in told
+    assert "Figures in the text 3 of 4 agree, 1 documented errata" in told
+    assert "Platform and sensor figures 63 of 65 agree, 2 documented errata" in told
+    rows = [line.replace("\u00b5", "u").split()[:4] for line in lines]
     for cell in result.cells:
         assert [cell.row, cell.column, *cell.printed_text.split(" ")] in rows
 

@@ -19,7 +19,8 @@ from typer.testing import CliRunner
 from syncline_design.cli.app import app
 from syncline_design.comparison.diff import diff
 from syncline_design.machine.streams import harmless
-from syncline_design.report.on_difference import diff_text
+from syncline_design.report.on_difference import on_difference
+from syncline_design.report.render_console import console
 from syncline_design.spec.load import BadInput
 from syncline_design.verdict.verify import check_file
 
@@ -184,7 +185,7 @@ def test_broken_verdict_files_are_refused_not_stumbled_over(folder: Path) -> Non
         broken.write_text(json.dumps(data))
         for old, new in ((good, broken), (broken, good)):
             try:
-                diff_text(diff(old, new))
+                console(on_difference(diff(old, new)))
             except BadInput:
                 refused += 1
     assert 0 < refused < 600

@@ -190,10 +190,11 @@ def diff(
 ) -> int:
     """Say in words what changed between two specs or verdicts; the exit code is the new one's."""
     from syncline_design.comparison.diff import diff as compare
-    from syncline_design.report.on_difference import DIFF_FORMATS, diff_text, render_diff
+    from syncline_design.report.on_difference import DIFF_FORMATS, on_difference, render_diff
+    from syncline_design.report.render_console import console
     from syncline_design.verdict.verify import CheckSettings
 
     targets = output_targets(output, DIFF_FORMATS, [old, new])
     data = compare(old, new, CheckSettings(seed=seed))
-    emit(diff_text(data), targets, lambda name: render_diff(name, data), quiet=quiet)
+    emit(console(on_difference(data)), targets, lambda name: render_diff(name, data), quiet=quiet)
     return int(data["exit_code"])

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -127,15 +127,14 @@ def reproduce(
     """Compute every table and figure of the paper and compare it with what is printed."""
     from syncline_design.paper import reproduce as paper
     from syncline_design.report.formats import REPRODUCE_FORMATS
+    from syncline_design.report.json_out import json_text
+    from syncline_design.report.on_paper import on_paper
+    from syncline_design.report.render_console import console
+    from syncline_design.report.render_html import html
 
     targets = output_targets(output, REPRODUCE_FORMATS)
-    data = paper.reproduce(seed=seed)
-    emit(paper.text(data), targets, lambda name: _reproduction(name, data), quiet=quiet)
-    return 0 if data.ok else 1
-
-
-def _reproduction(name: str, data: Any) -> str:
-    from syncline_design.report.json_out import json_text
-    from syncline_design.report.pages import render_reproduction
-
-    return json_text(data.to_json()) if name == "json" else render_reproduction(data.to_json())
+    found = paper.reproduce(seed=seed)
+    said = on_paper(found)
+    render = {"json": lambda: json_text(found.to_json()), "html": lambda: html(said)}
+    emit(console(said), targets, lambda name: render[name](), quiet=quiet)
+    return 0 if found.ok else 1

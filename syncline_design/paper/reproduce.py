@@ -15,7 +15,7 @@ from typing import Any, Literal
 from syncline_design import __version__
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
-from syncline_design.model.quantity import Dimension, Quantity, format_quantity, parse_quantity
+from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
 from syncline_design.paper.errata import ERRATA, Key
 from syncline_design.paper.figures import (
     FIGURE_1_SENSOR_ERROR_M,
@@ -218,7 +218,7 @@ def as_json(result: Reproduction) -> dict[str, Any]:
         "version": __version__,
         "seed": result.seed,
         "ok": result.ok,
-        "counts": _counts(result),
+        "counts": counts(result),
         "cells": [_cell_json(cell) for cell in result.cells],
         "inputs": [_cell_json(cell) for cell in result.inputs],
         "errata": [
@@ -258,7 +258,8 @@ def _figure_json(figure: Figure, simulated: tuple[Comparison, ...]) -> dict[str,
     }
 
 
-def _counts(result: Reproduction) -> dict[str, dict[str, int]]:
+def counts(result: Reproduction) -> dict[str, dict[str, int]]:
+    """How many cells of each kind are printed, agree, are errata, differ."""
     groups = {
         "tau_crit": tau_crit_cells(result),
         "text": tuple(cell for cell in result.cells if cell.table == "text"),
@@ -270,73 +271,3 @@ def _counts(result: Reproduction) -> dict[str, dict[str, int]]:
         | {status: sum(cell.status == status for cell in cells) for status in statuses}
         for name, cells in groups.items()
     }
-
-
-def text(result: Reproduction) -> str:
-    """The reproduction as aligned text: every cell, the errata, the counts at the end."""
-    lines: list[str] = []
-    for table in (*TAU_CRIT_TABLES, "text"):
-        lines += [table, *_rows([cell for cell in result.cells if cell.table == table]), ""]
-    disputed = [cell for cell in result.inputs if cell.status != "agrees"]
-    lines += ["inputs that are not as printed", *_rows(disputed), ""]
-    lines += ["figures set beside a simulation", *_comparison_lines(result), ""]
-    lines += ["errata of the paper", *(f"  {e.id}: {e.where}. {e.reason}" for e in ERRATA), ""]
-    words = {"tau_crit": "printed tau_crit cells", "text": "figures of the text"}
-    for name, count in _counts(result).items():
-        lines.append(_count_line(count, words.get(name, "printed inputs")))
-    lines.append(
-        "Every printed figure is accounted for."
-        if result.ok
-        else "Some printed figures are NOT accounted for: see the rows that say differs."
-    )
-    return "\n".join(lines)
-
-
-def _comparison_lines(result: Reproduction) -> Iterator[str]:
-    for number, points in result.comparisons.items():
-        ratios = sorted(point.ratio for point in points)
-        yield (
-            f"  figure {number}: worst simulated error {ratios[0]:.3f} to {ratios[-1]:.3f} of the "
-            f"Syncline over {len(points)} values of tau, {_time_text(points[0].tau_s)} to "
-            f"{_time_text(points[-1].tau_s)}"
-        )
-
-
-def _time_text(value_s: float) -> str:
-    return format_quantity(value_s, Dimension.TIME, digits=2)
-
-
-def _count_line(count: Mapping[str, int], what: str) -> str:
-    accounted = count["agrees"] + count["erratum"]
-    return (
-        f"{accounted} of {count['printed']} {what} accounted for: agree {count['agrees']}, "
-        f"documented errata {count['erratum']}, differ {count['differs']}"
-    )
-
-
-def _rows(cells: list[Cell]) -> list[str]:
-    """Aligned lines of cells: row, column, printed, computed, status, erratum."""
-    header = ("row", "column", "printed", "computed", "status")
-    table = [(c.row, c.column, c.printed_text, _computed_text(c), _status_text(c)) for c in cells]
-    widths = [max(len(line[i]) for line in [header, *table]) for i in range(len(header))]
-    lines = (
-        f"  {a:<{widths[0]}}  {b:<{widths[1]}}  {p:>{widths[2]}}  {q:>{widths[3]}}  {s}"
-        for a, b, p, q, s in [header, *table]
-    )
-    return [line.rstrip() for line in lines]
-
-
-def _computed_text(cell: Cell) -> str:
-    """The computed figure: five digits, or one decimal more than printed if that is more."""
-    decimals = len(cell.printed_text.split(" ")[0].partition(".")[2])
-    five, one_more = f"{cell.computed:.5g}", f"{cell.computed:.{decimals + 1}f}"
-    return f"{max(five, one_more, key=len)} {cell.unit}"
-
-
-def _status_text(cell: Cell) -> str:
-    """Status; an erratum with its id, a difference with what is known of it."""
-    if cell.status == "erratum":
-        return f"erratum ({cell.note.partition(':')[0]})"
-    if cell.status == "differs":
-        return f"DIFFERS, {cell.note}"
-    return f"agrees, {cell.note}" if cell.note else "agrees"

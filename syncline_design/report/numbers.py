@@ -34,7 +34,7 @@ def _shown(value: Any, dimension: Dimension, digits: int, currency: str = "EUR")
     text = format_quantity(number, dimension, digits, currency)
     if dimension is Dimension.MONEY:
         return text.replace(" ", "\N{NO-BREAK SPACE}")
-    return _typeset(text)
+    return typeset(text)
 
 
 def length(value: Any, digits: int = 4) -> str:
@@ -145,10 +145,11 @@ def si_quantity(value: Any, unit: str, digits: int = 4) -> str:
 
 def with_uncertainty(value: float, uncertainty: float | None, unit: str) -> str:
     """An SI estimate and its standard uncertainty in one unit, `87.1 ± 0.3 ms`, typeset."""
-    return _typeset(estimates.figure(value, uncertainty, unit))
+    return typeset(estimates.figure(value, uncertainty, unit))
 
 
-def _typeset(text: str) -> str:
+def typeset(text: str) -> str:
+    """A figure and its unit as pages print them: micro sign, minus, no break before the unit."""
     for plain, printed in _TYPOGRAPHIC:
         text = text.replace(plain, printed)
     return text.replace(" ", "\N{NO-BREAK SPACE}")

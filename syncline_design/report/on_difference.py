@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
-
 from syncline_design.report import numbers
+from syncline_design.report.document import Document, Items, Node, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
-from syncline_design.report.text import markdown_safe, sentence_list, visible
-from syncline_design.report.verdict_words import OUTCOMES, Json, items, part
+from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.verdict_words import STATUSES, Json, items, kind_text, outcome, part
 
 
 def render_diff(name: str, data: Json) -> str:
@@ -19,11 +18,13 @@ def render_diff(name: str, data: Json) -> str:
 
             return json_text(data)
         case "html":
-            from syncline_design.report.difference_page import render_difference
+            from syncline_design.report.render_html import html
 
-            return render_difference(data)
+            return html(on_difference(data))
         case "markdown":
-            return _markdown(data)
+            from syncline_design.report.render_markdown import markdown
+
+            return markdown(on_difference(data))
         case "github":
             level = "notice" if data.get("exit_code") == 0 else "error"
             text = visible(headline(data)).replace("%", "%25")
@@ -32,6 +33,35 @@ def render_diff(name: str, data: Json) -> str:
             return f"::{level} file={place},line=1::{text}\n"
         case _:
             raise ValueError(f"unknown format {name}")
+
+
+def on_difference(data: Json) -> Document:
+    """A difference as a document (data: schema syncline-design/diff/v1)."""
+    lines = tuple(_cause_line(cause) for cause in items(data, "causes"))
+    causes: list[Node] = [*show(_causes(data), silent=True, reach="page")]
+    causes += [Items(lines, reach="text")] if lines else []
+    old, new = (str(part(data, side).get("file") or side) for side in ("old", "new"))
+    return Document(
+        family="Difference",
+        outcome=outcome({"verdict": part(data, "verdict").get("new")}),
+        name=f"{old} \N{RIGHTWARDS ARROW} {new}",
+        sentences=(headline(data),),
+        facts=tuple(_facts(data)),
+        sections=(
+            *section("causes", "What differs", causes),
+            *section("payload", "Payload", show(_payload(data), silent=True)),
+            *section("sums", "Sums", show(_sums(data), silent=True)),
+            *section("margins", "Requirements", show(_margins(data), silent=True)),
+        ),
+    )
+
+
+def _facts(data: Json) -> list[tuple[str, str]]:
+    verdict = part(data, "verdict")
+    return [
+        (label, outcome({"verdict": verdict.get(side)}).word)
+        for label, side in (("Before", "old"), ("Now", "new"))
+    ]
 
 
 def headline(data: Json) -> str:
@@ -95,47 +125,9 @@ def cause_words(cause: Json) -> str:
     return f"{key} removed ({old})" if new is None else f"{key} {old} to {new}"
 
 
-def diff_text(data: Json) -> str:
-    """The difference for the console."""
-    mark = OUTCOMES[str(part(data, "verdict").get("new"))].mark
-    lines = [f"{mark} {visible(headline(data))}", ""]
-    for title, found in _sections(data):
-        rows = list(found)
-        if rows:
-            lines += [title, *(f"  {visible(row)}" for row in rows), ""]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _markdown(data: Json) -> str:
-    mark = OUTCOMES[str(part(data, "verdict").get("new"))].mark
-    lines = [f"## {mark} {markdown_safe(headline(data))}", ""]
-    for title, found in _sections(data):
-        rows = list(found)
-        if rows:
-            lines += [f"**{title}**", "", *(f"- {markdown_safe(row)}" for row in rows), ""]
-    return "\n".join(lines).rstrip() + "\n"
-
-
-def _sections(data: Json) -> list[tuple[str, Iterator[str]]]:
-    return [
-        ("What differs", _causes(data)),
-        ("Payload", _payload(data)),
-        ("Sums", _sums(data)),
-        ("Margins", _margins(data)),
-    ]
-
-
-def _causes(data: Json) -> Iterator[str]:
-    for cause in items(data, "causes"):
-        effect = part(cause, "effect")
-        alone = f"; alone: {effect_words(effect)}" if effect else ""
-        yield cause_words(cause) + alone
-
-
-def _payload(data: Json) -> Iterator[str]:
-    for entry in items(data, "payload"):
-        old, new = pick_words(part(entry, "old")), pick_words(part(entry, "new"))
-        yield f"{entry.get('role')}: {old} to {new}"
+def _cause_line(cause: Json) -> str:
+    effect = part(cause, "effect")
+    return cause_words(cause) + (f"; alone: {effect_words(effect)}" if effect else "")
 
 
 def pick_words(entry: Json) -> str:
@@ -143,16 +135,6 @@ def pick_words(entry: Json) -> str:
         return "nothing"
     name = entry.get("name") or entry.get("sensor")
     return f"{name} ({entry.get('timestamping')}, {entry.get('primitive')})"
-
-
-def _sums(data: Json) -> Iterator[str]:
-    for entry in [*items(data, "sums"), part(data, "error")]:
-        old, new = entry.get("old"), entry.get("new")
-        if old != new or units_differ(entry):
-            before, now = (
-                numbers.in_unit(v, u) for v, u in zip((old, new), units_of(entry), strict=True)
-            )
-            yield f"{sum_name(entry)}: {before} to {now}"
 
 
 def units_of(entry: Json) -> tuple[str, str]:
@@ -173,21 +155,59 @@ def sum_name(entry: Json) -> str:
     return "Syncline error" if name == "error" else name
 
 
-def _margins(data: Json) -> Iterator[str]:
+def _causes(data: Json) -> Table | None:
+    rows = [
+        (cause_words(cause), effect_words(part(cause, "effect")) if cause.get("effect") else "")
+        for cause in items(data, "causes")
+    ]
+    heads = ("Change", "What it does alone")
+    return table("What the two files say differently", heads, rows) if rows else None
+
+
+def _payload(data: Json) -> Table | None:
+    rows = [
+        (str(e.get("role")), pick_words(part(e, "old")), pick_words(part(e, "new")))
+        for e in items(data, "payload")
+    ]
+    heads = ("Role", "Before", "Now")
+    return table("Roles whose sensor or timestamping is another one", heads, rows) if rows else None
+
+
+def _sums(data: Json) -> Table | None:
+    rows = []
+    for entry in [*items(data, "sums"), part(data, "error")]:
+        before, unit = units_of(entry)
+        old, new = numbers.finite(entry.get("old")), numbers.finite(entry.get("new"))
+        change = numbers.finite(entry.get("change"))
+        rows.append((
+            sum_name(entry),
+            Cell(numbers.in_unit(old, before), old),
+            Cell(numbers.in_unit(new, unit), new),
+            Cell(numbers.MISSING if change is None else signed_change(change, unit), change),
+        ))  # fmt: skip
+    return table("Sums, before and now", ("Sum", "Before #", "Now #", "Change #"), rows)
+
+
+def _margins(data: Json) -> Table | None:
+    rows: list[tuple[Cell | str, ...]] = []
     for entry in items(data, "requirements"):
-        old, new = part(entry, "old"), part(entry, "new")
-        if old and new and _comparable(old) == _comparable(new):
-            continue
-        yield f"{entry.get('id')}: {_standing(old)} to {_standing(new)}"
+        cells = [_standing(part(entry, side)) for side in ("old", "new")]
+        rows.append((Cell(str(entry.get("id"))), kind_text(entry), *cells))
+    heads = ("Requirement", "Limits", "Before", "Now")
+    return table("Requirements, before and now", heads, rows) if rows else None
 
 
-def _comparable(row: Json) -> tuple[Any, ...]:
-    return row.get("status"), row.get("value"), row.get("limit"), row.get("unit")
-
-
-def _standing(row: Json) -> str:
-    """`0.29 m of 0.3 m (pass)`."""
-    return f"{value_of_limit(row)} ({row.get('status')})" if row else "not required"
+def _standing(row: Json) -> Cell:
+    """`0.29 m of 0.3 m` with the requirement's status as colour and symbol."""
+    if not row:
+        return Cell("not required")
+    state = STATUSES.get(str(row.get("status")), STATUSES["indeterminate"])
+    return Cell(
+        f"{value_of_limit(row)}, {state.word}",
+        numbers.finite(row.get("value")),
+        state.tone,
+        state.mark,
+    )
 
 
 def value_of_limit(row: Json) -> str:

@@ -2,15 +2,34 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from collections.abc import Iterable
+from typing import Final
 
-from syncline_design.report import numbers, page
+from syncline_design import __version__
+from syncline_design.paper.errata import ERRATA
+from syncline_design.paper.figures import Comparison, Figure
+from syncline_design.paper.reproduce import TAU_CRIT_TABLES, Reproduction, counts
+from syncline_design.paper.reproduce import Cell as Printed
+from syncline_design.report import numbers
+from syncline_design.report.document import (
+    Chart,
+    Document,
+    Facts,
+    Group,
+    Heading,
+    Items,
+    Node,
+    Outcome,
+    Text,
+    section,
+    show,
+    strong,
+)
 from syncline_design.report.figures import SynclineCurve, syncline
 from syncline_design.report.figures_curves import LabelledCurve, letters, synclines
+from syncline_design.report.simulated import span
 from syncline_design.report.svg import InlineFigure
 from syncline_design.report.table import Cell, Table, Tone, table
-from syncline_design.report.text import harmless
-from syncline_design.report.verdict_words import OUTCOMES, Json, items, part
 
 _MARKS: Final[dict[str, tuple[str, Tone]]] = {
     "agrees": ("\u2713", "good"),
@@ -25,6 +44,11 @@ _TITLES: Final = {
     "position": "Sensor noise, position",
     "attitude": "Sensor noise, attitude",
     "ranging": "Sensor noise, ranging",
+}
+_COUNTED: Final = {
+    "tau_crit": "\u03c4_crit cells",
+    "text": "Figures in the text",
+    "inputs": "Platform and sensor figures",
 }
 # What the paper says of its own figures, paraphrased (arXiv:2209.01136v2, sections V and VI).
 _SAYS: Final = {
@@ -42,139 +66,176 @@ _SAYS: Final = {
 }
 
 
-def render_reproduction(data: Json) -> str:
-    """The HTML page of `reproduce` (schema syncline-design/reproduction/v1)."""
-    data = harmless(data)
-    ok = bool(data.get("ok"))
-    result = OUTCOMES["meets" if ok else "fails"]
-    return page.render_page(
-        "reproduction.html.j2",
-        kind="Reproduction of arXiv:2209.01136v2",
-        contents=[
-            ("tables", "Tables"),
-            ("figures", "Figures"),
-            ("errata", "Errata"),
-            ("inputs", "Inputs"),
-        ],
-        outcome=result,
-        word="Every printed figure is accounted for" if ok else "Some printed figures differ",
-        counts=_counts(data),
-        tables=[_matrix(data, "cells", name) for name in _names(data, "cells")],
-        inputs=[_matrix(data, "inputs", name) for name in _names(data, "inputs")],
-        figures=[_figure(entry) for entry in items(data, "figures")],
-        errata=_errata(data),
-        version=str(data.get("version") or ""),
-    )
+def on_paper(result: Reproduction) -> Document:
+    """A reproduction as a document: every table, figure and erratum."""
+    authors = "E. R. Jellum, T. H. Bryne, T. A. Johansen, M. Orlandi\u0107"
+    word = "Every printed figure is accounted for" if result.ok else "Some printed figures differ"
+    return Document(
+        family="Reproduction of arXiv:2209.01136v2",
+        outcome=Outcome("good", "\u2713", word) if result.ok else Outcome("bad", "\u2717", word),
+        name="The Syncline model, reproduced",
+        sentences=(f"{authors}: every table and figure computed from the catalog, beside what the "
+                   "paper prints.",),
+        facts=tuple(_facts(result)),
+        sections=(
+            *section("tables", "Tables", _tables(result)),
+            *section("figures", "Figures", _figures(result)),
+            *section("errata", "Errata of the paper", [_errata()], "Errata"),
+            *section("inputs", "Inputs", _inputs(result)),
+        ),
+        title=f"Reproduction of the Syncline paper: {word}",
+    )  # fmt: skip
 
 
-def _names(data: Json, key: str) -> list[str]:
-    return list(dict.fromkeys(str(entry.get("table")) for entry in items(data, key)))
+def _facts(result: Reproduction) -> Iterable[tuple[str, str]]:
+    for key, count in counts(result).items():
+        text = f"{count['agrees']} of {count['printed']} agree"
+        text += f", {count['erratum']} documented errata" if count["erratum"] else ""
+        text += f", {count['differs']} differ" if count["differs"] else ""
+        yield _COUNTED[key], text
 
 
-def _counts(data: Json) -> list[tuple[str, str]]:
-    labels = {"tau_crit": "\u03c4_crit cells", "text": "Figures in the text",
-              "inputs": "Platform and sensor figures"}  # fmt: skip
-    facts = []
-    for key, count in part(data, "counts").items():
-        agree, erratum = count.get("agrees"), count.get("erratum")
-        text = f"{agree} of {count.get('printed')} agree"
-        text += f", {erratum} documented errata" if erratum else ""
-        text += f", {count['differs']} differ" if count.get("differs") else ""
-        facts.append((labels.get(str(key), str(key)), text))
-    return facts
+def _tables(result: Reproduction) -> list[Node]:
+    legend = Text(
+        ("\u2713 agrees within one unit of the last printed digit, \u2020 documented erratum, "
+         "\u2717 differs."),
+    )  # fmt: skip
+    nodes: list[Node] = [legend]
+    for name in (*TAU_CRIT_TABLES, "text"):
+        cells = [cell for cell in result.cells if cell.table == name]
+        nodes += show(_matrix(name, cells), reach="page")
+        nodes += show(_list(_title(name), cells), reach="text")
+    return nodes
 
 
-def _matrix(data: Json, key: str, name: str) -> Table:
+def _title(name: str) -> str:
+    return _TITLES.get(name, name.replace("_", " "))
+
+
+def _matrix(name: str, cells: list[Printed]) -> Table:
     """One printed table with rows and columns as in the paper, computed figures in the cells."""
-    cells = [entry for entry in items(data, key) if entry.get("table") == name]
-    columns = list(dict.fromkeys(str(entry.get("column")) for entry in cells))
+    columns = list(dict.fromkeys(cell.column for cell in cells))
     rows = []
-    for row in dict.fromkeys(str(entry.get("row")) for entry in cells):
-        found = {str(e.get("column")): e for e in cells if str(e.get("row")) == row}
+    for row in dict.fromkeys(cell.row for cell in cells):
+        found = {cell.column: cell for cell in cells if cell.row == row}
         rows.append((Cell(row, code=True), *(_matrix_cell(found.get(c)) for c in columns)))
-    notes = [
-        f"{entry.get('row')}, {entry.get('column')}: {entry.get('note')}"
-        for entry in cells
-        if entry.get("note")
-    ]
-    title = _TITLES.get(name, name.replace("_", " "))
-    heads = ("", *(f"{column} #" for column in columns))
-    return table(title, ("Row", *heads[1:]), rows, "; ".join(notes))
+    notes = [f"{cell.row}, {cell.column}: {cell.note}" for cell in cells if cell.note]
+    return table(_title(name), ("Row", *(f"{c} #" for c in columns)), rows, "; ".join(notes))
 
 
-def _matrix_cell(entry: Json | None) -> Cell:
-    if entry is None:
+def _matrix_cell(cell: Printed | None) -> Cell:
+    if cell is None:
         return Cell(numbers.MISSING)
-    mark, tone = _MARKS.get(str(entry.get("status")), _MARKS["differs"])
-    computed = numbers.finite(entry.get("computed"))
-    shown = numbers.MISSING if computed is None else f"{computed:.6g}"
-    printed = entry.get("printed_text") or entry.get("printed")
-    unit = str(entry.get("unit") or "").replace("us", "\u00b5s")
-    return Cell(f"{shown} {unit}".strip(), computed, tone, mark, sub=f"printed {printed}")
+    mark, tone = _MARKS[cell.status]
+    sub = f"printed {numbers.typeset(cell.printed_text)}"
+    return Cell(_computed(cell), cell.computed, tone, mark, sub=sub)
 
 
-def _figure(entry: Json) -> dict[str, Any]:
-    number = int(entry.get("number") or 0)
-    tau = tuple(float(value) for value in entry.get("tau_s") or ())
-    curves = [
-        LabelledCurve(
-            str(curve.get("label")),
-            float(curve["sensor_error_m"]),
-            numbers.finite(curve.get("tau_crit_s")),
-            tau,
-            tuple(float(value) for value in curve.get("error_m") or ()),
-        )
-        for curve in items(entry, "curves")
-    ]
-    simulated = [(float(p["tau_s"]), float(p["worst_case_m"])) for p in items(entry, "simulated")]
-    title = f"Figure {number}: {entry.get('title')}"
-    name = f"fig-paper-{number}"
-    drawn = (
-        _annotated(curves[0], items(entry, "curves")[0], name, title)
-        if len(curves) == 1 and not simulated
-        else synclines(curves, simulated, name, title)
+def _computed(cell: Printed) -> str:
+    """The computed figure: five digits, or one decimal more than printed if that is more."""
+    decimals = len(cell.printed_text.split(" ")[0].partition(".")[2])
+    five, one_more = f"{cell.computed:.5g}", f"{cell.computed:.{decimals + 1}f}"
+    return numbers.typeset(f"{max(five, one_more, key=len)} {cell.unit}")
+
+
+def _list(caption: str, cells: list[Printed]) -> Table:
+    """The same row by row, narrow enough for a terminal."""
+    rows: list[list[Cell | str]] = []
+    for cell in cells:
+        mark, tone = _MARKS[cell.status]
+        told = cell.note.partition(":")[0] if cell.status == "erratum" else cell.note
+        said = f"{cell.status}, {told}" if told else cell.status
+        printed = Cell(numbers.typeset(cell.printed_text), cell.printed)
+        computed = Cell(_computed(cell), cell.computed)
+        rows.append([cell.row, cell.column, printed, computed, Cell(said, tone=tone, mark=mark)])
+    return table(caption, ("Row", "Column", "Printed #", "Computed #", "Status"), rows)
+
+
+def _figures(result: Reproduction) -> list[Node]:
+    words = (
+        "The paper's figures are not in its source; what it says of them stands beside the "
+        "computed ones. The upright mark on a curve is its \u03c4_crit."
     )
-    return {
-        "id": f"figure-{number}",
-        "title": title,
-        "svg": page.trusted_svg(drawn.svg),
-        "says": _SAYS.get(number, ""),
-        "note": str(entry.get("note") or ""),
-        "curves": _curve_table(number, curves, items(entry, "curves")),
-        "simulated": _simulated_sentence(items(entry, "simulated")),
-    }
+    articles = [_article(f, result.comparisons.get(f.number, ())) for f in result.figures]
+    beside = tuple(
+        f"Figure {number}: {_simulated(points)} \u03c4 from {numbers.time(points[0].tau_s, 2)} to "
+        f"{numbers.time(points[-1].tau_s, 2)}."
+        for number, points in result.comparisons.items()
+        if points
+    )
+    return [
+        Text(words, reach="page"),
+        *articles,
+        *([Items(beside, reach="text")] if beside else []),
+    ]
 
 
-def _annotated(curve: LabelledCurve, entry: Json, name: str, title: str) -> InlineFigure:
+def _article(figure: Figure, simulated: tuple[Comparison, ...]) -> Node:
+    said: list[Node] = []
+    if figure.number in _SAYS:
+        said.append(Text((strong("The paper says:"), " ", _SAYS[figure.number])))
+    if simulated:
+        said.append(Text((strong("Here:"), " ", _simulated(simulated))))
+    if figure.note:
+        said.append(Text(figure.note, quiet=True))
+    title = f"Figure {figure.number}: {figure.title}"
+    chart = Chart(f"paper-{figure.number}", lambda: _drawn(figure, simulated, title), "")
+    column = Group((*said, *show(_curves(figure))))
+    return Group((Heading(title), Group((chart, column), "split")), "article",
+                 f"figure-{figure.number}", reach="page")  # fmt: skip
+
+
+def _simulated(points: tuple[Comparison, ...]) -> str:
+    ratios = [point.ratio for point in points]
+    ends = span(numbers.percent(min(ratios), 4), numbers.percent(max(ratios), 4))
+    return f"{len(points)} simulated worst cases reach {ends} of the Syncline."
+
+
+def _drawn(figure: Figure, simulated: tuple[Comparison, ...], title: str) -> InlineFigure:
     """A single Syncline with roof, slope and both regions named, as in the paper's figure 1."""
-    rate = numbers.finite(entry.get("sync_rate_mps")) or 0.0
-    shape = SynclineCurve(curve.roof_m, rate, curve.tau_crit_s, None, None, None)
-    return syncline(shape, name, title)
+    name, first = f"fig-paper-{figure.number}", figure.curves[0]
+    if len(figure.curves) == 1 and not simulated:
+        shape = SynclineCurve(
+            first.sensor_error_m, first.sync_rate_mps, first.tau_crit_s, None, None, None
+        )
+        return syncline(shape, name, title)
+    beside = [(p.tau_s, p.worst_case_m) for p in simulated]
+    return synclines(_labelled(figure), beside, name, title)
 
 
-def _curve_table(number: int, curves: list[LabelledCurve], entries: list[Json]) -> Table:
+def _labelled(figure: Figure) -> list[LabelledCurve]:
+    grid = figure.tau_grid_s()
+    return [
+        LabelledCurve(c.label, c.sensor_error_m, c.tau_crit_s, grid, c.error_m(grid))
+        for c in figure.curves
+    ]
+
+
+def _curves(figure: Figure) -> Table:
+    named = letters(_labelled(figure))
     rows = [
         (
-            Cell(f"{letter} \u00b7 {curve.label}" if letter else curve.label),
-            Cell(numbers.length(curve.roof_m), curve.roof_m),
-            Cell(numbers.speed(entry.get("sync_rate_mps")), entry.get("sync_rate_mps")),
+            f"{letter} \u00b7 {curve.label}" if letter else curve.label,
+            Cell(numbers.length(curve.sensor_error_m), curve.sensor_error_m),
+            Cell(numbers.speed(curve.sync_rate_mps), curve.sync_rate_mps),
             Cell(numbers.time_limit(curve.tau_crit_s), curve.tau_crit_s),
         )
-        for curve, entry, letter in zip(curves, entries, letters(curves), strict=True)
+        for curve, letter in zip(figure.curves, named, strict=True)
     ]
     heads = ("System", "Roof #", "Slope #", "\u03c4_crit #")
-    return table(f"Figure {number}, computed", heads, rows)
+    return table(f"Figure {figure.number}, computed", heads, rows)
 
 
-def _simulated_sentence(points: list[Json]) -> str:
-    ratios = [r for p in points if (r := numbers.finite(p.get("ratio_to_syncline"))) is not None]
-    if not ratios:
-        return ""
-    return (
-        f"{len(ratios)} simulated worst cases reach {numbers.percent(min(ratios), 4)} to "
-        f"{numbers.percent(max(ratios), 4)} of the Syncline."
-    )
+def _errata() -> Facts:
+    return Facts(tuple((f"{e.where} ({e.id})", e.reason) for e in ERRATA), "terms")
 
 
-def _errata(data: Json) -> list[tuple[str, str]]:
-    return [(str(e.get("where")), str(e.get("reason"))) for e in items(data, "errata")]
+def _inputs(result: Reproduction) -> list[Node]:
+    lead = "The catalog's platform and sensor figures against the printed ones."
+    nodes: list[Node] = [Text(lead, reach="page")]
+    for name in dict.fromkeys(cell.table for cell in result.inputs):
+        shown = _matrix(name, [cell for cell in result.inputs if cell.table == name])
+        nodes.append(Group(tuple(show(shown)), "fold", summary=shown.caption, reach="page"))
+    disputed = [cell for cell in result.inputs if cell.status != "agrees"]
+    nodes += show(_list("Inputs that are not as printed", disputed), reach="text")
+    return [*nodes, Text(f"Computed by syncline-design {__version__}.", quiet=True)]

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from syncline_design.report.on_diagnosis import render_diagnosis
-from syncline_design.report.on_paper import render_reproduction
 from syncline_design.report.on_verdict import render_verdict
 from syncline_design.report.overview_page import render_verdicts
 
 __all__ = [
     "render_diagnosis",
-    "render_reproduction",
     "render_verdict",
     "render_verdicts",
 ]

@@ -84,6 +84,10 @@ def _lines(nodes: Iterable[Node], indent: str, paint: Paint) -> Iterator[str]:
             case Text():
                 mark = f"{paint(node.mark, node.tone)} " if node.mark else ""
                 yield from _wrapped(_shown(node.words), indent, indent + mark)
+            case Facts(look="terms"):
+                for label, value in node.pairs:
+                    yield from _wrapped(_shown(label), indent)
+                    yield from _wrapped(_shown(value), f"{indent}  ")
             case Facts():
                 yield from _pairs(node.pairs, indent)
             case Items():
