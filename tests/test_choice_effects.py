@@ -19,7 +19,7 @@ from random_problems import random_problem
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.front import front
 from syncline_design.choice.table import Design, Option, Problem
-from syncline_design.spec.load import LoadedSpec, load_text
+from syncline_design.spec.load import Case, load_text
 from syncline_design.verdict.optimise import Optimisation, OptimizeSettings, optimize
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
@@ -64,7 +64,7 @@ def spec(
     effects: list[str],
     speed: str = "2 m/s",
     distance: str = "10 m",
-) -> LoadedSpec:
+) -> Case:
     (folder / "own.yaml").write_text(OWN)
     text = SPEC.format(
         requirements="\n".join(f"  - {one}" for one in requirements),
@@ -82,7 +82,7 @@ def total_m(sensor: str, factor: float, speed: float = 2.0, distance: float = 10
     return math.sqrt(3) * SIGMA[sensor] * factor + angles + 0.01 + rate * 2e-3
 
 
-def found(loaded: LoadedSpec) -> Optimisation:
+def found(loaded: Case) -> Optimisation:
     return optimize(loaded, OptimizeSettings(pareto=True, count=2))
 
 

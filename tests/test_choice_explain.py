@@ -19,7 +19,7 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import with_limits
 from syncline_design.choice.variations import with_methods
 from syncline_design.choice.written import rounded
-from syncline_design.spec.load import LoadedSpec, load, load_text
+from syncline_design.spec.load import Case, load, load_text
 
 ROOT = Path(__file__).parent.parent
 
@@ -52,7 +52,7 @@ sensors:
 """
 
 
-def spec(folder: Path, **changes: str) -> LoadedSpec:
+def spec(folder: Path, **changes: str) -> Case:
     values = {"accuracy": "10 cm", "cost": "60000 EUR", "speed": "20 m/s", "methods": "gpio"}
     (folder / "ins.yaml").write_text(INS)
     path = folder / "spec.yaml"
@@ -60,7 +60,7 @@ def spec(folder: Path, **changes: str) -> LoadedSpec:
     return load(path)
 
 
-def explained(loaded: LoadedSpec) -> Explanation:
+def explained(loaded: Case) -> Explanation:
     problem = build_problem(loaded)
     assert isinstance(choose(problem), Infeasible)
     return explain(loaded, problem)
@@ -90,7 +90,7 @@ def test_each_member_of_the_conflict_left_out_makes_it_feasible(tmp_path: Path) 
     assert not is_feasible(with_limits(problem, limits))
 
 
-def with_mass(folder: Path, mass: str, **changes: str) -> LoadedSpec:
+def with_mass(folder: Path, mass: str, **changes: str) -> Case:
     text = spec(folder, **changes).text.replace("limit: 10 kg", f"limit: {mass}")
     return load_text(text, folder / "spec.yaml")
 

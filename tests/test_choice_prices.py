@@ -29,7 +29,7 @@ from syncline_design.choice.variations import (
     with_platform_figure,
 )
 from syncline_design.model.quantity import Dimension
-from syncline_design.spec.load import LoadedSpec, load, load_text
+from syncline_design.spec.load import Case, load, load_text
 from syncline_design.verdict.recheck import recheck
 from test_choice_explain import spec
 from test_front import one_stage, option
@@ -37,7 +37,7 @@ from test_front import one_stage, option
 ROOT = Path(__file__).parent.parent
 
 
-def chosen(loaded: LoadedSpec) -> tuple[Problem, Design]:
+def chosen(loaded: Case) -> tuple[Problem, Design]:
     problem = build_problem(loaded)
     found = choose(problem)
     assert isinstance(found, Choice)
@@ -172,7 +172,7 @@ timestamping:
 """
 
 
-def tolerant(position: str, attitude: str, accuracy: str) -> LoadedSpec:
+def tolerant(position: str, attitude: str, accuracy: str) -> Case:
     text = TOLERANT.format(position=position, attitude=attitude, accuracy=accuracy)
     return load_text(text, "spec.yaml")
 

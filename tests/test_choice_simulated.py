@@ -19,7 +19,7 @@ from scipy.stats import chi
 from syncline_design.choice.table import Design
 from syncline_design.choice.tolerance import ToleranceVerdict, tolerance_verdict
 from syncline_design.report.optimisations import render_optimize
-from syncline_design.spec.load import LoadedSpec, load_text
+from syncline_design.spec.load import Case, load_text
 from syncline_design.verdict import acceptance, verify
 from syncline_design.verdict import optimise as optimisation
 from syncline_design.verdict.acceptance import Simulations
@@ -42,7 +42,7 @@ SENSORS = {  # sigma [m], cost
 }
 
 
-def spec(folder: Path, requirements: list[dict[str, Any]], **changes: Any) -> LoadedSpec:
+def spec(folder: Path, requirements: list[dict[str, Any]], **changes: Any) -> Case:
     sensors = {
         name: {
             "modality": "position",
@@ -264,7 +264,7 @@ def test_a_waived_simulated_requirement_excludes_nothing(tmp_path: Path) -> None
     assert position(verdict["design"]) == "a"
 
 
-def tolerances_of_c(loaded: LoadedSpec) -> ToleranceVerdict:
+def tolerances_of_c(loaded: Case) -> ToleranceVerdict:
     build = Simulations().problem_of
     problem = build(loaded)
     place = [option.sensor for option in problem.roles[0].options].index("c")

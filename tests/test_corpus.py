@@ -22,7 +22,7 @@ from typing import Any
 import pytest
 
 from syncline_design.spec.edit import yaml_text
-from syncline_design.spec.load import BadInput, LoadedSpec, load, load_text
+from syncline_design.spec.load import BadInput, Case, load, load_text
 from syncline_design.spec.yaml_text import Problem, read
 
 CORPUS = Path(__file__).parent / "corpus"
@@ -61,7 +61,7 @@ def files_under(folder: Path) -> set[str]:
     return {str(p.relative_to(folder)) for p in folder.rglob("*")}
 
 
-def value_at(loaded: LoadedSpec, path: str) -> Any:
+def value_at(loaded: Case, path: str) -> Any:
     value: Any = loaded.spec
     for part in path.split("."):
         value = value[int(part)] if part.isdigit() else getattr(value, part)

@@ -22,7 +22,7 @@ from syncline_design.choice.table import Design, Option, Problem, with_limits
 from syncline_design.model import timing
 from syncline_design.model.budget import budget
 from syncline_design.spec.exact import norm, square_root, tau_bound
-from syncline_design.spec.load import LoadedSpec, load, load_text
+from syncline_design.spec.load import Case, load, load_text
 
 SPECS = sorted((Path(__file__).parent.parent / "specs").glob("*.yaml"))
 
@@ -50,7 +50,7 @@ timestamping: {candidates: [gpio, arrival]}
 """
 
 
-def loaded(text: str) -> LoadedSpec:
+def loaded(text: str) -> Case:
     return load_text(text, "spec.yaml")
 
 

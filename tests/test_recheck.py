@@ -16,7 +16,7 @@ from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.front import front
 from syncline_design.choice.problem import build_problem, selection_of, sole_design
 from syncline_design.choice.ranked import iter_best
-from syncline_design.spec.load import LoadedSpec, load, load_text
+from syncline_design.spec.load import Case, load, load_text
 from syncline_design.spec.selection import ClockSelection, Selection
 from syncline_design.verdict.recheck import IMPLIED_SYNC, NotADesign, recheck
 
@@ -65,7 +65,7 @@ clocks:
 """
 
 
-def chain(folder: Path, model: str, limit: str = "5 m") -> LoadedSpec:
+def chain(folder: Path, model: str, limit: str = "5 m") -> Case:
     (folder / "clocks.yaml").write_text(CLOCKS)
     path = folder / "spec.yaml"
     path.write_text(CHAIN.format(model=model, limit=limit))
@@ -116,7 +116,7 @@ def by_hand(model: str) -> dict[str, Any]:
     }
 
 
-def selected(loaded: LoadedSpec) -> Selection:
+def selected(loaded: Case) -> Selection:
     found = sole_design(build_problem(loaded))
     assert found is not None
     return selection_of(*found)

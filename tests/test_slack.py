@@ -14,7 +14,7 @@ from syncline_design.choice.presentation import slack_table
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Problem
-from syncline_design.spec.load import LoadedSpec, load_text
+from syncline_design.spec.load import Case, load_text
 
 Option = dict[str, Any]
 Tables = list[list[Option]]
@@ -60,7 +60,7 @@ def draw_catalog(rng: random.Random) -> str:
     return "\n".join(lines) + "\n"
 
 
-def loaded_of(folder: Any, text: str, own: str) -> LoadedSpec:
+def loaded_of(folder: Any, text: str, own: str) -> Case:
     (folder / "own.yaml").write_text(own, "utf-8")
     return load_text(text, folder / "spec.yaml")
 
@@ -202,7 +202,7 @@ def test_limit_equal_to_the_total_fails_at_the_value_itself(tmp_path: Any) -> No
             assert row.payload_changes_at == pytest.approx(row.value, rel=1e-5)
 
 
-def with_accuracy(spec: LoadedSpec, limit_m: float) -> Problem:
+def with_accuracy(spec: Case, limit_m: float) -> Problem:
     problem = build_problem(spec)
     return replace(problem, limits=replace(problem.limits, accuracy_m=limit_m))
 

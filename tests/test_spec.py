@@ -12,7 +12,7 @@ import pytest
 from pydantic import ValidationError
 
 from syncline_design.model.quantity import UNITS, Dimension, Quantity
-from syncline_design.spec.load import BadInput, LoadedSpec, load, load_text
+from syncline_design.spec.load import BadInput, Case, load, load_text
 from syncline_design.spec.resolve import candidate_sensors, platform_of, sensor_id, timestamping_of
 from syncline_design.spec.spec import (
     EffectChoice,
@@ -40,7 +40,7 @@ timestamping: {candidates: [hardware, gpio]}
 """
 
 
-def loaded(text: str, folder: Path | None = None) -> LoadedSpec:
+def loaded(text: str, folder: Path | None = None) -> Case:
     return load_text(text, (folder or Path("nowhere")) / "spec.yaml")
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from syncline_design.machine.result_files import OutputError, write_file
 from syncline_design.spec.edit import PinnedRole, pinned_spec_text, with_effects_text, write_spec
-from syncline_design.spec.load import BadInput, LoadedSpec, load, load_text
+from syncline_design.spec.load import BadInput, Case, load, load_text
 from syncline_design.spec.resolve import candidate_sensors, timestamping_of, usable_primitives
 from syncline_design.spec.spec import ROLE_NAMES, EffectChoice, InlineTimestamping
 from syncline_design.spec.yaml_text import parse
@@ -26,7 +26,7 @@ EFFECT = EffectChoice(
 )
 
 
-def first_options(spec: LoadedSpec) -> list[PinnedRole]:
+def first_options(spec: Case) -> list[PinnedRole]:
     """The first usable option of every role."""
     pins = []
     for index, stage in enumerate(spec.spec.stages):

@@ -25,7 +25,7 @@ from syncline_design.spec.catalog import (
     TimestampError,
     UniformError,
 )
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import candidate_sensors, platform_of
 from syncline_design.spec.spec import InlineTimestamping, StageChoice
 
@@ -33,7 +33,7 @@ Vector = tuple[float, float, float]
 
 
 def system_of(
-    loaded: LoadedSpec, problem: Problem, design: Design, effects: tuple[EffectEntry, ...] = ()
+    case: Case, problem: Problem, design: Design, effects: tuple[EffectEntry, ...] = ()
 ) -> System:
     """The system that a design of this problem is."""
     chosen = {
@@ -41,17 +41,17 @@ def system_of(
         for table, place in zip(problem.roles, design.options, strict=True)
     }
     stages = tuple(
-        _stage(loaded, index, {role: chosen.get((index, role)) for role in ROLES})
-        for index in range(len(loaded.spec.stages))
+        _stage(case, index, {role: chosen.get((index, role)) for role in ROLES})
+        for index in range(len(case.spec.stages))
     )
     offsets = []
     for vehicle, place in zip(problem.vehicles, design.clocks, strict=True):
         identity = vehicle.clocks[place].id
         if identity is not None:
-            error = clock_error(loaded.catalog.clocks[identity])
+            error = clock_error(case.catalog.clocks[identity])
             offsets.append((host_timeline(vehicle.name), error))
-    factor = float(loaded.spec.coverage_factor)
-    return System(stages, factor, tuple(offsets), effects, loaded.spec.horizon.horizon())
+    factor = float(case.spec.coverage_factor)
+    return System(stages, factor, tuple(offsets), effects, case.spec.horizon.horizon())
 
 
 def host_timeline(vehicle: str) -> str:
@@ -86,14 +86,14 @@ def clock_error(entry: ClockEntry) -> timing.TimingError:
     return replace(offset, drifted_s=abs(float(entry.drift)) * float(entry.holdover))
 
 
-def _stage(loaded: LoadedSpec, index: int, chosen: dict[RoleName, Option | None]) -> Stage:
-    choice = loaded.spec.stages[index]
-    entry = platform_of(choice.platform, loaded.catalog)
+def _stage(case: Case, index: int, chosen: dict[RoleName, Option | None]) -> Stage:
+    choice = case.spec.stages[index]
+    entry = platform_of(choice.platform, case.catalog)
     platform = Platform(
         float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline)
     )
     sensors = {
-        role: _sensor(loaded, choice, role, option) if option is not None else None
+        role: _sensor(case, choice, role, option) if option is not None else None
         for role, option in chosen.items()
     }
     transponder = choice.position.lever_arm if index > 0 and choice.position else None
@@ -112,16 +112,16 @@ def _vector(arm: Sequence[float] | None) -> Vector | None:
     return None if arm is None else (float(arm[0]), float(arm[1]), float(arm[2]))
 
 
-def _sensor(loaded: LoadedSpec, stage: StageChoice, role: RoleName, option: Option) -> Sensor:
+def _sensor(case: Case, stage: StageChoice, role: RoleName, option: Option) -> Sensor:
     choice = stage.role(role)
     assert choice is not None
-    candidates = dict(candidate_sensors(loaded.spec, stage, role, loaded.catalog))
+    candidates = dict(candidate_sensors(case.spec, stage, role, case.catalog))
     entry = candidates[option.sensor]
     own = choice.timestamping
     error = (
         own.error
         if isinstance(own, InlineTimestamping)
-        else loaded.catalog.timestamping[option.method].error
+        else case.catalog.timestamping[option.method].error
     )
     return Sensor(
         id=option.sensor,

@@ -20,23 +20,23 @@ from syncline_design.effects.acting import known_of
 from syncline_design.model.budget import Budget, budget
 from syncline_design.model.system import EffectEntry, RoleName, Sensor, System
 from syncline_design.spec.known_effects import demand_budget, effect_entries
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 
 Key = tuple[str, RoleName, str]  # stage, role, sensor
 Term = tuple[str, str, float]  # name, stage, value [m]
 
 
-def problem_of(loaded: LoadedSpec) -> Problem:
+def problem_of(case: Case) -> Problem:
     """The design problem of a spec, its known effects taken for its own figures.
 
     A design's sums in these tables are those of its verification.
     """
-    bare = build_problem(loaded)
-    effects = effect_entries(loaded)
+    bare = build_problem(case)
+    effects = effect_entries(case)
     if not effects:
         return bare
-    demand_budget(loaded)
-    systems = _Systems(loaded, with_everything(bare), effects)
+    demand_budget(case)
+    systems = _Systems(case, with_everything(bare), effects)
     charges = _Charges()
     for entry in effects:
         charges.add(systems, entry)
@@ -49,12 +49,12 @@ def problem_of(loaded: LoadedSpec) -> Problem:
         )
         for key in systems
     }
-    return build_problem(loaded, systems.usual_tau_s(), charges.fixed, by_sensor)
+    return build_problem(case, systems.usual_tau_s(), charges.fixed, by_sensor)
 
 
-def design_budget(loaded: LoadedSpec, problem: Problem, design: Design) -> Budget:
+def design_budget(case: Case, problem: Problem, design: Design) -> Budget:
     """The budget of one design with the spec's known effects, as its verification sees it."""
-    system = system_of(loaded, problem, design, effect_entries(loaded))
+    system = system_of(case, problem, design, effect_entries(case))
     known = known_of(system)
     return budget(system, known.extra_tau_s, known.systematic)
 
@@ -62,10 +62,8 @@ def design_budget(loaded: LoadedSpec, problem: Problem, design: Design) -> Budge
 class _Systems:
     """Systems that differ from a first one in a single sensor."""
 
-    def __init__(
-        self, loaded: LoadedSpec, problem: Problem, effects: tuple[EffectEntry, ...]
-    ) -> None:
-        self.loaded, self.problem, self.effects = loaded, problem, effects
+    def __init__(self, case: Case, problem: Problem, effects: tuple[EffectEntry, ...]) -> None:
+        self.case, self.problem, self.effects = case, problem, effects
         filled = not is_empty(problem)
         self.first = Design((0,) * len(problem.roles), (0,) * len(problem.vehicles))
         self.places = dict(self._places()) if filled else {}
@@ -91,7 +89,7 @@ class _Systems:
                 role, place = self.places[key]
                 options[role] = place
             design = replace(self.first, options=tuple(options))
-            self.built[key] = system_of(self.loaded, self.problem, design, self.effects)
+            self.built[key] = system_of(self.case, self.problem, design, self.effects)
         return self.built[key]
 
     def usual_tau_s(self) -> dict[tuple[str, RoleName], float]:

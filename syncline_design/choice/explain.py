@@ -17,7 +17,7 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import Problem, RoleTable, VehicleTable
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import in_force
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 
 Found = TypeVar("Found")
 
@@ -131,7 +131,7 @@ def _members_json(members: Sequence[ConflictMember]) -> list[dict[str, Any]]:
     return [{"id": m.id, "kind": m.kind, "line": m.line} for m in members]
 
 
-def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) -> Explanation:
+def explain(case: Case, problem: Problem, build: Build = build_problem) -> Explanation:
     """Reasons and remedies for a problem that has no design.
 
     build: how a changed spec becomes a problem (with the known effects and simulated requirements,
@@ -141,21 +141,21 @@ def explain(loaded: LoadedSpec, problem: Problem, build: Build = build_problem) 
     gaps += tuple(_clock_gap(vehicle) for vehicle in problem.vehicles if not vehicle.clocks)
     conflict, minimal = _conflict(problem)
     further = _further(problem, conflict)
-    moves = _proven(lambda: requirement_fixes(loaded, problem, build))
+    moves = _proven(lambda: requirement_fixes(case, problem, build))
     fixes = [fix for together in moves if len(together) == 1 for fix in together]
     joint = tuple(together for together in moves if len(together) > 1)
     if not moves:
-        joint = joint_fixes(loaded, problem, build)
-    fixes += _proven(lambda: method_fixes(loaded, build, problem))
-    fixes += _proven(lambda: platform_fixes(loaded, build))
+        joint = joint_fixes(case, problem, build)
+    fixes += _proven(lambda: method_fixes(case, build, problem))
+    fixes += _proven(lambda: platform_fixes(case, build))
     return Explanation(
         gaps,
-        tuple(_member(loaded, part) for part in conflict),
+        tuple(_member(case, part) for part in conflict),
         minimal,
         tuple(fixes),
-        tuple(tuple(_member(loaded, part) for part in parts) for parts in further),
+        tuple(tuple(_member(case, part) for part in parts) for parts in further),
         joint,
-        _each_suffices(loaded, problem, build, conflict),
+        _each_suffices(case, problem, build, conflict),
         cut_short=in_force().is_over,  # once over, every search after it ended without an answer
     )
 
@@ -168,9 +168,7 @@ def _proven(source: Callable[[], Iterable[Found]]) -> list[Found]:
     return found
 
 
-def _each_suffices(
-    loaded: LoadedSpec, problem: Problem, build: Build, conflict: Sequence[Part]
-) -> bool:
+def _each_suffices(case: Case, problem: Problem, build: Build, conflict: Sequence[Part]) -> bool:
     """Whether the spec has a design without any one requirement of the conflict, as it would be
     written: another requirement of the kind stays, and without a sync requirement 1.0 is implied.
     """
@@ -178,8 +176,8 @@ def _each_suffices(
     def helps(part: Part) -> bool:
         if part.id is None:
             return is_feasible(lifted(problem, [part]))
-        rest = [one for one in loaded.spec.requirements if one.id != part.id]
-        return is_feasible(build(with_requirements(loaded, rest)))
+        rest = [one for one in case.spec.requirements if one.id != part.id]
+        return is_feasible(build(with_requirements(case, rest)))
 
     try:
         return bool(conflict) and all(map(helps, conflict))
@@ -255,10 +253,10 @@ def _conflict(problem: Problem) -> tuple[tuple[Part, ...], bool]:
     return tuple(active), minimal
 
 
-def _member(loaded: LoadedSpec, part: Part) -> ConflictMember:
+def _member(case: Case, part: Part) -> ConflictMember:
     line = None
-    for index, requirement in enumerate(loaded.spec.requirements):
+    for index, requirement in enumerate(case.spec.requirements):
         if requirement.id == part.id:
-            place = loaded.positions.get(("requirements", index))
+            place = case.positions.get(("requirements", index))
             line = place[0] if place else None
     return ConflictMember(part.kind, part.id, line)

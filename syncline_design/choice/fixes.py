@@ -17,7 +17,7 @@ from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build, with_methods
 from syncline_design.choice.written import in_unit_of, money, plain
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import candidate_sensors, timestamping_of, usable_primitives
 from syncline_design.spec.spec import InlineTimestamping, Requirement
 
@@ -73,9 +73,7 @@ class Fix:
 Move = tuple[Requirement | None, float, Quantity]  # requirement (None: implied), before, after
 
 
-def requirement_fixes(
-    loaded: LoadedSpec, problem: Problem, build: Build
-) -> Iterator[tuple[Fix, ...]]:
+def requirement_fixes(case: Case, problem: Problem, build: Build) -> Iterator[tuple[Fix, ...]]:
     """For each requirement alone the least relaxation that helps.
 
     Several fixes at once where two requirements of a kind stand in the way.
@@ -83,7 +81,7 @@ def requirement_fixes(
     for part in parts_of(problem):
         try:
             value = least(problem, part)
-            found = value and proven(loaded, problem, build, {part: value})
+            found = value and proven(case, problem, build, {part: value})
         except NoVerdict:  # a remedy that cannot be proven is not offered
             continue
         if found:
@@ -91,27 +89,27 @@ def requirement_fixes(
 
 
 def proven(
-    loaded: LoadedSpec, problem: Problem, build: Build, values: Mapping[Part, Fraction]
+    case: Case, problem: Problem, build: Build, values: Mapping[Part, Fraction]
 ) -> tuple[Fix, ...] | None:
     """The changes that bring limits to these values, if the spec so written has a design."""
     for attempt in range(TRIES):
         moves = [
             move
             for part, value in values.items()
-            for move in _moves(loaded, problem, part, _widened(part, value, attempt))
+            for move in _moves(case, problem, part, _widened(part, value, attempt))
         ]
-        if moves and is_feasible(build(with_moves(loaded, moves))):
-            return tuple(_fix(loaded, move) for move in moves)
+        if moves and is_feasible(build(with_moves(case, moves))):
+            return tuple(_fix(case, move) for move in moves)
         if not any(part.kind == SIMULATED for part in values):
             return None
     return None
 
 
-def as_written(loaded: LoadedSpec, problem: Problem, part: Part, value: Fraction) -> Fraction:
+def as_written(case: Case, problem: Problem, part: Part, value: Fraction) -> Fraction:
     """The limit that a value becomes once it is written with so many figures."""
-    afters = [after for _, _, after in _moves(loaded, problem, part, value)]
+    afters = [after for _, _, after in _moves(case, problem, part, value)]
     if part.kind == "cost":
-        return min((loaded.spec.in_currency(after) for after in afters), default=value)
+        return min((case.spec.in_currency(after) for after in afters), default=value)
     return min((after.exact for after in afters), default=value)
 
 
@@ -119,58 +117,58 @@ def _widened(part: Part, value: Fraction, attempt: int) -> Fraction:
     return value * (1 + attempt * WIDENING) if part.kind == SIMULATED else value
 
 
-def _moves(loaded: LoadedSpec, problem: Problem, part: Part, value: Fraction) -> Iterator[Move]:
+def _moves(case: Case, problem: Problem, part: Part, value: Fraction) -> Iterator[Move]:
     """Requirements whose limit has to move for the kind's to reach a value, and where to."""
     if part.kind == "sync" and part.id is None:
         yield None, problem.limits.sync, plain(value, up=True)
         return
-    for requirement in loaded.spec.requirements:
+    for requirement in case.spec.requirements:
         if requirement.kind != part.kind or (part.kind == SIMULATED and requirement.id != part.id):
             continue
-        before = _limit(loaded, requirement)
+        before = _limit(case, requirement)
         if before < value:
-            yield requirement, float(before), _rounded_up(loaded, requirement, value)
+            yield requirement, float(before), _rounded_up(case, requirement, value)
 
 
-def _limit(loaded: LoadedSpec, requirement: Requirement) -> Fraction:
+def _limit(case: Case, requirement: Requirement) -> Fraction:
     """A requirement's limit in SI or the spec's currency."""
     limit = requirement.limit
     if requirement.kind == "cost" and isinstance(limit, Quantity):
-        return loaded.spec.in_currency(limit)
+        return case.spec.in_currency(limit)
     return limit.exact if isinstance(limit, Quantity) else Fraction(limit)
 
 
-def _rounded_up(loaded: LoadedSpec, requirement: Requirement, value: Fraction) -> Quantity:
+def _rounded_up(case: Case, requirement: Requirement, value: Fraction) -> Quantity:
     limit = requirement.limit
     if requirement.kind == "sync":
         return plain(value, up=True)
     if requirement.kind == "cost":
-        currency = getattr(limit, "currency", None) or loaded.spec.currency
-        rate = loaded.spec.in_currency(Quantity(Fraction(1), "", None, currency))
+        currency = getattr(limit, "currency", None) or case.spec.currency
+        rate = case.spec.in_currency(Quantity(Fraction(1), "", None, currency))
         return money(value, rate, currency)
     return in_unit_of(getattr(limit, "text", ""), value, DIMENSIONS[requirement.kind], up=True)
 
 
-def with_moves(loaded: LoadedSpec, moves: Sequence[Move]) -> LoadedSpec:
+def with_moves(case: Case, moves: Sequence[Move]) -> Case:
     """The spec with other limits."""
     limits = {requirement.id: after for requirement, _, after in moves if requirement is not None}
     requirements = [
         one.model_copy(update={"limit": limits[one.id]}) if one.id in limits else one
-        for one in loaded.spec.requirements
+        for one in case.spec.requirements
     ]
     for requirement, _, after in moves:
         if requirement is None:
             requirements.append(Requirement.model_construct(id=IMPLIED, kind="sync", limit=after))
-    return with_requirements(loaded, requirements)
+    return with_requirements(case, requirements)
 
 
-def with_requirements(loaded: LoadedSpec, requirements: Sequence[Requirement]) -> LoadedSpec:
+def with_requirements(case: Case, requirements: Sequence[Requirement]) -> Case:
     """The spec with other requirements."""
-    spec = loaded.spec.model_copy(update={"requirements": tuple(requirements)})
-    return replace(loaded, spec=spec)
+    spec = case.spec.model_copy(update={"requirements": tuple(requirements)})
+    return replace(case, spec=spec)
 
 
-def _fix(loaded: LoadedSpec, move: Move) -> Fix:
+def _fix(case: Case, move: Move) -> Fix:
     requirement, before, after = move
     if requirement is None:
         text = (
@@ -180,40 +178,40 @@ def _fix(loaded: LoadedSpec, move: Move) -> Fix:
         return Fix("sync", None, before, float(after), text, unit="1")
     name, kind = requirement.id, requirement.kind
     written = getattr(requirement.limit, "text", f"{before:.6g}")
-    unit = UNITS_OF.get(kind, loaded.spec.currency)
+    unit = UNITS_OF.get(kind, case.spec.currency)
     if kind != "cost":
         text = f"{name} from {written} to {after.text}"
         return Fix(kind, name, before, float(after), text, unit=unit)
     exact = requirement.limit.exact if isinstance(requirement.limit, Quantity) else Fraction(0)
-    currency = after.currency or loaded.spec.currency
+    currency = after.currency or case.spec.currency
     shown = [
         format_quantity(float(v), Dimension.MONEY, currency=currency)
         for v in (after.exact - exact, exact, after.exact)
     ]
     text = f"{name} by {shown[0]}, from {shown[1]} to {shown[2]}"
-    return Fix(kind, name, before, float(loaded.spec.in_currency(after)), text, unit=unit)
+    return Fix(kind, name, before, float(case.spec.in_currency(after)), text, unit=unit)
 
 
-def method_fixes(loaded: LoadedSpec, build: Build, problem: Problem) -> Iterator[Fix]:
+def method_fixes(case: Case, build: Build, problem: Problem) -> Iterator[Fix]:
     """Timestamping methods of the catalogs that, opened to a role without options, do help."""
     for table in problem.roles:
         if table.options:
             continue
-        stage = loaded.spec.stages[table.stage]
+        stage = case.spec.stages[table.stage]
         choice = stage.role(table.role)
         assert choice is not None
-        now = timestamping_of(loaded.spec, stage, choice, loaded.catalog)
+        now = timestamping_of(case.spec, stage, choice, case.catalog)
         if isinstance(now, InlineTimestamping):
             continue
         have = tuple(name for name, _ in now)
-        sensors = candidate_sensors(loaded.spec, stage, table.role, loaded.catalog)
+        sensors = candidate_sensors(case.spec, stage, table.role, case.catalog)
         found: list[tuple[float, str]] = []
-        for name, method in loaded.catalog.timestamping.items():
+        for name, method in case.catalog.timestamping.items():
             if name in have or not any(
                 usable_primitives(s, method, choice.primitive) for _, s in sensors
             ):
                 continue
-            best = solve(build(with_methods(loaded, table.stage, table.role, (*have, name))))
+            best = solve(build(with_methods(case, table.stage, table.role, (*have, name))))
             if best is not None:
                 found.append((float(best.cost or 0), name))
         for _, name in sorted(found)[:MOST_METHODS]:

@@ -11,12 +11,12 @@ from syncline_design.choice.outcome import NoVerdict
 from syncline_design.choice.parts import Part, is_feasible, least, lifted, moved, parts_of
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 
 MOST = 3
 
 
-def joint_fixes(loaded: LoadedSpec, problem: Problem, build: Build) -> tuple[tuple[Fix, ...], ...]:
+def joint_fixes(case: Case, problem: Problem, build: Build) -> tuple[tuple[Fix, ...], ...]:
     """The smallest sets of requirements that have to move, and by how little.
 
     One after the other each is moved to the least limit that the rest allow while those after it
@@ -27,8 +27,8 @@ def joint_fixes(loaded: LoadedSpec, problem: Problem, build: Build) -> tuple[tup
     for together in _sets(problem):
         for order in itertools.permutations(together):
             try:
-                values = _least_in_turn(loaded, problem, order)
-                fixes = values and proven(loaded, problem, build, values)
+                values = _least_in_turn(case, problem, order)
+                fixes = values and proven(case, problem, build, values)
             except NoVerdict:  # what cannot be proven is not offered
                 continue
             if fixes and {f.text for f in fixes} not in [{f.text for f in one} for one in found]:
@@ -56,7 +56,7 @@ def _sets(problem: Problem) -> Iterator[tuple[Part, ...]]:
 
 
 def _least_in_turn(
-    loaded: LoadedSpec, problem: Problem, order: tuple[Part, ...]
+    case: Case, problem: Problem, order: tuple[Part, ...]
 ) -> dict[Part, Fraction] | None:
     values: dict[Part, Fraction] = {}
     for place, part in enumerate(order):
@@ -64,7 +64,7 @@ def _least_in_turn(
         value = least(eased, part)
         if value is None:
             return None
-        values[part] = as_written(loaded, problem, part, value)
+        values[part] = as_written(case, problem, part, value)
     return values
 
 

@@ -27,7 +27,7 @@ from syncline_design.choice.variations import (
 )
 from syncline_design.choice.written import DIGITS, in_unit_of
 from syncline_design.model.quantity import Dimension, Quantity
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 
 LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
 LARGEST_SHARE = 10.0  # nor a distance raised above this multiple
@@ -40,17 +40,17 @@ Named = tuple[int, str, str, str]
 SHARES = (0.98, 0.95, 0.9, 0.8, 0.7, 0.5, 0.3, 0.2, 0.1, 0.03, 0.01, LEAST_SHARE)
 
 
-def platform_fixes(loaded: LoadedSpec, build: Build) -> Iterator[Fix]:
+def platform_fixes(case: Case, build: Build) -> Iterator[Fix]:
     """The least change of each figure of each stage that helps, a distance to either side."""
-    for index, stage in enumerate(loaded.spec.stages):
+    for index, stage in enumerate(case.spec.stages):
         for figure, (words, dimension) in PLATFORM_FIGURES.items():
-            before = platform_figure(loaded, index, figure)
+            before = platform_figure(case, index, figure)
             if not before > 0.0:
                 continue
             written = getattr(before, "text", "")
             ends = (LEAST_SHARE, LARGEST_SHARE) if figure == "distance" else (LEAST_SHARE,)
             for end in ends:
-                asked = _Asked(loaded, build, index, figure, dimension, float(before), written)
+                asked = _Asked(case, build, index, figure, dimension, float(before), written)
                 after = asked.nearest(end * float(before))
                 if after is not None:
                     text = f"{words} of {stage.name} from {_shown(before, dimension)}"
@@ -69,7 +69,7 @@ def _shown(value: float, dimension: Dimension) -> str:
 class _Asked:
     """One figure of one stage, and what is known of its values."""
 
-    loaded: LoadedSpec
+    case: Case
     build: Build
     stage: int
     figure: PlatformFigure
@@ -104,8 +104,8 @@ class _Asked:
             self.problems[value] = self.build(self._changed(quantity(value, self.dimension)))
         return self.problems[value]
 
-    def _changed(self, value: Quantity) -> LoadedSpec:
-        return with_platform_figure(self.loaded, self.stage, self.figure, value)
+    def _changed(self, value: Quantity) -> Case:
+        return with_platform_figure(self.case, self.stage, self.figure, value)
 
     def _holds(self, value: float) -> bool:
         return is_feasible(self._problem(value))

@@ -50,7 +50,7 @@ from syncline_design.spec.catalog import (
 )
 from syncline_design.spec.exact import fraction_of, norm, tau_bound
 from syncline_design.spec.gnss import Barred, barred_clock, barred_method, barred_sensor
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import (
     Methods,
     candidate_sensors,
@@ -108,7 +108,7 @@ NO_SENSOR: BySensor = {}
 
 
 def build_problem(
-    loaded: LoadedSpec,
+    case: Case,
     extra_tau_s: Mapping[tuple[str, RoleName], float] = NO_EXTRA,
     systematic: Sequence[tuple[str, str, float]] = (),
     by_sensor: BySensor = NO_SENSOR,
@@ -119,26 +119,26 @@ def build_problem(
     systematic errors as (term, stage name, value [m]), the same for every design; by_sensor: what
     they add where it hangs on the sensor (its tau in place of extra_tau_s).
     """
-    spec = loaded.spec
-    motions = [_motion(loaded, stage) for stage in spec.stages]
-    limits = _limits(loaded)
+    spec = case.spec
+    motions = [_motion(case, stage) for stage in spec.stages]
+    limits = _limits(case)
     vehicles = list(dict.fromkeys(stage.vehicle_name for stage in spec.stages))
     tables = tuple(
         _role_table(
-            loaded, index, role, motions[index], limits.sync, vehicles, extra_tau_s, by_sensor
+            case, index, role, motions[index], limits.sync, vehicles, extra_tau_s, by_sensor
         )
         for index, stage in enumerate(spec.stages)
         for role in ROLES
         if not _is_empty(stage.role(role))
     )
-    vehicle_tables = tuple(_vehicle(loaded, name) for name in vehicles)
+    vehicle_tables = tuple(_vehicle(case, name) for name in vehicles)
     rate = sum((motion.rate for motion in motions), Fraction(0))
     fixed = sum((Fraction(value) for _, _, value in systematic), Fraction(0))
     return Problem(
         roles=tables,
         pairs=_pairs(tables, motions),
         vehicles=vehicle_tables,
-        infrastructure=tuple(_infrastructure(loaded, _required(tables, vehicle_tables))),
+        infrastructure=tuple(_infrastructure(case, _required(tables, vehicle_tables))),
         sync_rate_mps=float(rate),
         fixed_error_m=float(fixed),
         limits=limits,
@@ -199,17 +199,17 @@ def _is_empty(choice: RoleChoice | None) -> bool:
     return choice is None or choice.is_empty
 
 
-def _motion(loaded: LoadedSpec, stage: StageChoice) -> _Motion:
-    platform: PlatformEntry = platform_of(stage.platform, loaded.catalog)
+def _motion(case: Case, stage: StageChoice) -> _Motion:
+    platform: PlatformEntry = platform_of(stage.platform, case.catalog)
     ranges = not _is_empty(stage.ranging)
     distance = fraction_of(platform.distance) if ranges else Fraction(0)
     speed = fraction_of(platform.v_max)
     return _Motion(speed, distance, distance * fraction_of(platform.omega_max), ranges)
 
 
-def _limits(loaded: LoadedSpec) -> Limits:
+def _limits(case: Case) -> Limits:
     """The tightest limit of each kind; without a sync requirement 1.0 is implied."""
-    spec = loaded.spec
+    spec = case.spec
     tightest: dict[str, tuple[Fraction, str]] = {}
     for requirement in spec.requirements:
         limit = requirement.limit
@@ -237,7 +237,7 @@ def _sensor_error(sensor: SensorEntry, role: RoleName, motion: _Motion) -> Fract
 
 
 def _role_table(
-    loaded: LoadedSpec,
+    case: Case,
     index: int,
     role: Role,
     motion: _Motion,
@@ -246,12 +246,12 @@ def _role_table(
     extra_tau_s: Mapping[tuple[str, RoleName], float],
     by_sensor: BySensor,
 ) -> RoleTable:
-    stage = loaded.spec.stages[index]
+    stage = case.spec.stages[index]
     usual = SensorEffects(extra_tau_s.get((stage.name, role), 0.0))
     effects = _EffectsOf(stage.name, role, usual, by_sensor)
     options: list[Option] = []
     excluded: list[Excluded] = []
-    for one in unhurried(_candidates(loaded, stage, role, motion, effects)):
+    for one in unhurried(_candidates(case, stage, role, motion, effects)):
         ratio = sync_ratio(one) if isinstance(one, Option) else 0.0
         if isinstance(one, Excluded):
             excluded.append(one)
@@ -278,15 +278,15 @@ class _EffectsOf:
 
 
 def _candidates(
-    loaded: LoadedSpec, stage: StageChoice, role: Role, motion: _Motion, effects: _EffectsOf
+    case: Case, stage: StageChoice, role: Role, motion: _Motion, effects: _EffectsOf
 ) -> Iterator[Option | Excluded]:
     """Every (sensor, primitive, method) that the spec lets a role take, or why it cannot."""
-    spec, catalog = loaded.spec, loaded.catalog
+    spec, catalog = case.spec, case.catalog
     choice = stage.role(role)
     assert choice is not None
     methods = timestamping_of(spec, stage, choice, catalog)
     for name, sensor in candidate_sensors(spec, stage, role, catalog):
-        figures = _Figures(loaded, role, motion, effects.of(name), name, sensor)
+        figures = _Figures(case, role, motion, effects.of(name), name, sensor)
         if isinstance(methods, InlineTimestamping):
             found: Iterator[Option | Excluded] = _given_in_place(figures, choice, methods)
         else:
@@ -307,7 +307,7 @@ def _given_in_place(
         reason = f"{choice.primitive} is asked for; {name} has {offers}"
         yield Excluded(name, "", INLINE, reason, figure=offers, limit=choice.primitive)
         return
-    tau = tau_bound(stamping.error, figures.loaded.spec.coverage_factor)
+    tau = tau_bound(stamping.error, figures.case.spec.coverage_factor)
     yield figures.option(choice.primitive or INLINE, INLINE, tau, stamping.timeline, None)
 
 
@@ -315,7 +315,7 @@ def _stamped(
     figures: _Figures, stage: StageChoice, choice: RoleChoice, methods: Methods
 ) -> Iterator[Option | Excluded]:
     """Every way of stamping one sensor, or why it is none."""
-    spec, catalog = figures.loaded.spec, figures.loaded.catalog
+    spec, catalog = figures.case.spec, figures.case.catalog
     name, sensor = figures.name, figures.sensor
     for method_id, method in methods:
         primitives = usable_primitives(sensor, method, choice.primitive)
@@ -355,7 +355,7 @@ def _impossible(
 class _Figures:
     """A sensor in a role, before it is known how it is stamped."""
 
-    loaded: LoadedSpec
+    case: Case
     role: RoleName
     motion: _Motion
     effects: SensorEffects
@@ -386,7 +386,7 @@ class _Figures:
             tau_s=float(tau),
             tau_crit_s=crit,
             timeline="utc" if timeline == "utc" else "host",
-            resources=_resources(self.loaded, self.sensor, entry),
+            resources=_resources(self.case, self.sensor, entry),
             requires=tuple(sorted(entry.requires.items())) if entry else (),
             exact_error_m=error,
             exact_tau_s=tau,
@@ -398,7 +398,7 @@ class _Figures:
 
 
 def _resources(
-    loaded: LoadedSpec,
+    case: Case,
     *entries: SensorEntry | TimestampingEntry | ClockEntry | InfrastructureEntry | None,
 ) -> Resources:
     """Sums over entries; None where one of them does not say."""
@@ -406,15 +406,15 @@ def _resources(
     for name in RESOURCES:
         amounts = [getattr(entry, name) for entry in entries if entry is not None]
         said = [a for a in amounts if a is not None]
-        known = [a for one in said if (a := _amount(loaded, name, one)) is not None]
+        known = [a for one in said if (a := _amount(case, name, one)) is not None]
         sums[name] = sum(known, Fraction(0)) if len(known) == len(amounts) else None
     return Resources(**sums)
 
 
-def _amount(loaded: LoadedSpec, name: str, amount: float) -> Fraction | None:
+def _amount(case: Case, name: str, amount: float) -> Fraction | None:
     """The amount; None in a currency without a rate (loading refuses those of a spec's own)."""
     if name == "cost" and isinstance(amount, Quantity):
-        return loaded.spec.in_currency(amount) if loaded.spec.can_convert(amount) else None
+        return case.spec.in_currency(amount) if case.spec.can_convert(amount) else None
     return fraction_of(amount)
 
 
@@ -432,11 +432,11 @@ def _pairs(tables: tuple[RoleTable, ...], motions: list[_Motion]) -> tuple[Pair,
     return tuple(pairs)
 
 
-def _vehicle(loaded: LoadedSpec, name: str) -> VehicleTable:
-    spec = loaded.spec
+def _vehicle(case: Case, name: str) -> VehicleTable:
+    spec = case.spec
     stages = [i for i, stage in enumerate(spec.stages) if stage.vehicle_name == name]
     entries = next(
-        (c for i in stages if (c := clocks_of(spec.stages[i], loaded.catalog))),
+        (c for i in stages if (c := clocks_of(spec.stages[i], case.catalog))),
         (),
     )
     if not entries:
@@ -444,8 +444,8 @@ def _vehicle(loaded: LoadedSpec, name: str) -> VehicleTable:
     clocks: list[ClockOption] = []
     excluded: list[ExcludedClock] = []
     for identity, entry in entries:
-        clock = _clock(loaded, identity, entry)
-        barred = barred_clock(spec, name, identity, entry, loaded.catalog)
+        clock = _clock(case, identity, entry)
+        barred = barred_clock(spec, name, identity, entry, case.catalog)
         if barred is None:
             clocks.append(clock)
         else:
@@ -454,12 +454,12 @@ def _vehicle(loaded: LoadedSpec, name: str) -> VehicleTable:
     return VehicleTable(name, tuple(stages), tuple(clocks), tuple(excluded))
 
 
-def _clock(loaded: LoadedSpec, identity: str, entry: ClockEntry) -> ClockOption:
-    offset = tau_bound(entry.offset, loaded.spec.coverage_factor)
+def _clock(case: Case, identity: str, entry: ClockEntry) -> ClockOption:
+    offset = tau_bound(entry.offset, case.spec.coverage_factor)
     if entry.drift is not None and entry.holdover is not None:
         offset += abs(fraction_of(entry.drift)) * fraction_of(entry.holdover)
     requires = tuple(sorted(entry.requires.items()))
-    return ClockOption(identity, float(offset), _resources(loaded, entry), requires, offset)
+    return ClockOption(identity, float(offset), _resources(case, entry), requires, offset)
 
 
 def _required(tables: Sequence[RoleTable], vehicles: Sequence[VehicleTable]) -> set[str]:
@@ -471,8 +471,8 @@ def _required(tables: Sequence[RoleTable], vehicles: Sequence[VehicleTable]) -> 
     return {name for requires in needs for name, _ in requires}
 
 
-def _infrastructure(loaded: LoadedSpec, required: set[str]) -> Iterator[Infrastructure]:
+def _infrastructure(case: Case, required: set[str]) -> Iterator[Infrastructure]:
     """Shared hardware that a design may buy: what is only on the shelf has no influence."""
-    for identity, entry in loaded.catalog.infrastructure.items():
+    for identity, entry in case.catalog.infrastructure.items():
         if identity in required:
-            yield Infrastructure(identity, int(entry.channels), _resources(loaded, entry))
+            yield Infrastructure(identity, int(entry.channels), _resources(case, entry))

@@ -30,7 +30,7 @@ from syncline_design.choice.variations import (
     with_platform_figure,
 )
 from syncline_design.machine.deadline import in_force
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 
 # Values tried, over the term's own: from a nudge that only settles ties to a million times.
 GROWTHS = (1.0 + 1e-9, 1.0001, 1.01, 1.05, *(1.3**k for k in range(1, 53)), 1e6)
@@ -75,21 +75,21 @@ class Slack:
 
 
 def slack_ledger(
-    loaded: LoadedSpec, problem: Problem, design: Design, build: Build = build_problem
+    case: Case, problem: Problem, design: Design, build: Build = build_problem
 ) -> tuple[Slack, ...]:
     """Slack of every sensor error, timestamp bound and platform figure of a chosen design.
 
     A sensor whose noise enters no error (the attitude of a stage without ranging) has no such row.
     """
     rows: list[Slack] = []
-    for index, stage in enumerate(loaded.spec.stages):
+    for index, stage in enumerate(case.spec.stages):
         for r, table in enumerate(problem.roles):
             if table.stage == index:
                 if chosen_options(problem, design)[r].error() > 0:
                     rows.append(_error_slack(problem, design, r))
                 rows.append(_tau_slack(problem, design, r))
         for figure in PLATFORM_FIGURES:
-            row = _platform_slack(loaded, problem, design, build, index, figure)
+            row = _platform_slack(case, problem, design, build, index, figure)
             rows += [replace(row, stage=stage.name)] if row else []
     return tuple(rows)
 
@@ -212,7 +212,7 @@ def _tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
 
 
 def _platform_slack(
-    loaded: LoadedSpec,
+    case: Case,
     problem: Problem,
     design: Design,
     build: Build,
@@ -221,12 +221,12 @@ def _platform_slack(
 ) -> Slack | None:
     """Growth of a platform figure: the same design evaluated, and the choice made, anew."""
     words, dimension = PLATFORM_FIGURES[figure]
-    value = float(platform_figure(loaded, stage, figure))
+    value = float(platform_figure(case, stage, figure))
     if value <= 0.0:
         return None
 
     def changed(at: float) -> Problem:
-        return build(with_platform_figure(loaded, stage, figure, quantity(at, dimension)))
+        return build(with_platform_figure(case, stage, figure, quantity(at, dimension)))
 
     def kinds_broken(at: float) -> tuple[str, ...]:
         other = changed(at)

@@ -24,7 +24,7 @@ from syncline_design.choice.slack import payload
 from syncline_design.choice.table import RESOURCES, Design, Problem
 from syncline_design.choice.variations import Build, Figure, quantity, sigma_figures, with_figure
 from syncline_design.model.quantity import format_like
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.selection import RoleSelection
 
 Word = Literal["always", "sometimes", "never"]
@@ -66,33 +66,33 @@ class ToleranceVerdict:
 
 
 def tolerance_verdict(
-    loaded: LoadedSpec, problem: Problem, design: Design, build: Build = build_problem
+    case: Case, problem: Problem, design: Design, build: Build = build_problem
 ) -> ToleranceVerdict:
     """The verdict on one design under the tolerances of its own sensors' figures."""
     selected = selection_of(problem, design).roles
     used = {(one.sensor, one.role) for one in selected}
     sensors = {sensor for sensor, _ in used}
-    figures = [f for f in sigma_figures(loaded) if f.sensor in sensors and f.quantity.has_tolerance]
+    figures = [f for f in sigma_figures(case) if f.sensor in sensors and f.quantity.has_tolerance]
     names = tuple(figure.name for figure in figures)
-    word = _word(loaded, selected, design, figures, build)
+    word = _word(case, selected, design, figures, build)
     if word != "sometimes":
         return ToleranceVerdict(word, names, (), False)
     settles = []
     for figure in figures:
         rest = [other for other in figures if other != figure]
-        if _word(loaded, selected, design, rest, build) != "sometimes":
+        if _word(case, selected, design, rest, build) != "sometimes":
             settles.append(figure.name)
     if settles:
         return ToleranceVerdict(word, names, tuple(settles[:1]), True)
-    widest = sorted(figures, key=lambda f: (-_span(loaded, selected, f, build), f.name))
+    widest = sorted(figures, key=lambda f: (-_span(case, selected, f, build), f.name))
     return ToleranceVerdict(word, names, tuple(f.name for f in widest), False)
 
 
 def _errors(
-    loaded: LoadedSpec, selected: Sequence[RoleSelection], build: Build
+    case: Case, selected: Sequence[RoleSelection], build: Build
 ) -> tuple[Problem, Design, list[Fraction]]:
     """Exact errors of a selection under a changed spec, sync limit or not."""
-    everything = with_everything(build(loaded))
+    everything = with_everything(build(case))
     places = []
     for table, one in zip(everything.roles, selected, strict=True):
         names = [option.names for option in table.options]
@@ -101,15 +101,15 @@ def _errors(
     return everything, design, [o.error() for o in chosen_options(everything, design)]
 
 
-def _at(loaded: LoadedSpec, figures: Iterable[Figure], end: Literal["low", "high"]) -> LoadedSpec:
+def _at(case: Case, figures: Iterable[Figure], end: Literal["low", "high"]) -> Case:
     for figure in figures:
         value = getattr(figure.quantity, end)
-        loaded = with_figure(loaded, figure, quantity(value, figure.dimension))
-    return loaded
+        case = with_figure(case, figure, quantity(value, figure.dimension))
+    return case
 
 
 def _word(
-    loaded: LoadedSpec,
+    case: Case,
     selected: Sequence[RoleSelection],
     design: Design,
     figures: Sequence[Figure],
@@ -119,10 +119,10 @@ def _word(
 
     Always asks simulation too, at the upper ends: what it leaves open is not said to pass always.
     """
-    better, best_case, low = _errors(_at(loaded, figures, "low"), selected, build)
-    problem, plain, high = _errors(_at(loaded, figures, "high"), selected, build)
+    better, best_case, low = _errors(_at(case, figures, "low"), selected, build)
+    problem, plain, high = _errors(_at(case, figures, "high"), selected, build)
     found = evaluate(problem, Design(plain.options, design.clocks))
-    strict, limits = build(loaded).limits, problem.limits
+    strict, limits = build(case).limits, problem.limits
     others = found.total_m - found.sensor_error_m
     room = math.inf if limits.accuracy_m is None else Fraction(limits.accuracy_m) - others
     least = [Fraction(0)] * len(low)
@@ -163,11 +163,9 @@ def _budgets_broken(problem: Problem, design: Design, plain: Design) -> tuple[st
     return broken(problem, evaluate(problem, Design(plain.options, design.clocks)), accuracy=False)
 
 
-def _span(
-    loaded: LoadedSpec, selected: Sequence[RoleSelection], figure: Figure, build: Build
-) -> float:
+def _span(case: Case, selected: Sequence[RoleSelection], figure: Figure, build: Build) -> float:
     """How much a figure's tolerance moves the sensor error [m]."""
-    ends = [sum(_errors(_at(loaded, [figure], end), selected, build)[2]) for end in ("low", "high")]
+    ends = [sum(_errors(_at(case, [figure], end), selected, build)[2]) for end in ("low", "high")]
     return float(ends[1] - ends[0])
 
 
@@ -203,18 +201,18 @@ class Measurement:
 
 
 def measure_next(
-    loaded: LoadedSpec, problem: Problem, design: Design, build: Build = build_problem
+    case: Case, problem: Problem, design: Design, build: Build = build_problem
 ) -> tuple[Measurement, ...]:
     """Figures that alone flip the choice, the dearest flip first.
 
     Tried are the ends of every tolerance; where no figure has one, 20 % to either side of each.
     """
-    figures = list(sigma_figures(loaded))
+    figures = list(sigma_figures(case))
     given = [figure for figure in figures if figure.quantity.has_tolerance]
     found: list[Measurement] = []
     for figure in given or figures:
         try:
-            found += _flips(loaded, problem, design, build, figure, assumed=not given)
+            found += _flips(case, problem, design, build, figure, assumed=not given)
         except OutOfTime:
             raise
         except NoVerdict:  # what cannot be proven is not claimed
@@ -227,7 +225,7 @@ def _weight(one: Measurement) -> float:
 
 
 def _flips(
-    loaded: LoadedSpec,
+    case: Case,
     problem: Problem,
     design: Design,
     build: Build,
@@ -242,7 +240,7 @@ def _flips(
         spread = value.exact * ASSUMED_SPREAD
         ends = (float(value.exact - spread), float(value.exact + spread))
     for end in ends:
-        other = build(with_figure(loaded, figure, quantity(end, figure.dimension)))
+        other = build(with_figure(case, figure, quantity(end, figure.dimension)))
         outcome = choose(other, "front")
         if not isinstance(outcome, Choice):
             yield _measurement(figure, end, assumed, "infeasible", None)

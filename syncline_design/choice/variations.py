@@ -11,11 +11,11 @@ from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.spec.catalog import SensorEntry
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import candidate_sensors, platform_of
 from syncline_design.spec.spec import MethodChoice, Role, StageChoice
 
-Build = Callable[[LoadedSpec], Problem]
+Build = Callable[[Case], Problem]
 PlatformFigure = Literal["v_max", "distance", "omega_max"]
 PLATFORM_FIGURES: dict[PlatformFigure, tuple[str, Dimension]] = {
     "v_max": ("speed v_max", Dimension.SPEED),
@@ -36,38 +36,34 @@ def quantity(value: float | Fraction, dimension: Dimension) -> Quantity:
     return Quantity(exact, format_quantity(float(exact), dimension))
 
 
-def with_stage(loaded: LoadedSpec, index: int, **changes: Any) -> LoadedSpec:
+def with_stage(case: Case, index: int, **changes: Any) -> Case:
     """The spec with some keys of one stage changed; every what-if asks for time first."""
     in_force().check()
-    stages = list(loaded.spec.stages)
+    stages = list(case.spec.stages)
     stages[index] = stages[index].model_copy(update=changes)
-    spec = loaded.spec.model_copy(update={"stages": tuple(stages)})
-    return replace(loaded, spec=spec)
+    spec = case.spec.model_copy(update={"stages": tuple(stages)})
+    return replace(case, spec=spec)
 
 
-def with_platform_figure(
-    loaded: LoadedSpec, stage: int, figure: PlatformFigure, value: Quantity
-) -> LoadedSpec:
+def with_platform_figure(case: Case, stage: int, figure: PlatformFigure, value: Quantity) -> Case:
     """The spec with one figure of a stage's platform changed."""
-    platform = loaded.spec.stages[stage].platform.model_copy(update={figure: value})
-    return with_stage(loaded, stage, platform=platform)
+    platform = case.spec.stages[stage].platform.model_copy(update={figure: value})
+    return with_stage(case, stage, platform=platform)
 
 
-def platform_figure(loaded: LoadedSpec, stage: int, figure: PlatformFigure) -> float:
+def platform_figure(case: Case, stage: int, figure: PlatformFigure) -> float:
     """One figure of a stage's platform [SI], as written."""
-    entry = platform_of(loaded.spec.stages[stage].platform, loaded.catalog)
+    entry = platform_of(case.spec.stages[stage].platform, case.catalog)
     value: float = getattr(entry, figure)
     return value
 
 
-def with_methods(
-    loaded: LoadedSpec, stage: int, role: Role, methods: tuple[str, ...]
-) -> LoadedSpec:
+def with_methods(case: Case, stage: int, role: Role, methods: tuple[str, ...]) -> Case:
     """The spec with other timestamping methods open to one role."""
-    choice = loaded.spec.stages[stage].role(role)
+    choice = case.spec.stages[stage].role(role)
     assert choice is not None
     opened = MethodChoice.model_construct(candidates=methods)
-    return with_stage(loaded, stage, **{role: choice.model_copy(update={"timestamping": opened})})
+    return with_stage(case, stage, **{role: choice.model_copy(update={"timestamping": opened})})
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,13 +91,13 @@ class Figure:
         return f"{self.sensor} {self.figure}{axis}"
 
 
-def sigma_figures(loaded: LoadedSpec) -> Iterator[Figure]:
+def sigma_figures(case: Case) -> Iterator[Figure]:
     """Every datasheet figure of every sensor that the spec may use, once."""
     seen: set[tuple[str, str, int | None]] = set()
-    for index, stage in enumerate(loaded.spec.stages):
+    for index, stage in enumerate(case.spec.stages):
         for role in ("position", "attitude", "ranging"):
             own = _own_sensor(stage, role)
-            for name, entry in candidate_sensors(loaded.spec, stage, role, loaded.catalog):
+            for name, entry in candidate_sensors(case.spec, stage, role, case.catalog):
                 for figure in _figures(name, entry, (index, role) if own else None):
                     key = (figure.sensor, figure.figure, figure.axis)
                     if key not in seen:
@@ -125,20 +121,20 @@ def _figures(name: str, entry: SensorEntry, place: tuple[int, Role] | None) -> I
                     yield Figure(name, figure, axis, one, place)
 
 
-def with_figure(loaded: LoadedSpec, figure: Figure, value: Quantity) -> LoadedSpec:
+def with_figure(case: Case, figure: Figure, value: Quantity) -> Case:
     """The spec and catalogs with one datasheet figure changed; OutOfTime after the deadline."""
     in_force().check()
     if figure.place is not None:
         stage, role = figure.place
-        choice = loaded.spec.stages[stage].role(role)
+        choice = case.spec.stages[stage].role(role)
         assert choice is not None
         assert isinstance(choice.sensor, SensorEntry)
         sensor = _changed(choice.sensor, figure, value)
-        return with_stage(loaded, stage, **{role: choice.model_copy(update={"sensor": sensor})})
-    sensors = dict(loaded.catalog.sensors)
+        return with_stage(case, stage, **{role: choice.model_copy(update={"sensor": sensor})})
+    sensors = dict(case.catalog.sensors)
     sensors[figure.sensor] = _changed(sensors[figure.sensor], figure, value)
-    catalog = loaded.catalog.model_copy(update={"sensors": sensors})
-    return replace(loaded, catalog=catalog)
+    catalog = case.catalog.model_copy(update={"sensors": sensors})
+    return replace(case, catalog=catalog)
 
 
 def _changed(entry: SensorEntry, figure: Figure, value: Quantity) -> SensorEntry:

@@ -102,8 +102,8 @@ def optimize(
     from syncline_design.verdict.optimise import OptimizeSettings, optimisation_text, optimize
 
     targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
-    loaded = load(spec)
-    for name in loaded.spec.catalogs if write_design is not None else ():
+    case = load(spec)
+    for name in case.spec.catalogs if write_design is not None else ():
         if write_design is not None and not (write_design.parent / name).exists():
             refuse(
                 f"syncline-design: --write-design {write_design}: the spec draws in {name}, which "
@@ -115,7 +115,7 @@ def optimize(
         report=any(target.format == "html" for target in targets),
     )  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
-        found = optimize(loaded, settings)
+        found = optimize(case, settings)
     if write_design is not None and found.exit_code == 0:
         _write_design(found, write_design)
     emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
@@ -126,7 +126,7 @@ def _write_design(found: Any, path: Path) -> None:
     from syncline_design.spec.edit import write_spec
     from syncline_design.verdict.optimise import pinned_text
 
-    write_spec(pinned_text(found.loaded, found.problem, found.designs[0]), path)
+    write_spec(pinned_text(found.case, found.problem, found.designs[0]), path)
     say(f"design written to {path}")
 
 

@@ -48,8 +48,8 @@ def simulate(
     from syncline_design.verdict.simulated_spec import simulate_spec
 
     targets = output_targets(output, SIMULATE_FORMATS, [spec])
-    loaded = load(spec)
-    run = simulate_spec(loaded, seed=seed, samples=samples, workers=workers)
+    case = load(spec)
+    run = simulate_spec(case, seed=seed, samples=samples, workers=workers)
     text = console(simulated_document(run))
     emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
     return 0
@@ -82,15 +82,15 @@ def diagnose(
     from syncline_design.spec.load import load
 
     targets = output_targets(output, DIAGNOSE_FORMATS, [spec, *(log or ())], [write_spec])
-    loaded = load(spec)
+    case = load(spec)
     settings = DiagnosisSettings(
         seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects
     )
     with _progress(quiet) as progress:
-        found = diagnose_log(as_measured(loaded), log or (), settings, progress)
-        means = meaning(loaded, found, seed)
+        found = diagnose_log(as_measured(case), log or (), settings, progress)
+        means = meaning(case, found, seed)
     data = found.to_json()
-    text = f"{visible(loaded.spec.name)} ({visible(spec)})\n\n{summary_text(found)}"
+    text = f"{visible(case.spec.name)} ({visible(spec)})\n\n{summary_text(found)}"
     if means is not None:
         data["design"] = means.to_json()
         text += f"\nWhat it means for the design:\n{means.text()}"

@@ -18,7 +18,7 @@ from syncline_design.spec.factors import label
 from syncline_design.spec.keys import PLATFORM_KEYS, put
 from syncline_design.spec.load import (
     BadInput,
-    LoadedSpec,
+    Case,
     catalogs_of,
     load_document,
     without_simulated,
@@ -41,7 +41,7 @@ class Side:
 
     file: str
     verdict: Json
-    loaded: LoadedSpec | None = None
+    case: Case | None = None
     document: Document | None = None
 
 
@@ -68,7 +68,7 @@ def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None
     chosen = settings or CheckSettings()
     before, after = read_side(Path(old), chosen), read_side(Path(new), chosen)
     causes = list(_causes(before, after))
-    if before.loaded is not None and after.loaded is not None and 1 < len(causes) <= MOST_TRIED:
+    if before.case is not None and after.case is not None and 1 < len(causes) <= MOST_TRIED:
         causes = [_tried(cause, before, after, chosen) for cause in causes]
     return {
         "schema": SCHEMA,
@@ -87,17 +87,17 @@ def read_side(path: Path, settings: CheckSettings) -> Side:
     document = parse(text_of(path), str(path))
     if document.data is None:
         raise BadInput(document.problems)
-    loaded = load_document(document, path, catalogs_of(document, path))
-    return Side(str(path), check_loaded(loaded, settings), loaded, document)
+    case = load_document(document, path, catalogs_of(document, path))
+    return Side(str(path), check_loaded(case, settings), case, document)
 
 
 def _causes(before: Side, after: Side) -> Iterator[Cause]:
-    if before.loaded is not None and after.loaded is not None:
+    if before.case is not None and after.case is not None:
         yield from _spec_causes(_expanded(before), _expanded(after), (), "")
     else:
         yield from _verdict_causes(before.verdict, after.verdict)
-    if before.loaded is not None and after.loaded is not None:
-        yield from _catalog_causes(before.loaded, after.loaded)
+    if before.case is not None and after.case is not None:
+        yield from _catalog_causes(before.case, after.case)
     else:
         yield from _provenance_causes(before.verdict, after.verdict)
 
@@ -105,10 +105,10 @@ def _causes(before: Side, after: Side) -> Iterator[Cause]:
 def _expanded(side: Side) -> Any:
     """A spec's data with every platform written out, so that its figures can be compared."""
     assert side.document is not None
-    assert side.loaded is not None
+    assert side.case is not None
     stages = []
-    for stage, chosen in zip(side.document.data["stages"], side.loaded.spec.stages, strict=True):
-        entry = platform_of(chosen.platform, side.loaded.catalog)
+    for stage, chosen in zip(side.document.data["stages"], side.case.spec.stages, strict=True):
+        entry = platform_of(chosen.platform, side.case.catalog)
         figures = {key: _figure(getattr(entry, key)) for key in PLATFORM_KEYS}
         stages.append({**stage, "platform": {"use": chosen.platform.use or "", **figures}})
     return {**side.document.data, "stages": tuple(stages)}
@@ -199,7 +199,7 @@ def _provenance_causes(old: Json, new: Json) -> Iterator[Cause]:
             yield Cause(word, label(before.get(key)), label(after.get(key)))
 
 
-def _catalog_causes(old: LoadedSpec, new: LoadedSpec) -> Iterator[Cause]:
+def _catalog_causes(old: Case, new: Case) -> Iterator[Cause]:
     """Catalog entries that both specs can see and that differ."""
     if old.catalogs_sha256 == new.catalogs_sha256:
         return
@@ -227,7 +227,7 @@ def _figure(value: Any) -> str | None:
 
 def _tried(cause: Cause, before: Side, after: Side, settings: CheckSettings) -> Cause:
     """The cause with what it does alone; nothing where it cannot stand alone."""
-    if cause.path is None or before.loaded is None or after.document is None:
+    if cause.path is None or before.case is None or after.document is None:
         return cause
     assert before.document is not None
     original = before.document.data
@@ -240,10 +240,10 @@ def _tried(cause: Cause, before: Side, after: Side, settings: CheckSettings) -> 
     try:
         data = put(original, cause.path, value)
         document = replace(before.document, data=data)
-        path = before.loaded.path
+        path = before.case.path
         alone = load_document(document, path, catalogs_of(document, path))
         verdict = check_loaded(without_simulated(alone), plain)
-        start = check_loaded(without_simulated(before.loaded), plain)
+        start = check_loaded(without_simulated(before.case), plain)
     except Exception:  # a change that needs the others; the whole difference stands without it
         return cause
     return replace(cause, effect=changes(start, verdict))

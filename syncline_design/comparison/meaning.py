@@ -11,7 +11,7 @@ from syncline_design.diagnosis import Diagnosis
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.spec.edit import with_effects_text
 from syncline_design.spec.known_effects import NoBudget
-from syncline_design.spec.load import LoadedSpec, load_text
+from syncline_design.spec.load import Case, load_text
 from syncline_design.verdict.optimise import pinned_text
 from syncline_design.verdict.tree import frame
 from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
@@ -96,43 +96,43 @@ class ErrorFigure:
         }
 
 
-def as_measured(loaded: LoadedSpec) -> LoadedSpec:
+def as_measured(case: Case) -> Case:
     """The spec of the system that made a log: with choices open, its best design pinned."""
-    if sole_design(build_problem(loaded)) is not None:
-        return loaded
-    problem, design = picked_design(loaded)
+    if sole_design(build_problem(case)) is not None:
+        return case
+    problem, design = picked_design(case)
     if problem.combinations == 1:
-        return loaded
-    text = pinned_text(loaded, problem, design)
-    return load_text(text, loaded.path, loaded.builtin)
+        return case
+    text = pinned_text(case, problem, design)
+    return load_text(text, case.path, case.builtin)
 
 
-def meaning(loaded: LoadedSpec, found: Diagnosis, seed: int = 0) -> DesignMeaning | None:
+def meaning(case: Case, found: Diagnosis, seed: int = 0) -> DesignMeaning | None:
     """Check the spec with and without the findings; None when nothing was found."""
     entries = found.effects_entries()
     if not entries:
         return None
-    text = with_effects_text(loaded, entries)
+    text = with_effects_text(case, entries)
     settings = CheckSettings(seed=seed)
-    before = _checked(loaded, settings)
-    after = _checked(load_text(text, loaded.path, loaded.builtin), settings)
+    before = _checked(case, settings)
+    after = _checked(load_text(text, case.path, case.builtin), settings)
     return DesignMeaning(
         text,
         before,
         after,
         (*_lines(before, after), *_why_models_differ(after)),
         error_figures(before, after),
-        horizon_words(after["horizon"], given="horizon" in loaded.spec.model_fields_set),
+        horizon_words(after["horizon"], given="horizon" in case.spec.model_fields_set),
     )
 
 
-def _checked(loaded: LoadedSpec, settings: CheckSettings) -> Json:
+def _checked(case: Case, settings: CheckSettings) -> Json:
     """The verdict; `indeterminate` with its `refusal` where an effect has no place in a budget."""
     try:
-        return check_loaded(loaded, settings)
+        return check_loaded(case, settings)
     except NoBudget as refused:
         words = [f"{one.message}; {one.hint}" for one in refused.problems]
-        verdict = frame(loaded, build_problem(loaded), "indeterminate", settings.seed)
+        verdict = frame(case, build_problem(case), "indeterminate", settings.seed)
         return {**verdict, "refusal": words}
 
 

@@ -29,14 +29,14 @@ from syncline_design.diagnosis.search import Search, SearchResult, start_search
 from syncline_design.diagnosis.settings import DiagnosisSettings, Progress, silent
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.logs.log import Log
-from syncline_design.spec.load import LoadedSpec, load
+from syncline_design.spec.load import Case, load
 
 MOST_ROWS = 20_000  # of a longer log, windows spread over it are worked on
 REMAINDER_SHARE = 0.2  # of the false-alarm rate: for the test of what remains
 
 
 def diagnose(
-    spec: LoadedSpec | Path | str,
+    spec: Case | Path | str,
     log_paths: Sequence[Path | str] = (),
     settings: DiagnosisSettings | None = None,
     progress: Progress = silent,
@@ -45,17 +45,17 @@ def diagnose(
 
     Raises BadInput for a spec or log that cannot be used.
     """
-    loaded = spec if isinstance(spec, LoadedSpec) else load(spec)
+    case = spec if isinstance(spec, Case) else load(spec)
     progress("reading the log", 0.0)
     with one_thread():
-        inputs = measured(loaded, [Path(p) for p in log_paths])
-        return diagnose_measured(inputs, settings or DiagnosisSettings(), loaded, progress)
+        inputs = measured(case, [Path(p) for p in log_paths])
+        return diagnose_measured(inputs, settings or DiagnosisSettings(), case, progress)
 
 
 def diagnose_measured(
     inputs: Measured,
     settings: DiagnosisSettings,
-    loaded: LoadedSpec | None = None,
+    case: Case | None = None,
     progress: Progress = silent,
 ) -> Diagnosis:
     """The diagnosis of a system and a log that are already in memory."""
@@ -109,9 +109,9 @@ def diagnose_measured(
         | {"fitted": len(view), "motion": _motion_json(data)},
         noise=_noise_json(data, result),
         plots=plots(data, result, cells),
-        spec=None if loaded is None else {"name": loaded.spec.name, "file": str(loaded.path)},
+        spec=None if case is None else {"name": case.spec.name, "file": str(case.path)},
         log_files=tuple(inputs.files),
-        provenance=_provenance(settings, loaded),
+        provenance=_provenance(settings, case),
     )
 
 
@@ -240,13 +240,13 @@ def result_remainder(result: SearchResult) -> Any:
     return Likelihoods(result.base.nll, result.model.nll)
 
 
-def _provenance(settings: DiagnosisSettings, loaded: LoadedSpec | None) -> Json:
+def _provenance(settings: DiagnosisSettings, case: Case | None) -> Json:
     return {
         "version": __version__,
         "seed": settings.seed,
         "false_alarm_rate": settings.false_alarm_rate,
         "max_effects": settings.max_effects,
         "exclude_effects": list(settings.exclude_effects),
-        "spec_sha256": loaded.spec_sha256 if loaded else None,
-        "catalogs_sha256": loaded.catalogs_sha256 if loaded else None,
+        "spec_sha256": case.spec_sha256 if case else None,
+        "catalogs_sha256": case.catalogs_sha256 if case else None,
     }

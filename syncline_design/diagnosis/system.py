@@ -14,7 +14,7 @@ from syncline_design.logs.log import Log
 from syncline_design.logs.reading import read_log
 from syncline_design.model.system import System
 from syncline_design.spec.known_effects import effect_entries
-from syncline_design.spec.load import BadInput, LoadedSpec
+from syncline_design.spec.load import BadInput, Case
 from syncline_design.spec.yaml_text import KeyPath, Problem
 
 
@@ -29,14 +29,14 @@ class Measured:
     reread: Reread | None = None
 
 
-def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
+def measured(case: Case, paths: Sequence[Path]) -> Measured:
     """Resolve the spec, read the log, and refuse what does not fit."""
-    system = pinned_system(loaded)
+    system = pinned_system(case)
     names = [stage.name for stage in system.stages]
-    mapping = loaded.spec.log.columns if loaded.spec.log else {}
-    origin = loaded.spec.log.origin if loaded.spec.log else None
+    mapping = case.spec.log.columns if case.spec.log else {}
+    origin = case.spec.log.origin if case.spec.log else None
     ranges = system.stages[-1].ranging is not None
-    files = list(paths) or own_files(loaded)
+    files = list(paths) or own_files(case)
 
     def read(slip_s: float) -> Log:
         return read_log(files, names, mapping, ranges, slip_s, origin)
@@ -44,7 +44,7 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
     log = read(0.0)
     reread = read if len(files) > 1 else None
     system = replace(system, stages=system.stages[: len(log.stages)])
-    _demand_fit(loaded, system, log)
+    _demand_fit(case, system, log)
     known = known_effects(system)
     for one in known:
         if one.effect.kind == "discrete":
@@ -53,34 +53,34 @@ def measured(loaded: LoadedSpec, paths: Sequence[Path]) -> Measured:
     return Measured(system, log, kept, tuple(path.name for path in files), reread)
 
 
-def own_files(loaded: LoadedSpec) -> list[Path]:
+def own_files(case: Case) -> list[Path]:
     """The files that the spec's `log:` names, beside the spec."""
-    files = loaded.spec.log.files if loaded.spec.log else ()
+    files = case.spec.log.files if case.spec.log else ()
     if not files:
-        raise _refuse(loaded, (), "no log given", "a LOG argument, or log: {files: [...]}")
-    folder = loaded.path.parent.resolve()
+        raise _refuse(case, (), "no log given", "a LOG argument, or log: {files: [...]}")
+    folder = case.path.parent.resolve()
     paths = []
     for index, name in enumerate(files):
         path = (folder / name).resolve()
         if not path.is_relative_to(folder):
-            raise _refuse(loaded, ("log", "files", index), "outside the spec's folder", name)
+            raise _refuse(case, ("log", "files", index), "outside the spec's folder", name)
         paths.append(path)
     return paths
 
 
-def pinned_system(loaded: LoadedSpec) -> System:
+def pinned_system(case: Case) -> System:
     """The system of a spec that leaves nothing open; its effects come along."""
-    found = sole_design(build_problem(loaded))
+    found = sole_design(build_problem(case))
     if found is None:
         raise _refuse(
-            loaded,
+            case,
             ("stages",),
             "the spec leaves choices open, and a log comes from one system",
             "every role pinned by `sensor:` and `timestamping:`",
             "optimize SPEC --write-design writes a pinned spec",
         )
     problem, design = found
-    return system_of(loaded, problem, design, effect_entries(loaded))
+    return system_of(case, problem, design, effect_entries(case))
 
 
 def known_effects(system: System) -> tuple[Acting, ...]:
@@ -98,16 +98,16 @@ def known_effects(system: System) -> tuple[Acting, ...]:
     )
 
 
-def _demand_fit(loaded: LoadedSpec, system: System, log: Log) -> None:
+def _demand_fit(case: Case, system: System, log: Log) -> None:
     if system.stages[0].position is None:
-        raise _refuse(loaded, ("stages", 0), "the first stage has no position sensor")
+        raise _refuse(case, ("stages", 0), "the first stage has no position sensor")
     if log.kind == "position":
         return
     for k, stage in enumerate(system.stages):
         for role in ("attitude", "ranging"):
             if getattr(stage, role) is None:
                 raise _refuse(
-                    loaded,
+                    case,
                     ("stages", k),
                     f"the log holds ranges to targets, but stage {stage.name!r} has no {role} "
                     "sensor",
@@ -116,12 +116,12 @@ def _demand_fit(loaded: LoadedSpec, system: System, log: Log) -> None:
 
 
 def _refuse(
-    loaded: LoadedSpec, path: KeyPath, message: str, expected: str = "", hint: str = ""
+    case: Case, path: KeyPath, message: str, expected: str = "", hint: str = ""
 ) -> BadInput:
     at = path
-    while at and at not in loaded.positions:
+    while at and at not in case.positions:
         at = at[:-1]
-    line, column = loaded.positions.get(at, (1, 1))
+    line, column = case.positions.get(at, (1, 1))
     shown = ".".join(map(str, path))
-    problem = Problem(str(loaded.path), line, column, shown, message, expected, hint=hint)
+    problem = Problem(str(case.path), line, column, shown, message, expected, hint=hint)
     return BadInput((problem,))

@@ -15,7 +15,7 @@ CSV_HEADER: Final = "tau_s,worst_case_m,syncline_m,ratio,bound_m,gap,reason"
 
 def simulated_document(run: SimulatedSpec) -> Document:
     """A simulated spec in words."""
-    return on_simulation(run.result, run.system, run.loaded.spec.name, str(run.loaded.path))
+    return on_simulation(run.result, run.system, run.case.spec.name, str(run.case.path))
 
 
 def render_simulate(name: str, run: SimulatedSpec) -> str:

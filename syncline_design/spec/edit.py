@@ -16,7 +16,7 @@ import yaml
 
 from syncline_design.machine.result_files import write_file
 from syncline_design.model.quantity import Quantity
-from syncline_design.spec.load import LoadedSpec, load_text
+from syncline_design.spec.load import Case, load_text
 from syncline_design.spec.spec import EffectChoice, Role
 from syncline_design.spec.yaml_text import KeyPath, parse, plain_scalar
 
@@ -35,20 +35,20 @@ class PinnedRole:
 
 
 def pinned_spec_text(
-    loaded: LoadedSpec, roles: Sequence[PinnedRole], clocks: Mapping[int, str] | None = None
+    case: Case, roles: Sequence[PinnedRole], clocks: Mapping[int, str] | None = None
 ) -> str:
     """The spec with every choice pinned; clocks: stage index to clock id."""
     changes: list[tuple[KeyPath, dict[str, Any]]] = []
     for pinned in roles:
         path: KeyPath = ("stages", pinned.stage, pinned.role)
-        changes.append((path, _pinned_keys(loaded, pinned)))
+        changes.append((path, _pinned_keys(case, pinned)))
     for stage, clock in sorted((clocks or {}).items()):
         changes.append((("stages", stage), {"clock": clock}))
-    return _changed(loaded, changes, "with the chosen design pinned")
+    return _changed(case, changes, "with the chosen design pinned")
 
 
-def _pinned_keys(loaded: LoadedSpec, pinned: PinnedRole) -> dict[str, Any]:
-    choice = loaded.spec.stages[pinned.stage].role(pinned.role)
+def _pinned_keys(case: Case, pinned: PinnedRole) -> dict[str, Any]:
+    choice = case.spec.stages[pinned.stage].role(pinned.role)
     inline = choice is not None and choice.sensor is not None and not isinstance(choice.sensor, str)
     keys: dict[str, Any] = {"candidates": None}
     if not inline:  # a sensor given in place stays as it stands
@@ -60,11 +60,11 @@ def _pinned_keys(loaded: LoadedSpec, pinned: PinnedRole) -> dict[str, Any]:
     return keys
 
 
-def with_effects_text(loaded: LoadedSpec, effects: Sequence[EffectChoice]) -> str:
+def with_effects_text(case: Case, effects: Sequence[EffectChoice]) -> str:
     """The spec with entries added at the end of its `effects:`."""
-    data = parse(loaded.text, str(loaded.path)).data
+    data = parse(case.text, str(case.path)).data
     entries = (*data.get("effects", ()), *(effect_entry(effect) for effect in effects))
-    return _changed(loaded, [((), {"effects": entries})], "with effects that `diagnose` found")
+    return _changed(case, [((), {"effects": entries})], "with effects that `diagnose` found")
 
 
 def effect_entry(effect: EffectChoice) -> dict[str, Any]:
@@ -86,16 +86,16 @@ def _bare(value: float | str) -> float | str:
     return value if isinstance(value, str) else float(value)
 
 
-def write_spec(text: str, path: str | Path, builtin: bool = True) -> LoadedSpec:
+def write_spec(text: str, path: str | Path, builtin: bool = True) -> Case:
     """Check a spec's text as if it lay at `path`, then write it there in one step; OutputError."""
-    loaded = load_text(text, path, builtin)
+    case = load_text(text, path, builtin)
     write_file(path, text.encode("utf-8"))
-    return loaded
+    return case
 
 
-def _changed(loaded: LoadedSpec, changes: list[tuple[KeyPath, dict[str, Any]]], reason: str) -> str:
+def _changed(case: Case, changes: list[tuple[KeyPath, dict[str, Any]]], reason: str) -> str:
     """The spec's text with keys of mappings set (or, for None, dropped)."""
-    data, text = parse(loaded.text, str(loaded.path)).data, loaded.text
+    data, text = parse(case.text, str(case.path)).data, case.text
     for path, keys in changes:
         data = _with_keys(data, path, keys)
     try:
@@ -105,7 +105,7 @@ def _changed(loaded: LoadedSpec, changes: list[tuple[KeyPath, dict[str, Any]]], 
         text = ""
     if text and parse(text).data == data:
         return text
-    header = f"# Written from {loaded.path.name}, {reason}; its comments could not be kept.\n"
+    header = f"# Written from {case.path.name}, {reason}; its comments could not be kept.\n"
     return header + yaml_text(data)
 
 

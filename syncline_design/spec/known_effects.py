@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.model.estimates import figure
 from syncline_design.model.system import EffectEntry
-from syncline_design.spec.load import BadInput, LoadedSpec
+from syncline_design.spec.load import BadInput, Case
 from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import KeyPath, Problem, show_path
 
@@ -16,19 +16,19 @@ if TYPE_CHECKING:
     from syncline_design.effects.record import Parameter, Target
 
 
-def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:
+def effect_entries(case: Case) -> tuple[EffectEntry, ...]:
     """The spec's effects for the simulator; BadInput where one does not exist or fit."""
-    if not loaded.spec.effects:
+    if not case.spec.effects:
         return ()
     problems = [
         problem
-        for index, effect in enumerate(loaded.spec.effects)
-        for problem in _problems(loaded, ("effects", index), effect)
+        for index, effect in enumerate(case.spec.effects)
+        for problem in _problems(case, ("effects", index), effect)
     ]
     if problems:
         raise BadInput(tuple(problems))
-    last = loaded.spec.stages[-1].name
-    only = loaded.spec.stages[0].name
+    last = case.spec.stages[-1].name
+    only = case.spec.stages[0].name
     return tuple(
         EffectEntry(
             effect.effect,
@@ -36,17 +36,15 @@ def effect_entries(loaded: LoadedSpec) -> tuple[EffectEntry, ...]:
             effect.stage or (last if effect.sensor == "target" else only),
             tuple((name, _plain(value)) for name, value in effect.parameters.items()),
         )
-        for effect in loaded.spec.effects
+        for effect in case.spec.effects
     )
 
 
-def _transponder_problem(
-    loaded: LoadedSpec, at: KeyPath, effect: EffectChoice
-) -> Iterator[Problem]:
+def _transponder_problem(case: Case, at: KeyPath, effect: EffectChoice) -> Iterator[Problem]:
     """A later stage has no position sensor whose stamps or noise an effect could change."""
     from syncline_design.effects import registry
 
-    names = [stage.name for stage in loaded.spec.stages]
+    names = [stage.name for stage in case.spec.stages]
     place = names.index(effect.stage) if effect.stage in names else 0
     if place == 0:
         return
@@ -57,12 +55,12 @@ def _transponder_problem(
     )
     acting = ", ".join(name for name, record in registry().items() if record.transponder)
     known = [f"{acting} (of the transponder)", f"sensor: ranging with stage: {before}"]
-    yield _problem(loaded, (*at, "sensor"), message, f"{effect.effect} of its position", known)
+    yield _problem(case, (*at, "sensor"), message, f"{effect.effect} of its position", known)
 
 
-def demand_budget(loaded: LoadedSpec) -> None:
+def demand_budget(case: Case) -> None:
     """BadInput where an effect has no place in a budget with its values; in a log it may have."""
-    problems = list(_unbudgeted(loaded))
+    problems = list(_unbudgeted(case))
     if problems:
         raise NoBudget(tuple(problems))
 
@@ -71,23 +69,23 @@ class NoBudget(BadInput):
     """What no budget can hold, at its place in the spec."""
 
 
-def _unbudgeted(loaded: LoadedSpec) -> Iterator[Problem]:
+def _unbudgeted(case: Case) -> Iterator[Problem]:
     from syncline_design.effects import registry
 
-    for index, entry in enumerate(effect_entries(loaded)):
+    for index, entry in enumerate(effect_entries(case)):
         record = registry()[entry.effect]
         values = dict(entry.parameters)
         if not (why := record.unbudgeted(values)):  # type: ignore[arg-type]
             continue
         path: KeyPath = ("effects", index, "parameters")
-        line, column = _place(loaded, path)
+        line, column = _place(case, path)
         message, _, hint = why.partition("; ")
-        yield Problem(str(loaded.path), line, column, show_path(path), message, hint=hint)
+        yield Problem(str(case.path), line, column, show_path(path), message, hint=hint)
 
 
-def _place(loaded: LoadedSpec, path: KeyPath) -> tuple[int, int]:
+def _place(case: Case, path: KeyPath) -> tuple[int, int]:
     """Line and column of a key, or of the nearest one above it that the file holds."""
-    known = loaded.positions
+    known = case.positions
     return next(known[path[:n]] for n in range(len(path), -1, -1) if path[:n] in known)
 
 
@@ -95,30 +93,30 @@ def _plain(value: float | str) -> float | str:
     return value if isinstance(value, str) else float(value)
 
 
-def _problems(loaded: LoadedSpec, at: KeyPath, effect: EffectChoice) -> Iterator[Problem]:
+def _problems(case: Case, at: KeyPath, effect: EffectChoice) -> Iterator[Problem]:
     from syncline_design.effects import registry
 
     record = registry().get(effect.effect)
     if record is None:
-        yield _problem(loaded, (*at, "effect"), "unknown effect", effect.effect, list(registry()))
+        yield _problem(case, (*at, "effect"), "unknown effect", effect.effect, list(registry()))
         return
     if effect.sensor not in record.sensors:
         message = f"{effect.effect} does not act on this sensor"
-        yield _problem(loaded, (*at, "sensor"), message, effect.sensor, list(record.sensors))
+        yield _problem(case, (*at, "sensor"), message, effect.sensor, list(record.sensors))
     elif effect.sensor == "position" and not record.transponder:
-        yield from _transponder_problem(loaded, at, effect)
+        yield from _transponder_problem(case, at, effect)
     names = [parameter.name for parameter in record.parameters]
     for name in effect.parameters:
         if name not in names:
-            yield _problem(loaded, (*at, "parameters", name), "unknown parameter", name, names)
+            yield _problem(case, (*at, "parameters", name), "unknown parameter", name, names)
     for parameter in record.parameters:
         place = (*at, "parameters")
         if parameter.name not in effect.parameters:
-            yield _problem(loaded, place, f"missing parameter {parameter.name}", "", names)
+            yield _problem(case, place, f"missing parameter {parameter.name}", "", names)
         elif misfit := _misfit(effect.parameters[parameter.name], parameter, effect.sensor):
             wanted = list(parameter.choices.get(effect.sensor, ())) or [parameter.domain]
             found = str(effect.parameters[parameter.name])
-            yield _problem(loaded, (*place, parameter.name), misfit, found, wanted)
+            yield _problem(case, (*place, parameter.name), misfit, found, wanted)
 
 
 def _misfit(value: float | str, parameter: Parameter, sensor: Target) -> str | None:
@@ -131,14 +129,12 @@ def _misfit(value: float | str, parameter: Parameter, sensor: Target) -> str | N
     return None if parameter.holds(float(value)) else "out of range"
 
 
-def _problem(
-    loaded: LoadedSpec, path: KeyPath, message: str, found: str, known: list[str]
-) -> Problem:
-    line, column = _place(loaded, path)
+def _problem(case: Case, path: KeyPath, message: str, found: str, known: list[str]) -> Problem:
+    line, column = _place(case, path)
     close = get_close_matches(found, known, 1)
     hint = f"did you mean {close[0]}?" if close else ""
     expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]
-    return Problem(str(loaded.path), line, column, show_path(path), message, expected, found, hint)
+    return Problem(str(case.path), line, column, show_path(path), message, expected, found, hint)
 
 
 def describe(entry: EffectEntry) -> str:

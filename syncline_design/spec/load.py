@@ -53,7 +53,7 @@ def _place_and_text(problem: Problem) -> tuple[str, int, int, str]:
 
 
 @dataclass(frozen=True)
-class LoadedSpec:
+class Case:
     """A spec that can be worked with: its catalogs merged, every reference found.
 
     positions: key path, as in ("requirements", 0, "limit"), to (line, column).
@@ -81,17 +81,17 @@ class LoadedSpec:
         return str(self.path)
 
 
-def load(path: str | Path, builtin: bool = True) -> LoadedSpec:
+def load(path: str | Path, builtin: bool = True) -> Case:
     """Read a spec and its catalogs; BadInput names everything that is wrong with them.
 
     builtin: whether the shipped catalogs are drawn in too.
     """
     with noting() as found:
-        loaded = _loaded(read(path), Path(path), builtin)
-    return replace(loaded, files=_beside(loaded, found))
+        case = _loaded(read(path), Path(path), builtin)
+    return replace(case, files=_beside(case, found))
 
 
-def load_text(text: str, path: str | Path, builtin: bool = True) -> LoadedSpec:
+def load_text(text: str, path: str | Path, builtin: bool = True) -> Case:
     """The same for a text that is not on disk yet; `path` says where it would lie."""
     return _loaded(parse(text, str(path)), Path(path), builtin)
 
@@ -107,7 +107,7 @@ def catalogs_of(document: Document, path: Path, builtin: bool = True) -> Collect
 
 def load_document(
     document: Document, path: Path, collection: Collection, builtin: bool = True
-) -> LoadedSpec:
+) -> Case:
     """A spec that was read already, with catalogs drawn together once for many specs."""
     return _complete(document, path, collection.copy(), builtin)
 
@@ -134,13 +134,13 @@ def _stop_at(problems: list[Problem]) -> None:
         raise BadInput(tuple(problems))
 
 
-def _loaded(document: Document, path: Path, builtin: bool) -> LoadedSpec:
+def _loaded(document: Document, path: Path, builtin: bool) -> Case:
     if document.data is None:
         raise BadInput(document.problems)
     return _complete(document, path, catalogs_of(document, path, builtin), builtin)
 
 
-def _complete(document: Document, path: Path, collection: Collection, builtin: bool) -> LoadedSpec:
+def _complete(document: Document, path: Path, collection: Collection, builtin: bool) -> Case:
     filled = fill_empirical(document, path.parent, path.parent, collection)
     spec, problems = validate(Spec, document, filled)
     problems = [*document.problems, *problems, *collection.problems]
@@ -152,7 +152,7 @@ def _complete(document: Document, path: Path, collection: Collection, builtin: b
     catalog = collection.catalog()
     _stop_at(misfits(document, spec, catalog) + currency_problems(document, spec, catalog))
     _stop_at(missing_figures(document, spec, catalog))
-    return LoadedSpec(
+    return Case(
         spec, catalog, path, document.positions, document.sha256, collection.sha256(),
         document.text, collection.origins, builtin, trajectory=trajectory,
     )  # fmt: skip
@@ -194,11 +194,11 @@ def _recorded_trajectory(
         return problem_at(document, at, f"cannot read the file: {reason.lower()}")
 
 
-def _beside(loaded: LoadedSpec, found: FilesRead) -> tuple[tuple[str, str], ...]:
+def _beside(case: Case, found: FilesRead) -> tuple[tuple[str, str], ...]:
     """What a spec was read with: its own catalogs, files of delays, trajectory; names, hashes."""
-    folder = loaded.path.parent.resolve()
+    folder = case.path.parent.resolve()
     own = {Path(path).resolve(): digest for path, digest in found.contents.items()}
-    own.pop(loaded.path.resolve(), None)
+    own.pop(case.path.resolve(), None)
     return tuple(
         (path.relative_to(folder).as_posix(), digest)
         for path, digest in sorted(own.items())
@@ -208,7 +208,7 @@ def _beside(loaded: LoadedSpec, found: FilesRead) -> tuple[tuple[str, str], ...]
 
 __all__ = [
     "BadInput",
-    "LoadedSpec",
+    "Case",
     "Problem",
     "catalogs_of",
     "load",
@@ -219,17 +219,17 @@ __all__ = [
 ]
 
 
-def without_simulated(loaded: LoadedSpec) -> LoadedSpec:
+def without_simulated(case: Case) -> Case:
     """The spec without its monte_carlo requirements, every other one still at its own line."""
-    kept = [i for i, r in enumerate(loaded.spec.requirements) if r.kind != "monte_carlo"]
-    requirements = tuple(loaded.spec.requirements[i] for i in kept)
+    kept = [i for i, r in enumerate(case.spec.requirements) if r.kind != "monte_carlo"]
+    requirements = tuple(case.spec.requirements[i] for i in kept)
     renumbered = {old: new for new, old in enumerate(kept)}
     positions: dict[KeyPath, Position] = {}
-    for path, position in loaded.positions.items():
+    for path, position in case.positions.items():
         if path[:1] == ("requirements",) and len(path) > 1:
             if path[1] not in renumbered:
                 continue
             path = ("requirements", renumbered[int(path[1])], *path[2:])
         positions[path] = position
-    spec = loaded.spec.model_copy(update={"requirements": requirements})
-    return replace(loaded, spec=spec, positions=positions)
+    spec = case.spec.model_copy(update={"requirements": requirements})
+    return replace(case, spec=spec, positions=positions)

@@ -15,7 +15,7 @@ from typing import Any
 from syncline_design import __version__
 from syncline_design.machine.input_files import ReplacedInputError, noting
 from syncline_design.spec.factors import plain
-from syncline_design.spec.load import BadInput, LoadedSpec, without_simulated
+from syncline_design.spec.load import BadInput, Case, without_simulated
 from syncline_design.spec.yaml_text import Problem
 from syncline_design.studies.inputs import inputs_of
 from syncline_design.studies.loading import Base, Study, engine_sha256
@@ -122,8 +122,8 @@ def _judged(
     from syncline_design.simulation import SimulationError
 
     try:
-        loaded = base.load(chosen)
-        return _checked(study, base, loaded, settings)
+        case = base.load(chosen)
+        return _checked(study, base, case, settings)
     except ReplacedInputError:
         raise
     except BadInput as bad:
@@ -134,14 +134,14 @@ def _judged(
         return {"verdict": "indeterminate", "reason": f"{type(error).__name__}: {error}"}
 
 
-def _checked(study: Study, base: Base, loaded: LoadedSpec, settings: CaseSettings) -> Json:
+def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Json:
     from syncline_design.verdict.verify import CheckSettings, check_loaded
 
     simulated = simulates(study, base)
     left_out = () if simulated else base.simulated
     check = study.check
     verdict = check_loaded(
-        without_simulated(loaded) if left_out else loaded,
+        without_simulated(case) if left_out else case,
         CheckSettings(
             seed=settings.seed,
             method=check.method,

@@ -15,7 +15,7 @@ from syncline_design.spec.factors import Factor, FactorError, grid_values, label
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import MOST_PATH, Collection, problem_at
 from syncline_design.spec.keys import CATALOG, KeyPathError, put, resolve
-from syncline_design.spec.load import BadInput, LoadedSpec, catalogs_of, load_document
+from syncline_design.spec.load import BadInput, Case, catalogs_of, load_document
 from syncline_design.spec.references import unknown_ids
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate
@@ -40,7 +40,7 @@ class Base:
     name: str
     currency: str
 
-    def load(self, settings: Sequence[tuple[str, Any]]) -> LoadedSpec:
+    def load(self, settings: Sequence[tuple[str, Any]]) -> Case:
         """The spec with these key paths set; BadInput when the combination cannot be."""
         data, catalogs = self.document.data, self.catalogs
         # A whole mapping before its keys: a platform's id must not undo its distance.
@@ -231,17 +231,17 @@ def _base(
         return None
     try:
         catalogs = catalogs_of(document, target)
-        loaded = load_document(document, target, catalogs)
+        case = load_document(document, target, catalogs)
     except BadInput as bad:
         problems.extend(bad.problems)
         return None
     paths = _paths(document, study, factors, problems, str(target))
-    requirements = loaded.spec.requirements
+    requirements = case.spec.requirements
     simulated = tuple(r.id for r in requirements if r.kind == "monte_carlo")
     has_waivers = any(r.waiver is not None for r in requirements)
     return Base(
-        target, document, catalogs, paths, simulated, has_waivers, loaded.spec.name,
-        loaded.spec.currency,
+        target, document, catalogs, paths, simulated, has_waivers, case.spec.name,
+        case.spec.currency,
     )  # fmt: skip
 
 

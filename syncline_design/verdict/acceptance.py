@@ -32,7 +32,7 @@ from syncline_design.model.timing import (
 from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.simulation.run import DEFAULT_CAP
 from syncline_design.spec.known_effects import effect_entries
-from syncline_design.spec.load import BadInput, LoadedSpec, Problem
+from syncline_design.spec.load import BadInput, Case, Problem
 from syncline_design.spec.spec import Requirement
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
@@ -40,12 +40,12 @@ WHAT_IF_CAP = 400_000  # samples after which a what-if is left open, and so not 
 MOST_SIMULATED = 1000  # different systems simulated for one command before it gives up
 
 
-def simulation_settings(loaded: LoadedSpec, seed: int) -> SimulationSettings:
+def simulation_settings(case: Case, seed: int) -> SimulationSettings:
     """How a spec wants to be simulated; the target is its tightest accuracy (or other) limit."""
-    choice = loaded.spec.monte_carlo
-    limits = [float(r.limit) for r in loaded.spec.requirements if r.kind == "accuracy"]
-    limits = limits or [float(r.limit) for r in loaded.spec.requirements if r.kind == "monte_carlo"]
-    trajectory: str | FileContent | None = loaded.trajectory
+    choice = case.spec.monte_carlo
+    limits = [float(r.limit) for r in case.spec.requirements if r.kind == "accuracy"]
+    limits = limits or [float(r.limit) for r in case.spec.requirements if r.kind == "monte_carlo"]
+    trajectory: str | FileContent | None = case.trajectory
     if trajectory is None and choice.trajectory is not None:
         trajectory = choice.trajectory.manoeuvre
     return SimulationSettings(
@@ -57,11 +57,11 @@ def simulation_settings(loaded: LoadedSpec, seed: int) -> SimulationSettings:
     )
 
 
-def refuse_trajectory(loaded: LoadedSpec, message: str) -> NoReturn:
+def refuse_trajectory(case: Case, message: str) -> NoReturn:
     """A trajectory that cannot be flown, as bad input at its place."""
     place = ("monte_carlo", "trajectory")
-    line, column = loaded.positions.get(place, (0, 0))
-    raise BadInput((Problem(str(loaded.path), line, column, ".".join(place), message),))
+    line, column = case.positions.get(place, (0, 0))
+    raise BadInput((Problem(str(case.path), line, column, ".".join(place), message),))
 
 
 @dataclass
@@ -79,13 +79,11 @@ class Simulations:
     )
     systems: set[System] = field(default_factory=set)
     refusals: int = 0  # of systems beyond the most
-    asked: LoadedSpec | None = None  # the spec itself; every other one is a what-if
+    asked: Case | None = None  # the spec itself; every other one is a what-if
 
-    def decide(
-        self, loaded: LoadedSpec, system: System, quantile: float, limit_m: float
-    ) -> Decision:
+    def decide(self, case: Case, system: System, quantile: float, limit_m: float) -> Decision:
         """Whether a system's quantile keeps a limit; Unfinished once too many were simulated."""
-        settings = replace(simulation_settings(loaded, self.seed), limit_m=None)
+        settings = replace(simulation_settings(case, self.seed), limit_m=None)
         nameless = _nameless(system)
         key = (nameless, settings, quantile, limit_m)
         if key not in self.known:
@@ -93,16 +91,16 @@ class Simulations:
             if len(self.systems) > self.most:
                 self.refusals += 1
                 raise Unfinished(f"the search stopped after {self.most} simulated designs")
-            cap = DEFAULT_CAP if loaded is self.asked else WHAT_IF_CAP
+            cap = DEFAULT_CAP if case is self.asked else WHAT_IF_CAP
             self.known[key] = decide(nameless, settings, quantile, limit_m, cap)
         return self.known[key]
 
-    def problem_of(self, loaded: LoadedSpec) -> DesignProblem:
+    def problem_of(self, case: Case) -> DesignProblem:
         """The design problem of a spec, its simulated requirements included."""
-        wanted = [r for r in loaded.spec.requirements if r.kind == "monte_carlo"]
+        wanted = [r for r in case.spec.requirements if r.kind == "monte_carlo"]
         wanted = [r for r in wanted if not self._is_waived(r)]
-        problem = problem_of(loaded)
-        self.asked = self.asked or loaded
+        problem = problem_of(case)
+        self.asked = self.asked or case
         if not wanted:
             return problem
         limits = tuple((r.id, float(r.limit)) for r in wanted)
@@ -111,7 +109,7 @@ class Simulations:
             for table in with_everything(problem).roles
             for option in table.options
         }
-        return replace(problem, judge=_SpecJudge(self, loaded, tuple(wanted), limits, figures))
+        return replace(problem, judge=_SpecJudge(self, case, tuple(wanted), limits, figures))
 
     def _is_waived(self, requirement: Requirement) -> bool:
         waiver = requirement.waiver
@@ -123,7 +121,7 @@ class _SpecJudge:
     """The simulated requirements of one spec, at limits that may be moved or lifted."""
 
     simulations: Simulations
-    loaded: LoadedSpec
+    case: Case
     requirements: tuple[Requirement, ...]
     limits: tuple[tuple[str, float], ...]
     figures: Mapping[tuple[str, RoleName, tuple[str, str, str]], tuple[Fraction, Fraction]]
@@ -146,7 +144,7 @@ class _SpecJudge:
         places[role] = problem.roles[role].options.index(option)
         design = Design(tuple(places), (0,) * len(problem.vehicles))
         table = problem.roles[role]
-        bare = _noise_alone(system_of(self.loaded, problem, design), table.stage, table.role)
+        bare = _noise_alone(system_of(self.case, problem, design), table.stage, table.role)
         return any(
             self._status(bare, name, HOPELESS * limit) == "fail" for name, limit in self.limits
         )
@@ -155,7 +153,7 @@ class _SpecJudge:
         """Whether a known effect changes the noise of a sensor."""
         from syncline_design.effects import registry
 
-        kinds = [registry()[one.effect].kind for one in effect_entries(self.loaded)]
+        kinds = [registry()[one.effect].kind for one in effect_entries(self.case)]
         return "stochastic" in kinds
 
     def judge(self, problem: DesignProblem, design: Design) -> Judgement:
@@ -171,7 +169,7 @@ class _SpecJudge:
 
     def _system(self, problem: DesignProblem, design: Design) -> System:
         """The design's system; an option whose error or tau was grown has its sensor's grown."""
-        system = system_of(self.loaded, problem, design, effect_entries(self.loaded))
+        system = system_of(self.case, problem, design, effect_entries(self.case))
         for table, place in zip(problem.roles, design.options, strict=True):
             option = table.options[place]
             error, tau = self.figures[table.stage_name, table.role, option.names]
@@ -185,13 +183,13 @@ class _SpecJudge:
         try:
             return self._decision(system, name, limit_m).status
         except SimulationError as error:
-            if self.loaded.spec.monte_carlo.trajectory is not None:
-                refuse_trajectory(self.loaded, str(error))
+            if self.case.spec.monte_carlo.trajectory is not None:
+                refuse_trajectory(self.case, str(error))
             return "indeterminate"
 
     def _decision(self, system: System, name: str, limit_m: float) -> Decision:
         quantile = next(float(r.quantile or 0.0) for r in self.requirements if r.id == name)
-        return self.simulations.decide(self.loaded, system, quantile, limit_m)
+        return self.simulations.decide(self.case, system, quantile, limit_m)
 
     def reached_m(self, problem: DesignProblem, design: Design, requirement: str) -> float:
         """Upper end of the interval of the quantile that the requirement limits [m]."""

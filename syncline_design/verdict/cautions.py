@@ -12,25 +12,23 @@ from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
 from syncline_design.spec.gnss import has_gnss
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.verdict.tree import Verified
 
 Json = dict[str, Any]
 LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed their bound
 
 
-def cautions(
-    loaded: LoadedSpec, verified: Verified, assumed: Sequence[Mapping[str, Any]]
-) -> list[Json]:
+def cautions(case: Case, verified: Verified, assumed: Sequence[Mapping[str, Any]]) -> list[Json]:
     """The `warnings` of a verdict: a code to filter by, a sentence to read, what it is about."""
     return [
         caution.to_json()
         for caution in (
             *_worst_case(verified),
             *_lever_arm(verified),
-            *_clocks(loaded, verified),
+            *_clocks(case, verified),
             *_coverage(verified),
-            *_untyped(loaded, verified),
+            *_untyped(case, verified),
             *_waivers(verified),
             *_simulation(verified),
             *_assumptions(assumed),
@@ -105,10 +103,10 @@ def _lever_arm(verified: Verified) -> Iterator[Caution]:
         )
 
 
-def _clocks(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
+def _clocks(case: Case, verified: Verified) -> Iterator[Caution]:
     """Vehicles whose clocks are taken as common because the spec says nothing."""
     vehicles = {stage.vehicle for stage in verified.system.stages}
-    timed = {stage.vehicle_name for stage in loaded.spec.stages if stage.clock is not None}
+    timed = {stage.vehicle_name for stage in case.spec.stages if stage.clock is not None}
     silent = sorted(vehicles - timed)
     if len(vehicles) > 1 and silent:
         yield Caution(
@@ -159,11 +157,11 @@ def _coverage(verified: Verified) -> Iterator[Caution]:
         )
 
 
-def _untyped(loaded: LoadedSpec, verified: Verified) -> Iterator[Caution]:
+def _untyped(case: Case, verified: Verified) -> Iterator[Caution]:
     """Without GNSS only its type tells whether a position sensor works."""
-    for stage, choice in zip(verified.system.stages, loaded.spec.stages, strict=True):
+    for stage, choice in zip(verified.system.stages, case.spec.stages, strict=True):
         sensor = stage.position
-        if sensor is not None and not sensor.type.strip() and not has_gnss(loaded.spec, choice):
+        if sensor is not None and not sensor.type.strip() and not has_gnss(case.spec, choice):
             yield Caution(
                 "unknown-fact",
                 f"{sensor.id} does not say its `type`, and {stage.name} has no GNSS: "

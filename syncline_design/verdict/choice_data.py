@@ -9,7 +9,7 @@ from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem, ResourceName
 from syncline_design.machine.deadline import Pieces
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.references import parts_in_use
 from syncline_design.verdict.design_data import design_json
 from syncline_design.verdict.open_choice import Picked
@@ -21,7 +21,7 @@ MOST_EXCLUDED = 1000  # rows of `excluded` in a verdict
 
 
 def choice_json(
-    loaded: LoadedSpec,
+    case: Case,
     problem: Problem,
     picked: Picked,
     pieces: Pieces | None = None,
@@ -46,11 +46,11 @@ def choice_json(
     ranked = pieces.listed("next best of every design", lambda: others(every=True))
     return {
         "proof": proof_json(picked),
-        "front": front_json(loaded, problem, points),
-        "front_left_out": left_out(loaded, problem, "cost"),
+        "front": front_json(case, problem, points),
+        "front_left_out": left_out(case, problem, "cost"),
         "staircase": [step.to_json() for step in staircase([p for p in points if not p.undecided])],
-        "next_best": designs_json(loaded, problem, following[:NEXT_BEST]),
-        "next_best_every": designs_json(loaded, problem, ranked[:NEXT_BEST]),
+        "next_best": designs_json(case, problem, following[:NEXT_BEST]),
+        "next_best_every": designs_json(case, problem, ranked[:NEXT_BEST]),
         **excluded_json(problem),
     }
 
@@ -81,7 +81,7 @@ def unproven_json(method: str) -> Json:
 
 
 def front_json(
-    loaded: LoadedSpec,
+    case: Case,
     problem: Problem,
     points: Iterable[FrontPoint],
     resource: str = "cost",
@@ -91,28 +91,28 @@ def front_json(
         {
             resource: float(point.amount),
             "error_m": point.error_m,
-            "design": full_design(loaded, problem, point.design),
+            "design": full_design(case, problem, point.design),
         }
         | _undecided(problem, point.design)
         for point in points
     ]
 
 
-def designs_json(loaded: LoadedSpec, problem: Problem, designs: Iterable[Design]) -> list[Json]:
+def designs_json(case: Case, problem: Problem, designs: Iterable[Design]) -> list[Json]:
     """Designs with what they cost and reach, in the order given."""
-    return [_with_error(loaded, problem, design) for design in designs]
+    return [_with_error(case, problem, design) for design in designs]
 
 
-def full_design(loaded: LoadedSpec, problem: Problem, design: Design) -> Json:
+def full_design(case: Case, problem: Problem, design: Design) -> Json:
     """A design as the `design` key writes it."""
-    figures = design_budget(loaded, problem, design)
-    return design_json(loaded, problem, design, figures)
+    figures = design_budget(case, problem, design)
+    return design_json(case, problem, design, figures)
 
 
-def _with_error(loaded: LoadedSpec, problem: Problem, design: Design) -> Json:
-    figures = design_budget(loaded, problem, design)
-    shown = design_json(loaded, problem, design, figures)
-    error = figures.total(loaded.spec.sync_model)
+def _with_error(case: Case, problem: Problem, design: Design) -> Json:
+    figures = design_budget(case, problem, design)
+    shown = design_json(case, problem, design, figures)
+    error = figures.total(case.spec.sync_model)
     sums = {key: shown[key] for key in ("cost", "mass", "power")}
     return sums | {"error_m": error, "design": shown} | _undecided(problem, design)
 
@@ -125,7 +125,7 @@ def _undecided(problem: Problem, design: Design) -> Json:
     return {"undecided": list(found)} if found else {}
 
 
-def left_out(loaded: LoadedSpec, problem: Problem, resource: ResourceName) -> list[str]:
+def left_out(case: Case, problem: Problem, resource: ResourceName) -> list[str]:
     """What has no place on a front of a resource because its entry does not say how much it takes.
 
     In words, as in `sensor my_gnss`; only entries that a design may use.
@@ -136,7 +136,7 @@ def left_out(loaded: LoadedSpec, problem: Problem, resource: ResourceName) -> li
         usable |= {f"sensor {option.sensor}", f"timestamping method {option.method}"}
     return [
         label
-        for _, label, entry in parts_in_use(loaded.spec, loaded.catalog)
+        for _, label, entry in parts_in_use(case.spec, case.catalog)
         if label in usable and getattr(entry, resource) is None
     ]
 

@@ -12,7 +12,7 @@ from syncline_design.choice.table import Design, Option, Problem
 from syncline_design.model.budget import Budget, SensorRow
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.catalog import Entry
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import candidate_sensors, platform_of
 from syncline_design.verdict.tree import finite
 
@@ -33,7 +33,7 @@ def number(amount: Fraction | None) -> float | None:
     return None if amount is None else float(amount)
 
 
-def design_json(loaded: LoadedSpec, problem: Problem, design: Design, figures: Budget) -> Json:
+def design_json(case: Case, problem: Problem, design: Design, figures: Budget) -> Json:
     """The `design` key of a verdict."""
     sums = evaluate(problem, design)
     rows = {(row.stage, row.role): row for row in figures.sensors}
@@ -41,23 +41,23 @@ def design_json(loaded: LoadedSpec, problem: Problem, design: Design, figures: B
         "cost": number(sums.cost),
         "mass": number(sums.mass),
         "power": number(sums.power),
-        "currency": loaded.spec.currency,
-        "infrastructure": _shared(loaded, problem, sums),
-        "clocks": _clocks(loaded, problem, design),
+        "currency": case.spec.currency,
+        "infrastructure": _shared(case, problem, sums),
+        "clocks": _clocks(case, problem, design),
         "stages": [
             {
                 "name": stage.name,
                 "vehicle": stage.vehicle_name,
                 "platform": stage.platform.use or stage.platform.name or stage.name,
-                "roles": dict(_roles(loaded, problem, design, index, rows)),
+                "roles": dict(_roles(case, problem, design, index, rows)),
             }
-            for index, stage in enumerate(loaded.spec.stages)
+            for index, stage in enumerate(case.spec.stages)
         ],
     }
 
 
 def _roles(
-    loaded: LoadedSpec,
+    case: Case,
     problem: Problem,
     design: Design,
     stage: int,
@@ -66,12 +66,12 @@ def _roles(
     for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
         if table.stage == stage:
             row = rows[table.stage_name, table.role]
-            yield table.role, _role(loaded, stage, table.role, option, row)
+            yield table.role, _role(case, stage, table.role, option, row)
 
 
-def _role(loaded: LoadedSpec, stage: int, role: Any, option: Option, row: SensorRow) -> Json:
-    sensors = dict(candidate_sensors(loaded.spec, loaded.spec.stages[stage], role, loaded.catalog))
-    method = loaded.catalog.timestamping.get(option.method)
+def _role(case: Case, stage: int, role: Any, option: Option, row: SensorRow) -> Json:
+    sensors = dict(candidate_sensors(case.spec, case.spec.stages[stage], role, case.catalog))
+    method = case.catalog.timestamping.get(option.method)
     return {
         "sensor": option.sensor,
         "name": sensors[option.sensor].name or option.sensor,
@@ -89,7 +89,7 @@ def _role(loaded: LoadedSpec, stage: int, role: Any, option: Option, row: Sensor
     }
 
 
-def _shared(loaded: LoadedSpec, problem: Problem, sums: Evaluation) -> list[Json]:
+def _shared(case: Case, problem: Problem, sums: Evaluation) -> list[Json]:
     found = []
     for units in sums.units:
         item = problem.infrastructure[units.infrastructure]
@@ -97,7 +97,7 @@ def _shared(loaded: LoadedSpec, problem: Problem, sums: Evaluation) -> list[Json
         found.append(
             {
                 "id": item.id,
-                "name": loaded.catalog.infrastructure[item.id].name or item.id,
+                "name": case.catalog.infrastructure[item.id].name or item.id,
                 "vehicle": problem.vehicles[units.vehicle].name,
                 "count": units.count,
                 "cost": None if cost is None else float(cost * units.count),
@@ -106,12 +106,12 @@ def _shared(loaded: LoadedSpec, problem: Problem, sums: Evaluation) -> list[Json
     return found
 
 
-def _clocks(loaded: LoadedSpec, problem: Problem, design: Design) -> list[Json]:
+def _clocks(case: Case, problem: Problem, design: Design) -> list[Json]:
     return [
         {
             "vehicle": vehicle.name,
             "id": clock.id,
-            "name": loaded.catalog.clocks[clock.id].name or clock.id,
+            "name": case.catalog.clocks[clock.id].name or clock.id,
             "offset_bound_s": clock.offset_bound_s,
             "cost": number(clock.resources.cost),
         }
@@ -120,9 +120,9 @@ def _clocks(loaded: LoadedSpec, problem: Problem, design: Design) -> list[Json]:
     ]
 
 
-def used_entries(loaded: LoadedSpec, problem: Problem, design: Design) -> list[UsedEntry]:
+def used_entries(case: Case, problem: Problem, design: Design) -> list[UsedEntry]:
     """Every catalog entry a design rests on, each once: platforms, sensors, methods, hardware."""
-    spec, catalog = loaded.spec, loaded.catalog
+    spec, catalog = case.spec, case.catalog
     found: dict[tuple[str, str], Entry] = {}
     for stage in spec.stages:
         name = stage.platform.use or stage.platform.name or stage.name

@@ -26,7 +26,7 @@ from syncline_design.choice.tolerance import (
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_force, within
 from syncline_design.spec.edit import PinnedRole, pinned_spec_text
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import timestamping_of
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.spec.spec import InlineTimestamping
@@ -87,7 +87,7 @@ class Optimisation:
     picked: None when the time limit came before any design; `unfinished` says so.
     """
 
-    loaded: LoadedSpec
+    case: Case
     problem: Problem
     settings: OptimizeSettings
     picked: Picked | None
@@ -112,31 +112,31 @@ class Optimisation:
         return 0 if found.word == "meets" else 3
 
 
-def optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
+def optimize(case: Case, settings: OptimizeSettings) -> Optimisation:
     """The best designs of a spec; pinned roles stay as they are."""
     limit = settings.time_limit_s
     with within(in_force() if limit is None else Deadline(limit)):
-        return _optimize(loaded, settings)
+        return _optimize(case, settings)
 
 
-def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
+def _optimize(case: Case, settings: OptimizeSettings) -> Optimisation:
     build = Simulations(settings.seed).problem_of
-    simulated = any(r.kind == "monte_carlo" for r in loaded.spec.requirements)
+    simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
         settings.seed, settings.method, monte_carlo=simulated or settings.report
     )
     problem = NO_TABLES
     try:
-        problem = build(loaded)
+        problem = build(case)
         in_force().doing("choosing")
         picked = pick(
             problem,
             settings.method,
             None,
-            lambda design: verify(loaded, problem, design, checking),
+            lambda design: verify(case, problem, design, checking),
         )
     except OutOfTime as error:
-        return _unfinished(loaded, problem, settings, checking, str(error))
+        return _unfinished(case, problem, settings, checking, str(error))
     pieces, nothing = Pieces(lambda: refusals(problem)), _no_points()
     points = nothing
     if settings.pareto:
@@ -144,24 +144,24 @@ def _optimize(loaded: LoadedSpec, settings: OptimizeSettings) -> Optimisation:
     designs: tuple[Design, ...] = ()
     hinges = explanation = None
     if picked.verified is None:
-        explanation = explain(loaded, problem, build)
+        explanation = explain(case, problem, build)
     elif picked.exhausted:
         chosen = picked.verified.design
         designs = _designs(problem, chosen, settings, pieces)
         if picked.verified.word == "meets":
-            hinges = _hinges((loaded, problem, chosen, build), pieces)
+            hinges = _hinges((case, problem, chosen, build), pieces)
     if explanation is not None and explanation.cut_short:
         pieces.cut_short.append("reasons and remedies")
     steps = staircase([point for point in points if not point.undecided])
     found = Optimisation(
-        loaded, problem, settings, picked, designs, points, steps, hinges,
+        case, problem, settings, picked, designs, points, steps, hinges,
         explanation, tuple(pieces.cut_short), tuple(pieces.gave_up),
     )  # fmt: skip
     return replace(found, verdict=_verdict(found, checking)) if settings.report else found
 
 
 def _unfinished(
-    loaded: LoadedSpec,
+    case: Case,
     problem: Problem,
     settings: OptimizeSettings,
     checking: CheckSettings,
@@ -169,9 +169,9 @@ def _unfinished(
 ) -> Optimisation:
     """What there is to say when the time limit came before any design."""
     known = None if problem is NO_TABLES else problem
-    verdict = unfinished_verdict(loaded, known, checking, why) if settings.report else None
+    verdict = unfinished_verdict(case, known, checking, why) if settings.report else None
     return Optimisation(
-        loaded,
+        case,
         problem,
         settings,
         None,
@@ -204,7 +204,7 @@ def _designs(
     return (chosen, *pieces.listed("next best designs", others)[: count - 1])
 
 
-def _hinges(given: tuple[LoadedSpec, Problem, Design, Build], pieces: Pieces) -> Hinges:
+def _hinges(given: tuple[Case, Problem, Design, Build], pieces: Pieces) -> Hinges:
     return Hinges(
         pieces.made("slack ledger", lambda: slack_ledger(*given), None),
         pieces.made("tolerances", lambda: _tolerances(*given), None),
@@ -213,11 +213,11 @@ def _hinges(given: tuple[LoadedSpec, Problem, Design, Build], pieces: Pieces) ->
 
 
 def _tolerances(
-    loaded: LoadedSpec, problem: Problem, design: Design, build: Build
+    case: Case, problem: Problem, design: Design, build: Build
 ) -> ToleranceVerdict | None:
     """The verdict under tolerances; None where simulation is refused it."""
     try:
-        return tolerance_verdict(loaded, problem, design, build)
+        return tolerance_verdict(case, problem, design, build)
     except Unfinished:
         return None
 
@@ -226,27 +226,27 @@ def _verdict(found: Optimisation, checking: CheckSettings) -> Json:
     """The verdict of the same design, for a page: nothing is chosen a second time."""
     assert found.picked is not None
     points = found.front if found.settings.pareto and found.settings.resource == "cost" else None
-    return open_verdict(found.loaded, found.problem, found.picked, checking, points=points)
+    return open_verdict(found.case, found.problem, found.picked, checking, points=points)
 
 
 def optimisation_json(found: Optimisation) -> Json:
     """Everything as plain data; `designs` best first, `front` with --pareto."""
-    loaded, problem = found.loaded, found.problem
+    case, problem = found.case, found.problem
     data: Json = {
         "schema": SCHEMA,
         "verdict": "infeasible" if found.exit_code == 1 else "meets",
-        "spec": {"name": loaded.spec.name, "file": str(loaded.path)},
+        "spec": {"name": case.spec.name, "file": str(case.path)},
         "proof": _proof(found),
         "combinations": None if problem is NO_TABLES else str(problem.combinations),
-        "designs": designs_json(loaded, problem, found.designs),
+        "designs": designs_json(case, problem, found.designs),
         **excluded_json(problem),
         "cut_short": list(found.cut_short),
         "gave_up": list(found.gave_up),
         "provenance": {
             "version": __version__,
-            "spec_sha256": loaded.spec_sha256,
-            "catalogs_sha256": loaded.catalogs_sha256,
-            "files": files_json(loaded),
+            "spec_sha256": case.spec_sha256,
+            "catalogs_sha256": case.catalogs_sha256,
+            "files": files_json(case),
             "seed": found.settings.seed,
         },
     }
@@ -255,8 +255,8 @@ def optimisation_json(found: Optimisation) -> Json:
     if found.unfinished:
         data["message"] = _unfinished_line(found)
     if found.settings.pareto:
-        data["front"] = front_json(loaded, problem, found.front, found.settings.resource)
-        data["front_left_out"] = left_out(loaded, problem, found.settings.resource)
+        data["front"] = front_json(case, problem, found.front, found.settings.resource)
+        data["front_left_out"] = left_out(case, problem, found.settings.resource)
         data["staircase"] = [step.to_json() for step in found.prices]
     if found.hinges is not None:
         hinges = found.hinges
@@ -282,8 +282,8 @@ def _unfinished_line(found: Optimisation) -> str:
 
 def optimisation_text(found: Optimisation) -> str:
     """The same for a terminal."""
-    problem, currency = found.problem, found.loaded.spec.currency
-    blocks = [[f"{found.loaded.spec.name} ({found.loaded.path})"]]
+    problem, currency = found.problem, found.case.spec.currency
+    blocks = [[f"{found.case.spec.name} ({found.case.path})"]]
     if found.explanation is not None:
         blocks.append(found.explanation.lines())
     if found.unfinished:
@@ -297,7 +297,7 @@ def optimisation_text(found: Optimisation) -> str:
         prices = presentation.staircase_lines(found.prices, currency, found.settings.resource)
         blocks += [[title, *table], ["What accuracy costs:", *(f"  {line}" for line in prices)]]
     if found.settings.pareto and found.picked is not None:
-        missing = left_out(found.loaded, problem, found.settings.resource)
+        missing = left_out(found.case, problem, found.settings.resource)
         blocks += [[left_out_text(missing, found.settings.resource)]] if missing else []
     blocks += _hinge_blocks(found.hinges)
     blocks += [[line] for line in incomplete_lines(found)]
@@ -336,7 +336,7 @@ def _proof_line(found: Optimisation, picked: Picked) -> str:
         gap = "" if proof.gap is None else f": the optimum is at most {100 * proof.gap:.3g} % lower"
         return (
             f"Found among {problem_size(found.problem)} combinations by "
-            f"{found.loaded.spec.objective} within the time limit, rechecked exactly, not proven "
+            f"{found.case.spec.objective} within the time limit, rechecked exactly, not proven "
             f"optimal{gap}"
         )
     confirmed = " and ".join(ROADS.get(road, road) for road in proof.agrees_with)
@@ -344,7 +344,7 @@ def _proof_line(found: Optimisation, picked: Picked) -> str:
     passed = picked.passed_over
     skipped = f"; {passed} better ones fail the Monte Carlo requirements" if passed else ""
     return (
-        f"Best of {problem_size(found.problem)} combinations by {found.loaded.spec.objective}: "
+        f"Best of {problem_size(found.problem)} combinations by {found.case.spec.objective}: "
         f"proven by {ROADS.get(proof.method, proof.method)}{others}, rechecked exactly{skipped}"
     )
 
@@ -374,25 +374,25 @@ def optimisation_csv(found: Optimisation) -> str:
     return presentation.designs_csv(found.problem, found.designs)
 
 
-def pinned_text(loaded: LoadedSpec, problem: Problem, design: Design) -> str:
+def pinned_text(case: Case, problem: Problem, design: Design) -> str:
     """The spec with a design pinned, for `--write-design`."""
     selected = selection_of(problem, design)
-    index = {stage.name: i for i, stage in enumerate(loaded.spec.stages)}
-    roles = [_pinned(loaded, index[one.stage], one) for one in selected.roles]
+    index = {stage.name: i for i, stage in enumerate(case.spec.stages)}
+    roles = [_pinned(case, index[one.stage], one) for one in selected.roles]
     clocks = {
         i: identity
-        for i, stage in enumerate(loaded.spec.stages)
+        for i, stage in enumerate(case.spec.stages)
         if stage.clock is not None and (identity := selected.clock(stage.vehicle_name)) is not None
     }
-    return pinned_spec_text(loaded, roles, clocks)
+    return pinned_spec_text(case, roles, clocks)
 
 
-def _pinned(loaded: LoadedSpec, index: int, one: RoleSelection) -> PinnedRole:
+def _pinned(case: Case, index: int, one: RoleSelection) -> PinnedRole:
     """What to write for one role; an error given in place stays, with its primitive if it has."""
-    stage = loaded.spec.stages[index]
+    stage = case.spec.stages[index]
     choice = stage.role(one.role)
     assert choice is not None
-    stamping = timestamping_of(loaded.spec, stage, choice, loaded.catalog)
+    stamping = timestamping_of(case.spec, stage, choice, case.catalog)
     if isinstance(stamping, InlineTimestamping):
         return PinnedRole(index, one.role, one.sensor)
     return PinnedRole(index, one.role, one.sensor, one.primitive, one.method)

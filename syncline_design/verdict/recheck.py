@@ -19,7 +19,7 @@ from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from typing import Any, Literal
 
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import candidate_sensors, platform_of, timestamping_of
 from syncline_design.spec.selection import Role, RoleSelection, Selection
 from syncline_design.spec.spec import InlineTimestamping, StageChoice
@@ -92,7 +92,7 @@ class _Chosen:
 
 
 def recheck(
-    loaded: LoadedSpec,
+    case: Case,
     selection: Selection,
     extra_tau_s: Mapping[tuple[str, Role], float] = NO_EXTRA,
     systematic: Sequence[tuple[str, str, float]] = (),
@@ -103,35 +103,35 @@ def recheck(
     errors (term, stage, value [m]).  Raises NotADesign where the spec does not allow a choice.
     """
     with localcontext(Context(prec=DIGITS)):
-        return _recheck(loaded, selection, extra_tau_s, systematic)
+        return _recheck(case, selection, extra_tau_s, systematic)
 
 
 def _recheck(
-    loaded: LoadedSpec,
+    case: Case,
     selection: Selection,
     extra: Mapping[tuple[str, Role], float],
     systematic: Sequence[tuple[str, str, float]],
 ) -> Recheck:
-    chosen = _all_chosen(loaded, selection, extra)
-    stages = loaded.spec.stages
-    moves = {stage.name: _moves(loaded, stage, chosen) for stage in stages}
+    chosen = _all_chosen(case, selection, extra)
+    stages = case.spec.stages
+    moves = {stage.name: _moves(case, stage, chosen) for stage in stages}
     rate = sum((v + turning for v, turning, _ in moves.values()), Decimal(0))
-    meets = list(_meetings(loaded, selection, chosen, moves))
+    meets = list(_meetings(case, selection, chosen, moves))
     tau_sys = max((bound for bound, _ in meets), default=Decimal(0))
     errors = {key: _sensor_error(key[1], one, moves[key[0]]) for key, one in chosen.items()}
     sensor_error = sum(errors.values(), Decimal(0))
     sync_error = rate * tau_sys
-    if loaded.spec.sync_model == "per_sensor":
+    if case.spec.sync_model == "per_sensor":
         sync_error = sum((bound * speed for bound, speed in meets), Decimal(0))
     total = sensor_error + sync_error + sum((Decimal(v) for *_, v in systematic), Decimal(0))
     ratios = [_ratio(rate * tau_sys, sensor_error)]
     for (stage, role), one in chosen.items():
         ratios.append(_ratio(one.tau * _own_rate(role, moves[stage]), errors[stage, role]))
-    amounts = {name: _amount(loaded, selection, chosen, name) for name in BUDGETS}
+    amounts = {name: _amount(case, selection, chosen, name) for name in BUDGETS}
     found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
     found |= {"accuracy": Fraction(total), "sync": Fraction(max(ratios))}
     return Recheck(
-        (*_facts(loaded, selection), *_requirements(loaded, found)),
+        (*_facts(case, selection), *_requirements(case, found)),
         amounts["cost"],
         amounts["mass"],
         amounts["power"],
@@ -160,11 +160,11 @@ def _length(figures: Any, axes: int) -> Decimal:
 
 
 def _all_chosen(
-    loaded: LoadedSpec, selection: Selection, extra: Mapping[tuple[str, Role], float]
+    case: Case, selection: Selection, extra: Mapping[tuple[str, Role], float]
 ) -> dict[tuple[str, Role], _Chosen]:
     """Entries of every role that the spec fills, in its order."""
     out: dict[tuple[str, Role], _Chosen] = {}
-    for stage in loaded.spec.stages:
+    for stage in case.spec.stages:
         for role in ("position", "attitude", "ranging"):
             choice = stage.role(role)
             if choice is None or choice.is_empty:
@@ -172,17 +172,17 @@ def _all_chosen(
             picked = selection.role(stage.name, role)
             if picked is None:
                 raise NotADesign(f"nothing is chosen for {role} of {stage.name}")
-            out[stage.name, role] = _chosen(loaded, stage, picked, extra)
+            out[stage.name, role] = _chosen(case, stage, picked, extra)
     return out
 
 
 def _chosen(
-    loaded: LoadedSpec,
+    case: Case,
     stage: StageChoice,
     picked: RoleSelection,
     extra: Mapping[tuple[str, Role], float],
 ) -> _Chosen:
-    spec, catalog = loaded.spec, loaded.catalog
+    spec, catalog = case.spec, case.catalog
     choice = stage.role(picked.role)
     assert choice is not None
     sensor = dict(candidate_sensors(spec, stage, picked.role, catalog)).get(picked.sensor)
@@ -241,10 +241,8 @@ _Moment = tuple[str, Decimal]  # timeline of a stamp, bound of its error against
 _TRUE_TIME: _Moment = ("utc", Decimal(0))
 
 
-def _moves(
-    loaded: LoadedSpec, stage: StageChoice, chosen: Mapping[tuple[str, Role], _Chosen]
-) -> Moves:
-    platform = platform_of(stage.platform, loaded.catalog)
+def _moves(case: Case, stage: StageChoice, chosen: Mapping[tuple[str, Role], _Chosen]) -> Moves:
+    platform = platform_of(stage.platform, case.catalog)
     if (stage.name, "ranging") not in chosen:
         return _decimal(platform.v_max), Decimal(0), Decimal(0)
     distance = _decimal(platform.distance)
@@ -276,7 +274,7 @@ def _ratio(caused: Decimal, error: Decimal) -> Decimal:
 
 
 def _meetings(
-    loaded: LoadedSpec,
+    case: Case,
     selection: Selection,
     chosen: Mapping[tuple[str, Role], _Chosen],
     moves: Mapping[str, Moves],
@@ -288,7 +286,7 @@ def _meetings(
     chain before it, as stamped by the ranging there) and its attitude are held against that.
     """
     carried: _Moment | None = None
-    for stage in loaded.spec.stages:
+    for stage in case.spec.stages:
         speed, turning, _ = moves[stage.name]
         ranging = chosen.get((stage.name, "ranging"))
         located = _TRUE_TIME if ranging is None else (ranging.timeline, ranging.tau)
@@ -300,43 +298,43 @@ def _meetings(
             attitude = chosen[stage.name, "attitude"]
             held.append(((attitude.timeline, attitude.tau), turning))
         for (timeline, tau), rate in held:
-            yield tau + located[1] + _between(loaded, selection, timeline, located[0]), rate
+            yield tau + located[1] + _between(case, selection, timeline, located[0]), rate
         carried = located
 
 
-def _between(loaded: LoadedSpec, selection: Selection, first: str, second: str) -> Decimal:
+def _between(case: Case, selection: Selection, first: str, second: str) -> Decimal:
     """Bound of the offset between two timelines [s]."""
     if first == second:
         return Decimal(0)
-    return _from_utc(loaded, selection, first) + _from_utc(loaded, selection, second)
+    return _from_utc(case, selection, first) + _from_utc(case, selection, second)
 
 
-def _from_utc(loaded: LoadedSpec, selection: Selection, timeline: str) -> Decimal:
+def _from_utc(case: Case, selection: Selection, timeline: str) -> Decimal:
     if timeline == "utc":
         return Decimal(0)
-    entry = _clock(loaded, selection, timeline.removeprefix("host "))
+    entry = _clock(case, selection, timeline.removeprefix("host "))
     if entry is None:
         return Decimal(0)
     drift = Decimal(0)
     if entry.drift is not None:
         drift = abs(_decimal(entry.drift)) * _decimal(entry.holdover)
-    return _bound(entry.offset, loaded.spec.coverage_factor) + drift
+    return _bound(entry.offset, case.spec.coverage_factor) + drift
 
 
-def _clock(loaded: LoadedSpec, selection: Selection, vehicle: str) -> Any:
+def _clock(case: Case, selection: Selection, vehicle: str) -> Any:
     """The clock of a vehicle; it has to be one that the spec offers."""
     offered: set[str] = set()
-    for stage in loaded.spec.stages:
+    for stage in case.spec.stages:
         if (stage.vehicle or stage.name) == vehicle and stage.clock is not None:
             offered |= set(stage.clock.candidates)
     picked = selection.clock(vehicle)
     if (picked is None) != (not offered) or (picked is not None and picked not in offered):
         raise NotADesign(f"{picked or 'no clock'} is not open to vehicle {vehicle}")
-    return None if picked is None else loaded.catalog.clocks[picked]
+    return None if picked is None else case.catalog.clocks[picked]
 
 
 def _amount(
-    loaded: LoadedSpec,
+    case: Case,
     selection: Selection,
     chosen: Mapping[tuple[str, Role], _Chosen],
     name: Literal["cost", "mass", "power"],
@@ -344,7 +342,7 @@ def _amount(
     """Sum of a resource, exact; shared hardware once per vehicle and full set of channels."""
     bought: list[tuple[Any, int]] = []
     channels: dict[tuple[str, str], int] = {}
-    vehicles = {stage.name: stage.vehicle or stage.name for stage in loaded.spec.stages}
+    vehicles = {stage.name: stage.vehicle or stage.name for stage in case.spec.stages}
     for (stage, _), one in chosen.items():
         bought.append((one.sensor, 1))
         if one.method is not None:
@@ -353,46 +351,46 @@ def _amount(
                 key = (vehicles[stage], item)
                 channels[key] = channels.get(key, 0) + count
     for vehicle in dict.fromkeys(vehicles.values()):
-        clock = _clock(loaded, selection, vehicle)
+        clock = _clock(case, selection, vehicle)
         if clock is not None:
             bought.append((clock, 1))
             for item, count in clock.requires.items():
                 channels[vehicle, item] = channels.get((vehicle, item), 0) + count
     for (_, item), count in channels.items():
-        entry = loaded.catalog.infrastructure[item]
+        entry = case.catalog.infrastructure[item]
         bought.append((entry, (count + entry.channels - 1) // entry.channels))
     amounts = [(getattr(entry, name), count) for entry, count in bought]
     if any(amount is None for amount, _ in amounts):
         return None
-    return sum((_money(loaded, amount) * count for amount, count in amounts), Fraction(0))
+    return sum((_money(case, amount) * count for amount, count in amounts), Fraction(0))
 
 
-def _money(loaded: LoadedSpec, amount: Any) -> Fraction:
+def _money(case: Case, amount: Any) -> Fraction:
     """An amount as written; money in the spec's currency."""
     exact = Fraction(getattr(amount, "exact", amount))
     currency = getattr(amount, "currency", None)
-    if currency in (None, loaded.spec.currency):
+    if currency in (None, case.spec.currency):
         return exact
-    return exact * Fraction(getattr(loaded.spec.exchange_rates[currency], "exact", 0))
+    return exact * Fraction(getattr(case.spec.exchange_rates[currency], "exact", 0))
 
 
-def _requirements(loaded: LoadedSpec, found: Mapping[str, Fraction | None]) -> Iterator[Rechecked]:
-    written = [one for one in loaded.spec.requirements if one.kind != "monte_carlo"]
+def _requirements(case: Case, found: Mapping[str, Fraction | None]) -> Iterator[Rechecked]:
+    written = [one for one in case.spec.requirements if one.kind != "monte_carlo"]
     if not any(one.kind == "sync" for one in written):
         value = found["sync"]
         yield Rechecked(
             IMPLIED_SYNC, "sync", value, Fraction(1), _meets("sync", value, Fraction(1)), True
         )
     for one in written:
-        limit = _money(loaded, one.limit) if one.kind == "cost" else _exact(one.limit)
+        limit = _money(case, one.limit) if one.kind == "cost" else _exact(one.limit)
         value = found[one.kind]
         kind: Kind = one.kind  # type: ignore[assignment]  # monte_carlo is left out above
         yield Rechecked(one.id, kind, value, limit, _meets(one.kind, value, limit))
 
 
-def _facts(loaded: LoadedSpec, selection: Selection) -> Iterator[Rechecked]:
+def _facts(case: Case, selection: Selection) -> Iterator[Rechecked]:
     """The implied requirement that the payload can exist, where it cannot: how much is wrong."""
-    wrong = impossible(loaded, selection)
+    wrong = impossible(case, selection)
     if wrong:
         count, none = Fraction(len(wrong)), Fraction(0)
         yield Rechecked(IMPLIED_FACTS, "feasible", count, none, False, True, "; ".join(wrong))

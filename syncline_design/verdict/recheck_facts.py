@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from syncline_design.spec.load import LoadedSpec
+from syncline_design.spec.load import Case
 from syncline_design.spec.selection import Selection
 
 # Types of sensors that receive GNSS: parts of words, ends of words, the rest as whole words.
@@ -22,53 +22,53 @@ RECEIVER = re.compile(
 )
 
 
-def impossible(loaded: LoadedSpec, selection: Selection) -> list[str]:
+def impossible(case: Case, selection: Selection) -> list[str]:
     """What of a selection cannot work where it stands, in words; empty where all can."""
-    return [*_sensors_and_methods(loaded, selection), *_clocks(loaded, selection)]
+    return [*_sensors_and_methods(case, selection), *_clocks(case, selection)]
 
 
-def _sensors_and_methods(loaded: LoadedSpec, selection: Selection) -> Iterator[str]:
-    received, timed = _received(loaded), _timed(loaded)
-    stages = {stage.name: stage for stage in loaded.spec.stages}
+def _sensors_and_methods(case: Case, selection: Selection) -> Iterator[str]:
+    received, timed = _received(case), _timed(case)
+    stages = {stage.name: stage for stage in case.spec.stages}
     for one in selection.roles:
         choice = stages[one.stage].role(one.role)
         given: Any = getattr(choice, "sensor", None)
-        sensor = given if hasattr(given, "modality") else loaded.catalog.sensors[one.sensor]
+        sensor = given if hasattr(given, "modality") else case.catalog.sensors[one.sensor]
         listens = _asks(sensor) or RECEIVER.search(sensor.type.casefold()) is not None
         if listens and one.stage not in received:
             yield f"{one.sensor} ({one.role} of {one.stage}) needs GNSS, {one.stage} has none"
         if hasattr(getattr(choice, "timestamping", None), "error"):
             continue  # an error given in place names no method
-        follows = _asks_with_hardware(loaded, loaded.catalog.timestamping[one.method])
+        follows = _asks_with_hardware(case, case.catalog.timestamping[one.method])
         if follows and one.stage not in timed:
             yield f"{one.method} ({one.role} of {one.stage}) needs GNSS time, there is none"
 
 
-def _clocks(loaded: LoadedSpec, selection: Selection) -> Iterator[str]:
-    timed = _timed(loaded)
+def _clocks(case: Case, selection: Selection) -> Iterator[str]:
+    timed = _timed(case)
     for one in selection.clocks:
-        if one.id is None or not _asks_with_hardware(loaded, loaded.catalog.clocks[one.id]):
+        if one.id is None or not _asks_with_hardware(case, case.catalog.clocks[one.id]):
             continue
-        aboard = {s.name for s in loaded.spec.stages if (s.vehicle or s.name) == one.vehicle}
+        aboard = {s.name for s in case.spec.stages if (s.vehicle or s.name) == one.vehicle}
         if not aboard & timed:
             yield f"clock {one.id} of {one.vehicle} needs GNSS time, there is none"
 
 
-def _received(loaded: LoadedSpec) -> set[str]:
+def _received(case: Case) -> set[str]:
     """Stages with GNSS of their own."""
     found = set()
-    for number, stage in enumerate(loaded.spec.stages):
+    for number, stage in enumerate(case.spec.stages):
         silent = number == 0 and not (stage.depth or 0)
         if silent if stage.gnss is None else stage.gnss:
             found.add(stage.name)
     return found
 
 
-def _timed(loaded: LoadedSpec) -> set[str]:
+def _timed(case: Case) -> set[str]:
     """Stages with GNSS time: grown from those with GNSS, cable by cable, until nothing is new."""
-    found, grown = _received(loaded), True
+    found, grown = _received(case), True
     while grown:
-        reached = {s.name for s in loaded.spec.stages if s.timing_from in found} - found
+        reached = {s.name for s in case.spec.stages if s.timing_from in found} - found
         found |= reached
         grown = bool(reached)
     return found
@@ -78,6 +78,6 @@ def _asks(entry: Any) -> bool:
     return "gnss" in entry.needs
 
 
-def _asks_with_hardware(loaded: LoadedSpec, entry: Any) -> bool:
-    hardware = loaded.catalog.infrastructure
+def _asks_with_hardware(case: Case, entry: Any) -> bool:
+    hardware = case.catalog.infrastructure
     return _asks(entry) or any(_asks(hardware[name]) for name in entry.requires)

@@ -16,7 +16,7 @@ from syncline_design.model.system import System
 from syncline_design.simulation import MonteCarlo, SimulationError
 from syncline_design.simulation.certified import certified_worst_case_m
 from syncline_design.spec.known_effects import describe
-from syncline_design.spec.load import LoadedSpec, Problem
+from syncline_design.spec.load import Case, Problem
 from syncline_design.spec.resolve import platform_of
 from syncline_design.verdict.recheck import Recheck
 
@@ -192,12 +192,12 @@ def _lever_arm_json(lever_arm: LeverArm, per_sensor: bool) -> Json:
     }
 
 
-def frame(loaded: LoadedSpec, problem: DesignProblem | None, word: str, seed: int) -> Json:
+def frame(case: Case, problem: DesignProblem | None, word: str, seed: int) -> Json:
     """What every verdict holds, with or without a design; problem: None where time ended first."""
-    spec = loaded.spec
+    spec = case.spec
     stages = []
     for stage in spec.stages:
-        platform = platform_of(stage.platform, loaded.catalog)
+        platform = platform_of(stage.platform, case.catalog)
         identity = stage.platform.use or stage.platform.name or stage.name
         stages.append(
             {
@@ -218,7 +218,7 @@ def frame(loaded: LoadedSpec, problem: DesignProblem | None, word: str, seed: in
         "verdict": word,
         "spec": {
             "name": spec.name,
-            "file": str(loaded.path),
+            "file": str(case.path),
             "currency": spec.currency,
             "sync_model": spec.sync_model,
             "objective": spec.objective,
@@ -237,7 +237,7 @@ def frame(loaded: LoadedSpec, problem: DesignProblem | None, word: str, seed: in
         "syncline": None,
         "monte_carlo": None,
         "warnings": [],
-        "provenance": _provenance(loaded, seed),
+        "provenance": _provenance(case, seed),
     }
 
 
@@ -250,25 +250,25 @@ def horizon_json(horizon: Horizon) -> Json:
     }
 
 
-def _provenance(loaded: LoadedSpec, seed: int) -> Json:
+def _provenance(case: Case, seed: int) -> Json:
     import platform
 
     import numpy as np
 
     return {
         "version": __version__,
-        "spec_sha256": loaded.spec_sha256,
-        "catalogs_sha256": loaded.catalogs_sha256,
-        "files": files_json(loaded),
+        "spec_sha256": case.spec_sha256,
+        "catalogs_sha256": case.catalogs_sha256,
+        "files": files_json(case),
         "seed": seed,
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
 
 
-def files_json(loaded: LoadedSpec) -> list[Json]:
+def files_json(case: Case) -> list[Json]:
     """Every file besides spec and shipped catalogs whose content entered the result."""
-    return [{"file": name, "sha256": digest} for name, digest in loaded.files]
+    return [{"file": name, "sha256": digest} for name, digest in case.files]
 
 
 def effects_json(system: System) -> list[Json]:

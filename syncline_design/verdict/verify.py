@@ -21,7 +21,7 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
 from syncline_design.simulation import Decision, MonteCarlo, SimulationError, cross_check, decide
 from syncline_design.spec.known_effects import effect_entries
-from syncline_design.spec.load import BadInput, LoadedSpec, Problem, load
+from syncline_design.spec.load import BadInput, Case, Problem, load
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.spec import Requirement
 from syncline_design.verdict.acceptance import (
@@ -95,7 +95,7 @@ def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
         return [_check_or_refuse(item, alone) for item in read]
 
 
-def _check_or_refuse(read: LoadedSpec | Json, settings: CheckSettings) -> Json:
+def _check_or_refuse(read: Case | Json, settings: CheckSettings) -> Json:
     if isinstance(read, dict):
         return read
     return _or_refused(read.path, lambda _: check_loaded(read, settings))
@@ -114,22 +114,22 @@ def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Json:
         }
 
 
-def check_loaded(loaded: LoadedSpec, settings: CheckSettings) -> Json:
+def check_loaded(case: Case, settings: CheckSettings) -> Json:
     """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
     build = _build(settings)
     problem: DesignProblem | None = None
     with within(_deadline(settings)):
         try:
-            problem = build(loaded)
+            problem = build(case)
             if sole_design(problem) is not None:
-                return _sole_verdict(loaded, problem, settings, build)
-            return _check_open(loaded, problem, replace(settings, time_limit_s=None), build)
+                return _sole_verdict(case, problem, settings, build)
+            return _check_open(case, problem, replace(settings, time_limit_s=None), build)
         except OutOfTime as error:
-            return unfinished_verdict(loaded, problem, settings, str(error))
+            return unfinished_verdict(case, problem, settings, str(error))
 
 
 def _sole_verdict(
-    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+    case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
 ) -> Json:
     """The verdict on the only design that a spec leaves.
 
@@ -140,22 +140,22 @@ def _sole_verdict(
     from syncline_design.verdict.choice_data import excluded_json
 
     everything, design = sole
-    verified = verify(loaded, everything, design, settings)
-    if verified.word == "fails" and names_candidates(loaded.spec):
-        return _infeasible_json(loaded, problem, settings, build)
-    return _verdict_json(loaded, everything, verified, settings, excluded_json(problem))
+    verified = verify(case, everything, design, settings)
+    if verified.word == "fails" and names_candidates(case.spec):
+        return _infeasible_json(case, problem, settings, build)
+    return _verdict_json(case, everything, verified, settings, excluded_json(problem))
 
 
 def unfinished_verdict(
-    loaded: LoadedSpec, problem: DesignProblem | None, settings: CheckSettings, why: str
+    case: Case, problem: DesignProblem | None, settings: CheckSettings, why: str
 ) -> Json:
     """A verdict that the time limit left without a design."""
     from syncline_design.verdict.choice_data import unproven_json
 
-    data = frame(loaded, problem, "indeterminate", settings.seed)
+    data = frame(case, problem, "indeterminate", settings.seed)
     data["requirements"] = [
-        _placed(loaded, index, one, _unmet(loaded, one, in_conflict=False), settings).to_json()
-        for index, one in enumerate(loaded.spec.requirements)
+        _placed(case, index, one, _unmet(case, one, in_conflict=False), settings).to_json()
+        for index, one in enumerate(case.spec.requirements)
     ]
     data["warnings"] = [{"code": "time-limit", "message": f"{why}; no design was found by then"}]
     data["choice"] = {"proof": unproven_json(settings.method)}
@@ -169,9 +169,9 @@ def _build(settings: CheckSettings) -> Build:
     return Simulations(settings.seed, settings.today).problem_of
 
 
-def picked_design(loaded: LoadedSpec, seed: int = 0) -> tuple[DesignProblem, Design]:
+def picked_design(case: Case, seed: int = 0) -> tuple[DesignProblem, Design]:
     """The only design of a pinned spec, or the best of an open one; BadInput when there is none."""
-    problem = Simulations(seed).problem_of(loaded)
+    problem = Simulations(seed).problem_of(case)
     sole = sole_design(problem)
     if sole is not None:
         return sole
@@ -180,17 +180,15 @@ def picked_design(loaded: LoadedSpec, seed: int = 0) -> tuple[DesignProblem, Des
 
     choice = choose(problem)
     if isinstance(choice, Infeasible):
-        line, column = loaded.positions.get(("stages",), (0, 0))
+        line, column = case.positions.get(("stages",), (0, 0))
         message = "no design meets this spec, so there is no system to work with"
-        hint = f"see `syncline-design check {loaded.path.name}`, or pin the sensors"
-        place = (str(loaded.path), line, column, "stages")
+        hint = f"see `syncline-design check {case.path.name}`, or pin the sensors"
+        place = (str(case.path), line, column, "stages")
         raise BadInput((Problem(*place, message, hint=hint),))
     return problem, choice.design
 
 
-def _check_open(
-    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
-) -> Json:
+def _check_open(case: Case, problem: DesignProblem, settings: CheckSettings, build: Build) -> Json:
     """Choose, then verify; without any design say why and what would help."""
     from syncline_design.verdict.open_choice import pick
 
@@ -198,13 +196,13 @@ def _check_open(
         problem,
         settings.method,
         settings.time_limit_s,
-        lambda design: verify(loaded, problem, design, settings),
+        lambda design: verify(case, problem, design, settings),
     )
-    return open_verdict(loaded, problem, picked, settings, build)
+    return open_verdict(case, problem, picked, settings, build)
 
 
 def open_verdict(
-    loaded: LoadedSpec,
+    case: Case,
     problem: DesignProblem,
     picked: Picked,
     settings: CheckSettings,
@@ -216,12 +214,12 @@ def open_verdict(
 
     build = build or _build(settings)
     if sole_design(problem) is not None:
-        return _sole_verdict(loaded, problem, settings, build)
+        return _sole_verdict(case, problem, settings, build)
     if picked.verified is None:
-        return _infeasible_json(loaded, problem, settings, build)
+        return _infeasible_json(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
-    choice = choice_json(loaded, problem, picked, pieces, points)
-    data = _verdict_json(loaded, problem, picked.verified, settings, choice)
+    choice = choice_json(case, problem, picked, pieces, points)
+    data = _verdict_json(case, problem, picked.verified, settings, choice)
     if picked.verified.word != "meets" and not picked.exhausted:
         data["verdict"] = "indeterminate"
     data["warnings"][:0] = [*_unproven(picked), *pieces.cautions]
@@ -244,21 +242,21 @@ def _unproven(picked: Picked) -> list[Json]:
 
 
 def _infeasible_json(
-    loaded: LoadedSpec, problem: DesignProblem, settings: CheckSettings, build: Build
+    case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
 ) -> Json:
     """Why there is no design, and which single changes would help."""
     from syncline_design.choice.explain import explain
     from syncline_design.verdict.choice_data import excluded_json
 
-    found = explain(loaded, problem, build)
-    data = frame(loaded, problem, "infeasible", settings.seed)
+    found = explain(case, problem, build)
+    data = frame(case, problem, "infeasible", settings.seed)
     data["infeasibility"] = found.to_json() | {"text": found.lines()}
     conflict = {m.id for members in (found.conflict, *found.further) for m in members}
     data["requirements"] = [
         _placed(
-            loaded, index, one, _unmet(loaded, one, one.id in conflict, found.minimal), settings
+            case, index, one, _unmet(case, one, one.id in conflict, found.minimal), settings
         ).to_json()
-        for index, one in enumerate(loaded.spec.requirements)
+        for index, one in enumerate(case.spec.requirements)
     ]
     data["choice"] = excluded_json(problem)
     if found.cut_short:
@@ -268,17 +266,17 @@ def _infeasible_json(
 
 
 def _unmet(
-    loaded: LoadedSpec, one: Requirement, in_conflict: bool, minimal: bool = True
+    case: Case, one: Requirement, in_conflict: bool, minimal: bool = True
 ) -> RequirementResult:
     """A requirement of a spec without a design: part of the conflict, or not reached."""
-    unit = UNITS.get(one.kind, loaded.spec.currency)
+    unit = UNITS.get(one.kind, case.spec.currency)
     quantile = None if one.quantile is None else float(one.quantile)
     status: Status = "fail" if in_conflict else "indeterminate"
     part = "part of the conflict" if minimal else "perhaps part of the conflict"
     note = part if in_conflict else "no design to judge it by"
     limit = one.limit
     if one.kind == "cost" and isinstance(limit, Quantity):
-        limit = float(loaded.spec.in_currency(limit))
+        limit = float(case.spec.in_currency(limit))
     return RequirementResult(
         one.id, one.kind, status, None, float(limit), unit, quantile=quantile, note=note
     )
@@ -300,38 +298,36 @@ def exit_code(verdict: Json) -> int:
     return EXIT_CODES[verdict["verdict"]]
 
 
-def verify(
-    loaded: LoadedSpec, problem: DesignProblem, design: Design, settings: CheckSettings
-) -> Verified:
+def verify(case: Case, problem: DesignProblem, design: Design, settings: CheckSettings) -> Verified:
     """Budget, exact recheck, Monte Carlo and every requirement of one design."""
-    system = system_of(loaded, problem, design, effect_entries(loaded))
+    system = system_of(case, problem, design, effect_entries(case))
     known = known_of(system)
     figures = budget(system, known.extra_tau_s, known.systematic)
-    exact = recheck(loaded, selection_of(problem, design), known.extra_tau_s, known.systematic)
-    found, trouble = _monte_carlo(loaded, system, settings)
-    results = tuple(_results(loaded, system, exact, found, settings))
+    exact = recheck(case, selection_of(problem, design), known.extra_tau_s, known.systematic)
+    found, trouble = _monte_carlo(case, system, settings)
+    results = tuple(_results(case, system, exact, found, settings))
     return Verified(design, system, figures, exact, found, results, trouble)
 
 
 def _monte_carlo(
-    loaded: LoadedSpec, system: System, settings: CheckSettings
+    case: Case, system: System, settings: CheckSettings
 ) -> tuple[MonteCarlo | None, str]:
     """The cross-check, or why there is none; a trajectory that cannot be used is bad input."""
     if not settings.monte_carlo:
         return None, "left out on request"
     try:
         in_force().doing("simulating")
-        return cross_check(system, simulation_settings(loaded, settings.seed)), ""
+        return cross_check(system, simulation_settings(case, settings.seed)), ""
     except OutOfTime:
         return None, "the time limit ended it"
     except SimulationError as error:
-        if loaded.spec.monte_carlo.trajectory is not None:
-            refuse_trajectory(loaded, str(error))
+        if case.spec.monte_carlo.trajectory is not None:
+            refuse_trajectory(case, str(error))
         return None, str(error)
 
 
 def _results(
-    loaded: LoadedSpec,
+    case: Case,
     system: System,
     exact: Recheck,
     found: MonteCarlo | None,
@@ -345,9 +341,9 @@ def _results(
                 float(one.limit), UNITS[one.kind], implied=True,
                 note=one.note,
             )  # fmt: skip
-    for index, requirement in enumerate(loaded.spec.requirements):
+    for index, requirement in enumerate(case.spec.requirements):
         if requirement.kind == "monte_carlo":
-            result = _decided(loaded, requirement, system, found, settings)
+            result = _decided(case, requirement, system, found, settings)
         else:
             one = rechecked[requirement.id]
             result = RequirementResult(
@@ -356,14 +352,14 @@ def _results(
                 "pass" if one.passed else "fail",
                 one.value_float,
                 float(one.limit),
-                UNITS.get(one.kind, loaded.spec.currency),
+                UNITS.get(one.kind, case.spec.currency),
                 note="" if one.value is not None else f"a catalog entry gives no {one.kind}",
             )
-        yield _placed(loaded, index, requirement, result, settings)
+        yield _placed(case, index, requirement, result, settings)
 
 
 def _decided(
-    loaded: LoadedSpec,
+    case: Case,
     requirement: Requirement,
     system: System,
     found: MonteCarlo | None,
@@ -377,7 +373,7 @@ def _decided(
     )  # fmt: skip
     if found is None:
         return replace(blank, note="not simulated")
-    simulation = simulation_settings(loaded, settings.seed)
+    simulation = simulation_settings(case, settings.seed)
     try:
         decision = decide(system, simulation, quantile, limit, first=found)
     except OutOfTime:
@@ -400,14 +396,14 @@ def _samples_note(decision: Decision, asked: int) -> str:
 
 
 def _placed(
-    loaded: LoadedSpec,
+    case: Case,
     index: int,
     requirement: Requirement,
     result: RequirementResult,
     settings: CheckSettings,
 ) -> RequirementResult:
     """The result with its place in the spec, its note and its waiver."""
-    line, column = loaded.positions.get(("requirements", index), (None, None))
+    line, column = case.positions.get(("requirements", index), (None, None))
     note = "; ".join(text for text in (requirement.note, result.note) if text)
     waiver = None
     if requirement.waiver is not None:
@@ -421,24 +417,24 @@ def _placed(
 
 
 def _verdict_json(
-    loaded: LoadedSpec,
+    case: Case,
     problem: DesignProblem,
     verified: Verified,
     settings: CheckSettings,
     choice: Json,
 ) -> Json:
-    entries = used_entries(loaded, problem, verified.design)
-    model = loaded.spec.sync_model
-    data = frame(loaded, problem, verified.word, settings.seed)
+    entries = used_entries(case, problem, verified.design)
+    model = case.spec.sync_model
+    data = frame(case, problem, verified.word, settings.seed)
     data["requirements"] = [r.to_json() for r in verified.requirements]
-    data["design"] = design_json(loaded, problem, verified.design, verified.figures)
+    data["design"] = design_json(case, problem, verified.design, verified.figures)
     data["syncline"] = syncline_json(verified.figures, model, float(verified.exact.total_m))
     data["figures"] = figures_json(verified)
     data["monte_carlo"] = None if verified.monte_carlo is None else verified.monte_carlo.to_json()
     data["assumptions"] = assumptions(entries)
     data["sources"] = sources(entries)
     data["effects"] = effects_json(verified.system)
-    data["warnings"] = cautions(loaded, verified, data["assumptions"])
+    data["warnings"] = cautions(case, verified, data["assumptions"])
     if choice:
         data["choice"] = choice
     return data
