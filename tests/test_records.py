@@ -15,6 +15,7 @@ import pytest
 from syncline_design.machine.records import (
     NotThisResultError,
     Record,
+    Unbounded,
     optional,
     read_as,
     schema_of,
@@ -126,3 +127,21 @@ def test_texts_are_changed_everywhere_and_nothing_else() -> None:
     assert shouted.sums["3D"] == 1.5
     assert RESULT.changes[1].text == "said"
     assert shouted.count == 3
+
+
+@dataclass(frozen=True, slots=True)
+class Open(Record):
+    """A figure that may have no end."""
+
+    high_m: Unbounded
+    low_m: Unbounded = 0.0
+
+
+def test_a_figure_without_end_is_null_and_infinite_again_when_read() -> None:
+    assert Open(math.inf).to_json() == {"high_m": None, "low_m": 0.0}
+    assert read_as(Open, '{"high_m": null, "low_m": 2}') == Open(math.inf, 2.0)
+    validator = jsonschema.Draft202012Validator(schema_of(Open, "x/v1", "open"))
+    validator.validate(Open(math.inf).to_json())
+    assert not validator.is_valid({"high_m": "far"})
+    with pytest.raises(NotThisResultError, match="high_m"):
+        read_as(Open, '{"high_m": "inf"}')

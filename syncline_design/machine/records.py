@@ -4,7 +4,7 @@ one back from JSON.
 A result is a frozen dataclass below `Record`; its fields are the keys of its JSON, in their order.
 A field that ends in an underscore stands for the key without it (`from_` is `from`).  A field made
 by `optional()` is left out of the JSON while it is None; every other one is always there, null
-where a figure is unknown or has no end.
+where a figure is unknown or has no end: `float | None` for the one, `Unbounded` for the other.
 
 The rule for versions (`.../v1`): within a version keys are added, never renamed, never given
 another meaning and never dropped.  What is added later is `optional()` or has a default, so that
@@ -16,7 +16,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, ClassVar, Final, TypeVar
+from typing import Annotated, Any, ClassVar, Final, TypeVar
 
 Json = dict[str, Any]
 R = TypeVar("R", bound="Record")
@@ -39,6 +39,26 @@ class Record:
     def to_json(self) -> Json:
         """The record as plain data, ready for `json`."""
         return _record_json(self)
+
+
+class _NullIsInfinite:
+    """Of a float: null in JSON stands for it too, and is read as infinity."""
+
+    @staticmethod
+    def __get_pydantic_core_schema__(source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        def read(value: Any) -> Any:
+            return math.inf if value is None else value
+
+        return core_schema.no_info_before_validator_function(read, handler(source))
+
+    @staticmethod
+    def __get_pydantic_json_schema__(schema: Any, handler: Any) -> Json:
+        return {"anyOf": [handler(schema), {"type": "null"}]}
+
+
+Unbounded = Annotated[float, _NullIsInfinite]  # may be infinite: unlimited, or no end known
 
 
 def optional() -> Any:

@@ -13,6 +13,7 @@ from syncline_design.machine.input_files import (
     noting,
     read_plain,
 )
+from syncline_design.machine.records import Record
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.files import (
     BUILTIN_PACKAGE,
@@ -52,6 +53,17 @@ def _place_and_text(problem: Problem) -> tuple[str, int, int, str]:
     return problem.file, problem.line, problem.column, str(problem)
 
 
+@dataclass(frozen=True, slots=True)
+class FileRead(Record):
+    """A file besides spec and shipped catalogs whose content entered a result.
+
+    file: its name from the spec's folder.
+    """
+
+    file: str
+    sha256: str
+
+
 @dataclass(frozen=True)
 class Case:
     """A spec that can be worked with: its catalogs merged, every reference found.
@@ -69,7 +81,7 @@ class Case:
     text: str = field(repr=False)
     origins: dict[tuple[str, str], str] = field(repr=False)
     builtin: bool = True
-    files: tuple[tuple[str, str], ...] = ()  # read besides: name from the spec's folder, SHA-256
+    files: tuple[FileRead, ...] = ()  # read besides
     trajectory: FileContent | None = None
 
     def place(self, path: KeyPath) -> str:
@@ -194,13 +206,13 @@ def _recorded_trajectory(
         return problem_at(document, at, f"cannot read the file: {reason.lower()}")
 
 
-def _beside(case: Case, found: FilesRead) -> tuple[tuple[str, str], ...]:
-    """What a spec was read with: its own catalogs, files of delays, trajectory; names, hashes."""
+def _beside(case: Case, found: FilesRead) -> tuple[FileRead, ...]:
+    """What a spec was read with: its own catalogs, files of delays, trajectory."""
     folder = case.path.parent.resolve()
     own = {Path(path).resolve(): digest for path, digest in found.contents.items()}
     own.pop(case.path.resolve(), None)
     return tuple(
-        (path.relative_to(folder).as_posix(), digest)
+        FileRead(path.relative_to(folder).as_posix(), digest)
         for path, digest in sorted(own.items())
         if path.is_relative_to(folder) and not path.is_relative_to(BUILTIN_FOLDER)
     )

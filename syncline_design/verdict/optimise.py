@@ -25,6 +25,7 @@ from syncline_design.choice.tolerance import (
 )
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_force, within
+from syncline_design.machine.records import json_of
 from syncline_design.spec.edit import PinnedRole, pinned_spec_text
 from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import timestamping_of
@@ -42,7 +43,6 @@ from syncline_design.verdict.choice_data import (
     unproven_json,
 )
 from syncline_design.verdict.open_choice import Picked, pick
-from syncline_design.verdict.tree import files_json
 from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
 
 SCHEMA = "syncline-design/optimization/v1"
@@ -246,7 +246,7 @@ def optimisation_json(found: Optimisation) -> Json:
             "version": __version__,
             "spec_sha256": case.spec_sha256,
             "catalogs_sha256": case.catalogs_sha256,
-            "files": files_json(case),
+            "files": json_of(case.files),
             "seed": found.settings.seed,
         },
     }

@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from syncline_design.choice.chosen_system import system_of
+from syncline_design.machine.records import json_of
 from syncline_design.model.system import System
 from syncline_design.simulation import SimulationError, SimulationResult, simulate
 from syncline_design.spec.known_effects import effect_entries
 from syncline_design.spec.load import Case
 from syncline_design.verdict.acceptance import refuse_trajectory, simulation_settings
-from syncline_design.verdict.tree import files_json
 from syncline_design.verdict.verify import picked_design
 
 
@@ -29,7 +29,7 @@ class SimulatedSpec:
         provenance = {
             "spec_sha256": self.case.spec_sha256,
             "catalogs_sha256": self.case.catalogs_sha256,
-            "files": files_json(self.case),
+            "files": json_of(self.case.files),
         }
         return {**self.result.to_json(), "spec": spec, "provenance": provenance}
 

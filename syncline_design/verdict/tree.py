@@ -10,6 +10,7 @@ from typing import Any, Literal
 from syncline_design import __version__
 from syncline_design.choice.table import Design
 from syncline_design.choice.table import Problem as DesignProblem
+from syncline_design.machine.records import json_of
 from syncline_design.model.budget import Budget, LeverArm
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import System
@@ -259,16 +260,11 @@ def _provenance(case: Case, seed: int) -> Json:
         "version": __version__,
         "spec_sha256": case.spec_sha256,
         "catalogs_sha256": case.catalogs_sha256,
-        "files": files_json(case),
+        "files": json_of(case.files),
         "seed": seed,
         "python": platform.python_version(),
         "numpy": np.__version__,
     }
-
-
-def files_json(case: Case) -> list[Json]:
-    """Every file besides spec and shipped catalogs whose content entered the result."""
-    return [{"file": name, "sha256": digest} for name, digest in case.files]
 
 
 def effects_json(system: System) -> list[Json]:
