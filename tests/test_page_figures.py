@@ -11,8 +11,9 @@ import pytest
 
 from html_page import Page
 from syncline_design.report.axes import log_ticks
+from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimisations import render_optimize
-from syncline_design.report.pages import render_verdict
+from syncline_design.report.render_html import html
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.optimise import (
     OptimizeSettings,
@@ -35,7 +36,7 @@ def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
     verdict = check_file(ROOT / "specs" / f"{name}.yaml", PLAIN)
     assert any(clock["cost"] for clock in verdict["design"]["clocks"])
     cells: list[str] = []
-    text = render_verdict(verdict)
+    text = html(on_verdict(verdict))
     for caption in ("Payload and timestamping", "Shared hardware and clocks"):
         tables = re.findall(r"<table.*?</table>", text, re.DOTALL)
         [found] = [one for one in tables if caption in one.partition("</caption>")[0]]
@@ -52,7 +53,7 @@ def test_the_page_says_in_words_how_the_choice_was_proven(method: Any) -> None:
     words = {"front": "Pareto front", "milp": "integer program", "enumerate": "enumeration of all"}
     verdict = check_file(MULTIROTOR, CheckSettings(method=method, monte_carlo=False))
     assert verdict["choice"]["proof"]["method"] == method
-    sentence = re.search(r"Found by [^<]*", Page(render_verdict(verdict)).text)
+    sentence = re.search(r"Found by [^<]*", Page(html(on_verdict(verdict))).text)
     assert sentence is not None
     assert words[method] in sentence[0]
     assert "enumerate" not in sentence[0]
@@ -94,7 +95,7 @@ def test_a_figure_in_the_unit_of_another(written: str, value_si: float, shown: s
 
 @pytest.fixture(scope="module")
 def simulated_page() -> str:
-    page = render_verdict(check_file(ROOT / "specs" / "usv_mapping.yaml", CheckSettings()))
+    page = html(on_verdict(check_file(ROOT / "specs" / "usv_mapping.yaml", CheckSettings())))
     return re.sub(r"[\u00a0\u202f\u2009]", " ", page)
 
 

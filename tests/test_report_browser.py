@@ -12,10 +12,10 @@ import pytest
 
 import report_samples as samples
 from syncline_design.report.on_paper import on_paper
+from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.pages import (
     render_diagnosis,
-    render_verdict,
-    render_verdicts,
 )
 from syncline_design.report.render_html import html
 
@@ -50,7 +50,7 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render_verdict(samples.fixed_wing()), encoding="utf-8")
+    path.write_text(html(on_verdict(samples.fixed_wing())), encoding="utf-8")
     return path
 
 
@@ -261,10 +261,10 @@ WIDE, NARROW = ("light", 1280), ("dark", 400)
 @pytest.mark.parametrize(
     ("make", "view"),
     [
-        (lambda: render_verdict(samples.fixed_wing()), WIDE),
-        (lambda: render_verdict(samples.fixed_wing()), NARROW),
-        (lambda: render_verdict(samples.infeasible()), NARROW),
-        (lambda: render_verdicts([samples.fixed_wing(), samples.failing()]), NARROW),
+        (lambda: html(on_verdict(samples.fixed_wing())), WIDE),
+        (lambda: html(on_verdict(samples.fixed_wing())), NARROW),
+        (lambda: html(on_verdict(samples.infeasible())), NARROW),
+        (lambda: html(on_verdicts([samples.fixed_wing(), samples.failing()])), NARROW),
         (lambda: html(on_paper(samples.reproduction())), NARROW),
         (lambda: html(samples.simulation()[0]), NARROW),
         (lambda: render_diagnosis(samples.diagnosis()), WIDE),
@@ -292,7 +292,7 @@ def test_axe_finds_nothing(
 @pytest.mark.parametrize("text", ["".join(samples.HOSTILE), samples.HOSTILE[0], samples.HOSTILE[7]])
 def test_hostile_names_run_nothing(browser: Any, tmp_path: Path, text: str) -> None:
     path = tmp_path / "report.html"
-    path.write_text(render_verdict(samples.with_hostile_text(text)), encoding="utf-8")
+    path.write_text(html(on_verdict(samples.with_hostile_text(text))), encoding="utf-8")
     with Opened(browser, path, viewport={"width": 400, "height": 800}) as opened:
         assert opened.page.evaluate("() => document.scripts.length") == 1
         assert opened.page.evaluate("() => document.images.length") == 0
@@ -305,7 +305,7 @@ def test_hostile_names_run_nothing(browser: Any, tmp_path: Path, text: str) -> N
 def test_injected_script_is_stopped_by_the_policy(browser: Any, tmp_path: Path) -> None:
     """Second line of defence: had something slipped through the escaping, it would not run."""
     path = tmp_path / "report.html"
-    page = render_verdict(samples.fixed_wing())
+    page = html(on_verdict(samples.fixed_wing()))
     hole = "<script>window.owned = 1</script><img src='https://example.invalid/x.png'>"
     path.write_text(page.replace('<main id="main">', '<main id="main">' + hole), "utf-8")
     with Opened(browser, path) as opened:

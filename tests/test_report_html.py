@@ -17,13 +17,15 @@ import report_samples as samples
 from html_page import Page
 from syncline_design.paper.errata import ERRATA
 from syncline_design.report import errata, figures
-from syncline_design.report.pages import render_verdict, render_verdicts
+from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.on_verdicts import on_verdicts
+from syncline_design.report.render_html import html
 from syncline_design.report.text import visible
 
 
 @pytest.fixture(scope="module")
 def page() -> Page:
-    return Page(render_verdict(samples.fixed_wing()))
+    return Page(html(on_verdict(samples.fixed_wing())))
 
 
 def test_page_is_balanced_and_its_ids_are_unique(page: Page) -> None:
@@ -34,10 +36,12 @@ def test_page_is_balanced_and_its_ids_are_unique(page: Page) -> None:
 
 
 def test_every_reference_inside_the_page_leads_somewhere() -> None:
-    html = render_verdict(samples.fixed_wing())
-    page = Page(html)
+    shown = html(on_verdict(samples.fixed_wing()))
+    page = Page(shown)
     ids = {found["id"] for _, found in page.tags if "id" in found}
-    targets = set(re.findall(r'href="#([^"]+)"', html)) | set(re.findall(r"url\(#([^)]+)\)", html))
+    targets = set(re.findall(r'href="#([^"]+)"', shown)) | set(
+        re.findall(r"url\(#([^)]+)\)", shown)
+    )
     for name in ("aria-labelledby", "for"):
         for _, found in page.tags:
             targets |= set((found.get(name) or "").split())
@@ -50,8 +54,8 @@ def test_nothing_is_fetched(page: Page) -> None:
     for tag, found in page.tags:
         for name in fetching & found.keys():
             assert (found[name] or "").startswith("#"), (tag, name, found[name])
-    html = render_verdict(samples.fixed_wing())
-    assert not re.search(r"@import|url\((?!#)", html)
+    shown = html(on_verdict(samples.fixed_wing()))
+    assert not re.search(r"@import|url\((?!#)", shown)
 
 
 def test_policy_allows_exactly_the_pages_own_script(page: Page) -> None:
@@ -113,7 +117,7 @@ def test_every_section_is_there_and_listed(page: Page) -> None:
 
 
 def test_missing_parts_are_left_out() -> None:
-    page = Page(render_verdict(samples.two_stages()))
+    page = Page(html(on_verdict(samples.two_stages())))
     sections = page.attribute("section", "id")
     assert {"simulation", "choice", "effects", "infeasibility"}.isdisjoint(sections)
     assert "unlimited" in page.text
@@ -125,7 +129,7 @@ def test_any_part_may_be_missing_or_null(start: int) -> None:
     keys = sorted(samples.fixed_wing())[start::5]
     without = {k: v for k, v in samples.fixed_wing().items() if k not in keys}
     for verdict in (without, without | dict.fromkeys(keys)):
-        assert Page(render_verdict(verdict)).unbalanced == []
+        assert Page(html(on_verdict(verdict))).unbalanced == []
 
 
 def _leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
@@ -148,7 +152,7 @@ def test_any_optional_leaf_may_be_null() -> None:
                 holder = holder[step] if holder is not None else None
             if holder is not None:
                 holder[path[-1]] = None
-        assert Page(render_verdict(verdict)).unbalanced == []
+        assert Page(html(on_verdict(verdict))).unbalanced == []
 
 
 def test_errata_follow_the_design() -> None:
@@ -163,16 +167,16 @@ def test_errata_follow_the_design() -> None:
 
 
 def test_infeasible_says_why_first() -> None:
-    page = Page(render_verdict(samples.infeasible()))
+    page = Page(html(on_verdict(samples.infeasible())))
     assert page.attribute("section", "id")[0] == "infeasibility"
     assert "Infeasible: no design meets the requirements" in page.text
     assert "ACC-1 and COST-1 cannot hold together" in page.text
-    assert "a factor of 1.8" in page.text
+    assert "sbg_ellipse stamped by gpio, has 1.8 times the timestamp error" in page.text
     assert "COST-1 by 3 400 EUR" in page.text
 
 
 def test_failing_verdict_shows_word_and_symbol() -> None:
-    page = Page(render_verdict(samples.failing()))
+    page = Page(html(on_verdict(samples.failing())))
     assert "Does not meet its requirements" in page.text
     assert "\u2717" in page.text
     assert "87.8\u00a0% over" in page.text
@@ -180,15 +184,15 @@ def test_failing_verdict_shows_word_and_symbol() -> None:
 
 @pytest.mark.parametrize("text", [*samples.HOSTILE[:3], "".join(samples.HOSTILE)])
 def test_hostile_text_stays_text(text: str) -> None:
-    html = render_verdict(samples.with_hostile_text(text))
-    page = Page(html)
+    shown = html(on_verdict(samples.with_hostile_text(text)))
+    page = Page(shown)
     assert len(page.scripts) == 1
     assert "alert(" not in page.scripts[0]
     assert page.attribute("img", "src") == []
     assert page.unbalanced == []
     assert visible(text).strip() in " ".join(page.texts)
-    html.encode("utf-8")
-    assert not re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e]", html)
+    shown.encode("utf-8")
+    assert not re.search(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u202a-\u202e]", shown)
 
 
 @pytest.mark.parametrize("text", [*samples.HOSTILE, "$x^2$", "a_b", "\\alpha", "%d"])
@@ -202,14 +206,15 @@ def test_hostile_text_is_literal_in_figures(text: str) -> None:
 
 @pytest.mark.parametrize("make", [samples.fixed_wing, samples.infeasible])
 def test_same_input_same_bytes(make: Any) -> None:
-    assert render_verdict(make()) == render_verdict(make())
+    assert html(on_verdict(make())) == html(on_verdict(make()))
 
 
 def test_same_bytes_in_another_process() -> None:
     code = (
         "import sys; sys.path.insert(0, sys.argv[1]); import report_samples, hashlib\n"
-        "from syncline_design.report.pages import render_verdict\n"
-        "page = render_verdict(report_samples.fixed_wing())\n"
+        "from syncline_design.report.on_verdict import on_verdict\n"
+        "from syncline_design.report.render_html import html\n"
+        "page = html(on_verdict(report_samples.fixed_wing()))\n"
         "print(hashlib.sha256(page.encode()).hexdigest())"
     )
     tests = str(__import__("pathlib").Path(__file__).parent)
@@ -220,7 +225,7 @@ def test_same_bytes_in_another_process() -> None:
         text=True,
         check=True,
     ).stdout.strip()
-    here = hashlib.sha256(render_verdict(samples.fixed_wing()).encode()).hexdigest()
+    here = hashlib.sha256(html(on_verdict(samples.fixed_wing())).encode()).hexdigest()
     assert out == here
 
 
@@ -231,7 +236,7 @@ def test_size_is_far_below_three_megabytes() -> None:
     verdict["choice"]["front"] = [
         {"cost": 1000.0 + i, "error_m": 1.0 / (i + 1), "design": "x" * 80} for i in range(500)
     ]
-    assert len(render_verdict(verdict).encode()) < 3_000_000
+    assert len(html(on_verdict(verdict)).encode()) < 3_000_000
 
 
 def test_importing_the_report_package_loads_nothing_heavy() -> None:
@@ -252,7 +257,7 @@ def test_several_verdicts_get_an_overview() -> None:
         "file": "bad.yaml",
         "problems": [{"line": 2, "column": 1, "path": "stages", "message": "missing key"}],
     }
-    page = Page(render_verdicts([samples.fixed_wing(), samples.infeasible(), refused]))
+    page = Page(html(on_verdicts([samples.fixed_wing(), samples.infeasible(), refused])))
     assert "1 of 3 specs meet every requirement" in page.text
     assert "missing key" in page.text
     assert page.unbalanced == []

@@ -13,7 +13,7 @@ import pytest
 
 from study_specs import SPEC, write
 from syncline_design.report.figures_study import cost_map, sampled_cases
-from syncline_design.report.markdown import markdown_table
+from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.studies import render_study
 from syncline_design.report.study_words import MOST_ACROSS, heat_table, study_text
 from syncline_design.spec.factors import Factor

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from syncline_design.report.checks import render_checks
-from syncline_design.report.console import verdict_text
+from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.render_console import console
 from syncline_design.spec.load import load
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
@@ -100,7 +101,7 @@ def test_a_long_file_exceeds_its_own_bound_and_every_format_says_why(tmp_path: P
     assert found["monte_carlo"]["worst_case"]["bound_m"] < 4.0
     for form in ("json", "html", "junit", "sarif", "github", "markdown"):
         assert CODE in render_checks(form, [found])
-    shown = " ".join(verdict_text(found, colour=False).split())
+    shown = " ".join(console(on_verdict(found), colour=False).split())
     assert CODE in shown
     assert "place within" not in shown  # times and places are the file's
     assert "from the file" in shown

@@ -10,7 +10,8 @@ from typing import Any
 import pytest
 
 from syncline_design.report.checks import render_checks
-from syncline_design.report.console import verdict_text
+from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.render_console import console
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
@@ -87,7 +88,7 @@ def test_noise_that_is_known_to_be_larger_counts_in_the_worst_case() -> None:
         assert [w["requirement"] for w in found["warnings"] if w["code"] == WORST] == (
             ["NEAR"] if warns else []
         )
-        headline = verdict_text(found, colour=False).splitlines()[0]
+        headline = console(on_verdict(found), colour=False).splitlines()[0]
         assert ("its certified worst case at one sigma exceeds" in headline) == warns
 
 
@@ -121,9 +122,9 @@ def test_every_format_shows_the_warning(form: str) -> None:
 
 
 def test_the_console_shows_warning_horizon_envelope_and_ensemble() -> None:
-    shown = " ".join(verdict_text(verdict("0.80 m"), colour=False).split())
-    assert f"[{WORST}]" in shown
-    for text in ("horizon 1 h, extent 1 km, tilt 0 deg", "at tilts up to 0 deg", "over missions"):
+    shown = " ".join(console(on_verdict(verdict("0.80 m")), colour=False).split())
+    assert f"({WORST})" in shown
+    for text in ("charged for 1 h, extent 1 km, tilt 0 deg", "tilt up to 0 deg", "over missions"):
         assert text in shown
 
 
@@ -136,7 +137,7 @@ def headlines(found: dict[str, Any]) -> dict[str, str]:
     page = render_checks("html", [found])
     overview = render_checks("html", [found, verdict("1.9 m")])
     return {
-        "console": verdict_text(found, colour=False).splitlines()[0],
+        "console": console(on_verdict(found), colour=False).splitlines()[0],
         "markdown": shown["markdown"].splitlines()[0].replace("\\", ""),
         "junit": shown["junit"].split("<system-out>")[1].splitlines()[0],
         "github": next(x for x in shown["github"].splitlines() if x.startswith("::notice")),
@@ -228,9 +229,9 @@ def test_timelines_that_differ_between_stages_of_one_vehicle_are_told_of(
 @pytest.mark.parametrize(
     ("limit_m", "expires", "state", "said"),
     [
-        (0.2, "2999-01-01", "WAIVED", "waived until 2999-01-01: trial"),
-        (0.2, "2021-01-01", "FAIL", "waiver expired on 2021-01-01: trial"),
-        (9.0, "2999-01-01", "PASS", "waived until 2999-01-01: trial"),
+        (0.2, "2999-01-01", "\u25d0 waived", "waived until 2999-01-01: trial"),
+        (0.2, "2021-01-01", "\u2717 fail", "waiver expired on 2021-01-01: trial"),
+        (9.0, "2999-01-01", "\u2713 pass", "waived until 2999-01-01: trial"),
     ],
 )
 def test_console_and_csv_tell_a_waived_requirement_from_a_failed_one(
@@ -238,8 +239,10 @@ def test_console_and_csv_tell_a_waived_requirement_from_a_failed_one(
 ) -> None:
     """Both said FAIL alone; the boat's Syncline is above 0.2 m and below 9 m."""
     found = verdict(f"{limit_m} m, waiver: {{reason: trial, expires: {expires}}}")
-    (line,) = [x for x in verdict_text(found, colour=False).splitlines() if "  NEAR  " in x]
-    assert line.split()[0] == state
+    (line,) = [
+        x for x in console(on_verdict(found), colour=False).splitlines() if x.startswith("  NEAR  ")
+    ]
+    assert line.split()[1:3] == state.split()
     rows = {row["requirement"]: row for row in csv.DictReader(io.StringIO(csv_of(found)))}
     assert rows["NEAR"]["status"] == ("pass" if limit_m > 1.0 else "fail")
     assert rows["NEAR"]["waiver"] == said

@@ -44,7 +44,8 @@ def check(
     """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
     deadline = deadline_of(time_limit)
     from syncline_design.report.checks import CHECK_FORMATS, render_checks
-    from syncline_design.report.console import verdict_text
+    from syncline_design.report.on_verdict import on_verdict
+    from syncline_design.report.render_console import console
     from syncline_design.report.several import skipped_text, summary_line
     from syncline_design.report.write import STDOUT, OutputError
     from syncline_design.spec.folders import spec_files
@@ -60,7 +61,7 @@ def check(
         say(verdict["text"])
     if refused:  # no file is written; what goes to standard output may say so
         targets = [target for target in targets if target.path == STDOUT]
-    text = "\n".join(verdict_text(v) for v in verdicts if v not in refused)
+    text = "\n".join(console(on_verdict(v)) for v in verdicts if v not in refused)
     if len(found.files) != 1 or any(path.is_dir() for path in spec):
         summary = summary_line(verdicts)
         text = f"{text}\n{summary}\n" if text else f"{summary}\n"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from difflib import get_close_matches
 from typing import Any
 
-from syncline_design.report.console import table
+from syncline_design.report.render_console import aligned
 from syncline_design.report.text import visible
 from syncline_design.spec.catalog import Catalog, Entry
+from syncline_design.spec.fields import did_you_mean
 from syncline_design.verdict.design_data import figure_text
 
 SECTIONS = ("platforms", "sensors", "timestamping", "infrastructure", "clocks")
@@ -22,7 +22,7 @@ def list_text(catalog: Catalog, section: str | None) -> str:
         entries: Mapping[str, Entry] = getattr(catalog, name)
         rows = [[identity, visible(e.name), _digest(e)] for identity, e in entries.items()]
         if rows:
-            blocks.append("\n".join([name, *table(rows)]))
+            blocks.append("\n".join([name, *aligned(rows)]))
     return "\n\n".join(blocks) + "\n"
 
 
@@ -60,7 +60,7 @@ def _entry_text(section: str, identity: str, entry: Entry) -> str:
         [key, shown(value), "assumption" if is_assumed(entry, key) else ""]
         for key, value in _figures(entry)
     ]
-    lines = [f"{identity} ({section}): {visible(entry.name)}", *table(rows)]
+    lines = [f"{identity} ({section}): {visible(entry.name)}", *aligned(rows)]
     told = [(label, getattr(entry, label)) for label in ("source", "note")]
     lines += [f"  {label}: {visible(text)}" for label, text in told if text]
     return "\n".join(lines) + "\n"
@@ -76,5 +76,4 @@ def is_assumed(entry: Entry, figure: str) -> bool:
 def suggestion(catalog: Catalog, identity: str) -> str:
     """`; did you mean X?`, or where to look."""
     known = [name for section in SECTIONS for name in getattr(catalog, section)]
-    close = get_close_matches(identity, known, 1)
-    return f"; did you mean {close[0]}?" if close else "; see `syncline-design catalog list`"
+    return f"; {did_you_mean(identity, known) or 'see `syncline-design catalog list`'}"

@@ -23,7 +23,7 @@ def _renderer(name: str) -> Callable[[Sequence[dict[str, Any]]], str]:
         case "json":
             from syncline_design.report.json_out import verdicts_json as render
         case "html":
-            from syncline_design.report.pages import render_verdicts as render
+            return _page
         case "junit":
             from syncline_design.report.junit import render_junit as render
         case "sarif":
@@ -31,9 +31,24 @@ def _renderer(name: str) -> Callable[[Sequence[dict[str, Any]]], str]:
         case "github":
             from syncline_design.report.github import render_github as render
         case "markdown":
-            from syncline_design.report.markdown import render_markdown as render
+            return _markdown
         case "csv":
             from syncline_design.report.csv_out import render_csv as render
         case _:
             raise ValueError(f"unknown format {name}")
     return render
+
+
+def _page(verdicts: Sequence[dict[str, Any]]) -> str:
+    from syncline_design.report.on_verdicts import on_verdicts
+    from syncline_design.report.render_html import html
+
+    return html(on_verdicts(verdicts))
+
+
+def _markdown(verdicts: Sequence[dict[str, Any]]) -> str:
+    """Every verdict in full, one after the other."""
+    from syncline_design.report.on_verdict import on_verdict
+    from syncline_design.report.render_markdown import markdown
+
+    return "\n".join(markdown(on_verdict(verdict)) for verdict in verdicts)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from syncline_design.report.markdown import markdown_table
 from syncline_design.report.on_diagnosis import (
     check_sentences,
     design_lines,
@@ -17,6 +16,7 @@ from syncline_design.report.on_diagnosis import (
     remaining_text,
     sentence_text,
 )
+from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.text import markdown_safe
 from syncline_design.report.verdict_words import Json, items, part
 

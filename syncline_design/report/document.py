@@ -201,8 +201,16 @@ def plain(words: Inline) -> str:
 
 
 def show(table: Table | None, *, silent: bool = False, reach: Reach = "everywhere") -> list[Node]:
-    """A table as a node; none, or one without rows, as nothing."""
-    return [TableNode(table, silent, reach)] if table is not None and table.rows else []
+    """A table as a node; none, or one without rows, as nothing.
+
+    A column in which no row says anything is left out, unless it names the rows.
+    """
+    if table is None or not table.rows:
+        return []
+    kept = [i for i in range(len(table.heads)) if not i or any(row[i].text for row in table.rows)]
+    heads = tuple(table.heads[i] for i in kept)
+    rows = tuple(tuple(row[i] for i in kept) for row in table.rows)
+    return [TableNode(replace(table, heads=heads, rows=rows), silent, reach)]
 
 
 def section(key: str, title: str, nodes: Iterable[Node], label: str = "",

@@ -1,146 +1,85 @@
-"""The design report: one verdict as one offline HTML page."""
+"""What `check` says of one spec: the answer, the design, its errors, what they rest on."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Sequence
 
 from syncline_design.choice.outcome import ROADS
 from syncline_design.report import (
     choice_tables,
     errata,
     numbers,
-    page,
+    verdict_figures,
     verdict_tables,
     verdict_words,
 )
+from syncline_design.report.ci import spec_file, spec_name
+from syncline_design.report.document import (
+    Document,
+    Facts,
+    Group,
+    Heading,
+    Inline,
+    Items,
+    Node,
+    Section,
+    Span,
+    Text,
+    code,
+    given,
+    muted,
+    provenance,
+    section,
+    show,
+    strong,
+)
 from syncline_design.report.simulated import (
+    BEYOND,
     certificate,
     ensemble,
+    histogram_chart,
     quantiles,
     simulation_facts,
 )
-from syncline_design.report.svg import InlineFigure
-from syncline_design.report.text import harmless
-from syncline_design.report.verdict_figures import (
-    accuracy_target,
-    lowest_limit,
-    syncline_curve,
-    verdict_figures,
-)
+from syncline_design.report.table import Table
 from syncline_design.report.verdict_words import Json, items, part
 
-
-@dataclass(frozen=True, slots=True)
-class Explorer:
-    """What the page's script needs to move tau and the target; null where unknown."""
-
-    floor_m: float
-    rate_mps: float
-    tau_s: float
-    tau_crit_s: float | None
-    target_m: float | None
-    sync_limit: float
-    others_pass: bool
-    tau_span: tuple[float, float]
-    target_span: tuple[float, float]
+MOST_OPEN = 12  # rows of a table of the choice that is not folded away
+_PROVEN = muted(" (solved again to prove it)")
 
 
-def render_verdict(verdict: Json) -> str:
-    """The HTML report of one verdict (schema syncline-design/verdict/v1); same input, same bytes.
+def on_verdict(verdict: Json) -> Document:
+    """A verdict as a document (data: schema syncline-design/verdict/v1).
 
-    Any optional part that is missing or null is left out of the page.
+    Any optional part that is missing or null is left out.
     """
-    verdict = harmless(verdict)
-    drawn = verdict_figures(verdict)
-    sections = _sections(verdict, drawn)
-    return page.render_page(
-        "verdict.html.j2",
-        kind="Design report",
-        contents=[(key, label) for key, label in _CONTENTS if sections[key]],
-        sections=sections,
+    return Document(
+        family="Design report",
         outcome=verdict_words.outcome(verdict),
-        name=str(part(verdict, "spec").get("name") or "Unnamed system"),
-        sentence=verdict_words.design_sentence(verdict),
-        key_facts=_key_facts(verdict),
-        figures={key: drawing(drawn.get(key)) for key in _FIGURES},
-        box=drawn["syncline"].box if "syncline" in drawn else None,
-        numbers=numbers,
-        explorer=_explorer(verdict),
-        syncline_facts=_syncline_facts(verdict),
-        simulation_facts=_simulation_facts(verdict),
-        simulation_notes=_simulation_notes(verdict),
-        proof=_proof(verdict),
-        incomplete=part(verdict, "choice").get("incomplete") or (),
-    )
-
-
-def drawing(figure: InlineFigure | None) -> Any:
-    """A figure as ready HTML, None as None."""
-    return None if figure is None else page.trusted_svg(figure.svg)
-
-
-_FIGURES = ("syncline", "timing", "ledger", "histogram", "grid", "choice")
-_CONTENTS = (
-    ("infeasibility", "Why not"),
-    ("requirements", "Requirements"),
-    ("warnings", "Warnings"),
-    ("payload", "Payload"),
-    ("timing", "Timing"),
-    ("syncline", "Syncline"),
-    ("ledger", "Ledger"),
-    ("simulation", "Simulation"),
-    ("choice", "Choice"),
-    ("effects", "Known effects"),
-    ("basis", "Basis"),
-    ("provenance", "Provenance"),
-)
-
-
-def _sections(verdict: Json, drawn: dict[str, InlineFigure]) -> dict[str, Any]:
-    """Content of every section by key; empty where the verdict has none."""
-    tables = verdict_tables
-    has_roles = next(tables.roles(verdict), None) is not None
-    choice, simulated = part(verdict, "choice"), part(verdict, "monte_carlo")
-    candidates: dict[str, Any] = {
-        "infeasibility": part(verdict, "infeasibility"),
-        "requirements": tables.requirements(verdict) if verdict.get("requirements") else None,
-        "warnings": items(verdict, "warnings"),
-        "payload": (tables.payload(verdict), tables.shared(verdict)) if has_roles else None,
-        "timing": tables.taus(verdict) if has_roles else None,
-        "syncline": tables.models(verdict) if "syncline" in drawn else None,
-        "ledger": tables.ledger(verdict) if "ledger" in drawn else None,
-        "simulation": quantiles(simulated) if simulated else None,
-        "choice": choice_tables.choice_tables(verdict) if choice else None,
-        "effects": items(verdict, "effects"),
-        "basis": _basis(verdict),
-        "provenance": _provenance(verdict),
-    }
-    return candidates
-
-
-def _basis(verdict: Json) -> dict[str, Any] | None:
-    tables = [
-        t for t in (verdict_tables.assumptions(verdict), verdict_tables.sources(verdict)) if t
-    ]
-    notes = errata.relevant(verdict)
-    return {"tables": tables, "errata": notes} if tables or notes else None
-
-
-def _provenance(verdict: Json) -> list[tuple[str, str]]:
-    provenance = part(verdict, "provenance")
-    labels = (
-        ("version", "syncline-design"),
-        ("spec_sha256", "Spec, SHA-256"),
-        ("catalogs_sha256", "Catalogs, SHA-256"),
-        ("seed", "Seed"),
-        ("python", "Python"),
-        ("numpy", "NumPy"),
-    )
-    known = [(label, str(provenance[key])) for key, label in labels
-             if provenance.get(key) is not None]  # fmt: skip
-    file = part(verdict, "spec").get("file")
-    return [*([("Spec file", str(file))] if file else []), *known]
+        name=spec_name(verdict),
+        sentences=(verdict_words.design_sentence(verdict),),
+        facts=tuple(_key_facts(verdict)),
+        sections=(
+            *section("problems", "Problems in the file", problems(verdict), "Problems"),
+            *section("infeasibility", "Why no design meets the requirements", _why_not(verdict),
+                     "Why not"),
+            *section("requirements", "Requirements",
+                     show(verdict_tables.requirements(verdict), silent=True)),
+            *section("warnings", "Warnings", _warnings(verdict)),
+            *section("payload", "Payload and timestamping", _payload(verdict), "Payload"),
+            *section("timing", "Timestamp error of each sensor", _timing(verdict), "Timing"),
+            *section("syncline", "Syncline", _syncline(verdict)),
+            *section("ledger", "Where the error comes from", _ledger(verdict), "Ledger"),
+            *section("simulation", "Simulated with the nonlinear chain", _simulation(verdict),
+                     "Simulation"),
+            *section("choice", "The choice", _choice(verdict), "Choice"),
+            *section("effects", "Known systematic effects taken into account", _effects(verdict),
+                     "Known effects"),
+            *section("basis", "Assumptions, sources, errata", _basis(verdict), "Basis", "page"),
+            *_provenance(verdict),
+        ),
+        source=str(part(verdict, "spec").get("file") or ""),
+    )  # fmt: skip
 
 
 def _key_facts(verdict: Json) -> list[tuple[str, str]]:
@@ -150,7 +89,7 @@ def _key_facts(verdict: Json) -> list[tuple[str, str]]:
     if design.get("cost") is not None:
         currency = verdict_tables.currency_of(verdict)
         facts.append(("Price", numbers.money(design["cost"], currency)))
-    target = accuracy_target(verdict)
+    target = verdict_figures.lowest_limit(verdict, "accuracy")
     if syncline.get("total_m") is not None:
         total = numbers.length(syncline["total_m"])
         of = f" of {numbers.length(target)}" if target else ""
@@ -169,33 +108,162 @@ def _key_facts(verdict: Json) -> list[tuple[str, str]]:
     return facts
 
 
-def _syncline_facts(verdict: Json) -> list[tuple[str, str]]:
+def problems(verdict: Json) -> list[Node]:
+    """What is wrong with a file that was refused, each with its place."""
+    entries: tuple[Inline, ...] = tuple(
+        (code(f"{entry.get('file') or spec_file(verdict)}:{entry.get('line')}:"
+              f"{entry.get('column')}"), " ", given(entry.get("path") or ""), ": ",
+         given(entry.get("message")))
+        for entry in items(verdict, "problems")
+    )  # fmt: skip
+    return [Items(entries)] if entries else []
+
+
+def _why_not(verdict: Json) -> list[Node]:
+    why = part(verdict, "infeasibility")
+    if not why:
+        return []
+    told = [str(line).strip() for line in why.get("text") or ()]
+    gaps = tuple(line for line in told if line.startswith(("No option for", "No clock for")))
+    nodes: list[Node] = [Heading("Roles without any option"), Items(gaps)] if gaps else []
+    nodes += _conflict(part(why, "conflict"))
+    for members in why.get("further_conflicts") or ():
+        ending = " cannot hold together." if len(members) > 1 else " cannot be met either."
+        nodes.append(Text(("Apart from that: ", *_members(members), ending)))
+    together = tuple(_joint(entries) for entries in why.get("joint_fixes") or ())
+    if together:
+        nodes += [Heading("What would make it feasible together"), Items(together)]
+    alone = tuple(
+        (given(entry.get("text")), *([_PROVEN] if entry.get("proven") else []))
+        for entry in items(why, "fixes")
+    )
+    if alone:
+        nodes += [Heading("What would make it feasible, each alone"), Items(alone)]
+    elif not why.get("cut_short") and nodes:
+        nodes.append(Text("No single change of a requirement, platform or method was found to "
+                          "help."))  # fmt: skip
+    if why.get("cut_short"):
+        which = "further" if alone or together else "any"
+        nodes.append(Text(f"The time limit ended the search for reasons and remedies: whether "
+                          f"{which} change would help was not worked out."))  # fmt: skip
+    return nodes
+
+
+def _conflict(conflict: Json) -> list[Node]:
+    members = items(conflict, "requirements")
+    if not members:
+        return []
+    several = len(members) > 1
+    title = "Requirements that cannot hold together" if several else (
+        "Requirement that no candidate meets"
+    )  # fmt: skip
+    proven = " Proven minimal: without any one of them the rest can be met."
+    minimal = proven if conflict.get("minimal") and several else ""
+    return [Heading(title), Text((*_members(members), f".{minimal}"))]
+
+
+def _members(members: Sequence[Json]) -> list[str | Span]:
+    """`ACC-1 (line 15), COST-1 (line 17)`, the names strong."""
+    found: list[str | Span] = []
+    for entry in members:
+        line = f" (line {entry.get('line')})" if entry.get("line") else ""
+        comma = ", " if found else ""
+        found += [comma, strong(verdict_words.requirement_name(entry)), line]
+    return found
+
+
+def _joint(entries: Sequence[Json]) -> tuple[str | Span, ...]:
+    told: list[str | Span] = []
+    for entry in entries:
+        told += [" and " if told else "", given(entry.get("text"))]
+    return (*told, _PROVEN)
+
+
+def _warnings(verdict: Json) -> list[Node]:
+    entries: tuple[Inline, ...] = tuple(
+        (given(entry.get("message")), " (", code(entry.get("code") or "warning"), ")")
+        for entry in items(verdict, "warnings")
+    )
+    return [Items(entries, "!", "warn")] if entries else []
+
+
+def _payload(verdict: Json) -> list[Node]:
+    return [
+        *show(verdict_tables.payload(verdict), silent=True),
+        *show(verdict_tables.shared(verdict)),
+    ]
+
+
+def _timing(verdict: Json) -> list[Node]:
+    table = verdict_tables.taus(verdict)
+    if not table.rows:
+        return []
+    lead = ("A sensor whose \u03c4 stays below its \u03c4_crit is limited by its own noise, not by "
+            "its timestamps.")  # fmt: skip
+    return [Text(lead), *verdict_figures.timing_chart(verdict), *show(table, silent=True)]
+
+
+def _syncline(verdict: Json) -> list[Node]:
     syncline = part(verdict, "syncline")
+    chart = verdict_figures.syncline_chart(verdict)
+    if not chart:
+        return []
+    tau, crit = (numbers.finite(syncline.get(key)) for key in ("tau_s", "tau_crit_s"))
+    bound = "synchronisation" if tau and crit and tau >= crit else "sensor noise"
     facts = [
         ("Sensor error (roof)", numbers.length(syncline.get("sensor_error_m"))),
         ("Synchronisation rate (slope)", numbers.speed(syncline.get("sync_rate_mps"))),
-        ("\u03c4 of the system", numbers.time(syncline.get("tau_s"))),
-        ("\u03c4_crit of the system", numbers.time_limit(syncline.get("tau_crit_s"))),
+        ("\u03c4 of the system", numbers.time(tau)),
+        ("\u03c4_crit of the system", numbers.time_limit(crit)),
+        ("Bound by", bound),
         ("Synchronisation error", numbers.length(syncline.get("sync_error_m"))),
         ("Total error", numbers.length(syncline.get("total_m"))),
     ]
     if syncline.get("systematic_error_m"):
         facts.insert(-1, ("Known effects", numbers.length(syncline["systematic_error_m"])))
-    return facts
-
-
-def _simulation_facts(verdict: Json) -> list[tuple[str, str]]:
-    """The facts of the Monte Carlo part, and the horizon that it runs over."""
-    facts = simulation_facts(part(verdict, "monte_carlo"))
     if horizon := part(verdict, "horizon"):
-        facts.append(("Horizon", numbers.horizon(horizon)))
-    return facts
+        facts.append(("Drifts, grids, heave charged for", numbers.horizon(horizon)))
+    column = Group((Facts(tuple(facts)), *verdict_figures.explorer(verdict)))
+    return [Group((*chart, column), "split"), *show(verdict_tables.models(verdict))]
 
 
-def _simulation_notes(verdict: Json) -> list[str]:
-    """For what the upper bound holds, and over what the quantiles run, in sentences."""
+def _ledger(verdict: Json) -> list[Node]:
+    table = verdict_tables.ledger(verdict)
+    return [*verdict_figures.ledger_chart(verdict), *show(table, silent=True)]
+
+
+def _simulation(verdict: Json) -> list[Node]:
     monte_carlo = part(verdict, "monte_carlo")
-    return [text for text in (certificate(monte_carlo), ensemble(monte_carlo)) if text]
+    if not monte_carlo:
+        return []
+    told = (certificate(monte_carlo), ensemble(monte_carlo))
+    total = numbers.finite(part(verdict, "syncline").get("total_m"))
+    charts = [*histogram_chart(monte_carlo, total), *verdict_figures.grid_chart(verdict)]
+    return [
+        Facts(tuple(simulation_facts(monte_carlo))),
+        *(Text(text, quiet=True) for text in (*told, BEYOND) if text),
+        *([Group(tuple(charts), "pair")] if charts else []),
+        *show(quantiles(monte_carlo)),
+    ]
+
+
+def _choice(verdict: Json) -> list[Node]:
+    choice = part(verdict, "choice")
+    proof = _proof(verdict)
+    nodes: list[Node] = [Text(proof)] if proof else []
+    nodes += [Text((strong(line),), reach="page") for line in choice.get("incomplete") or ()]
+    nodes += verdict_figures.choice_chart(verdict)
+    for table in choice_tables.choice_tables(verdict):
+        nodes += _folded(table)
+    return nodes
+
+
+def _folded(table: Table) -> list[Node]:
+    """A table of the choice, on the page only; a long one is opened when it is asked for."""
+    if len(table.rows) <= MOST_OPEN:
+        return show(table, reach="page")
+    summary = f"{table.caption} ({len(table.rows)} rows)"
+    return [Group(tuple(show(table)), "fold", summary=summary, reach="page")]
 
 
 def _proof(verdict: Json) -> str:
@@ -219,25 +287,40 @@ def _grouped(digits: str) -> str:
     return f"{int(digits):,}".replace(",", "\N{NO-BREAK SPACE}")
 
 
-def _explorer(verdict: Json) -> Explorer | None:
-    """Values for the sliders; the total follows the model that decides, in proportion to tau."""
-    curve = syncline_curve(verdict)
-    if curve is None or not curve.tau_s or curve.total_m is None:
-        return None
-    rows = items(verdict, "requirements")
-    fixed = [row for row in rows if row.get("kind") not in ("accuracy", "sync", "monte_carlo")]
-    rate = (curve.total_m - curve.floor_m) / curve.tau_s
-    centre = curve.tau_crit_s or curve.tau_s
-    target = curve.target_m
-    middle = target or curve.total_m
-    return Explorer(
-        floor_m=curve.floor_m,
-        rate_mps=rate,
-        tau_s=curve.tau_s,
-        tau_crit_s=curve.tau_crit_s,
-        target_m=target,
-        sync_limit=lowest_limit(verdict, "sync") or 1.0,
-        others_pass=all(verdict_words.status_of(row).word in ("pass", "waived") for row in fixed),
-        tau_span=(min(centre / 1e3, curve.tau_s / 2), max(centre * 1e2, curve.tau_s * 2)),
-        target_span=(min(middle, curve.floor_m) / 4, max(middle, curve.total_m) * 10),
+def _effects(verdict: Json) -> list[Node]:
+    entries: list[Inline] = []
+    for entry in items(verdict, "effects"):
+        sentence = entry.get("sentence")
+        place = f"{entry.get('stage')} {entry.get('sensor')}"
+        said: list[str | Span] = [given(f"{sentence} ")] if sentence else []
+        entries.append((*said, "(", code(entry.get("effect")), ", ", given(place), ")"))
+    return [Items(tuple(entries))] if entries else []
+
+
+def _basis(verdict: Json) -> list[Node]:
+    notes = tuple(errata.relevant(verdict))
+    title = Heading("Errata of the paper that bear on this design")
+    nodes = [*show(verdict_tables.assumptions(verdict)), *show(verdict_tables.sources(verdict))]
+    return [*nodes, title, Items(notes)] if notes else nodes
+
+
+def _provenance(verdict: Json) -> list[Section]:
+    """In full on the page; in one line elsewhere."""
+    found = part(verdict, "provenance")
+    labels = (
+        ("version", "syncline-design"),
+        ("spec_sha256", "Spec, SHA-256"),
+        ("catalogs_sha256", "Catalogs, SHA-256"),
+        ("seed", "Seed"),
+        ("python", "Python"),
+        ("numpy", "NumPy"),
     )
+    known = [(label, str(found[key])) for key, label in labels if found.get(key) is not None]
+    file = part(verdict, "spec").get("file")
+    full = [*([("Spec file", str(file))] if file else []), *known]
+    line = (
+        f"syncline-design {found.get('version')}, spec {str(found.get('spec_sha256'))[:12]}, "
+        f"catalogs {str(found.get('catalogs_sha256'))[:12]}, seed {found.get('seed')}"
+    )
+    short = section("made-by", "Provenance", [Text(line)] if found else [], reach="text")
+    return [*provenance(full), *short]

@@ -23,11 +23,12 @@ def render_optimize(name: str, found: Optimisation) -> str:
         from syncline_design.report.json_out import json_text
 
         return json_text(optimisation_json(found))
-    from syncline_design.report.on_verdict import render_verdict
+    from syncline_design.report.on_verdict import on_verdict
+    from syncline_design.report.render_html import html
 
     verdict = found.verdict or {}
     told = optimisation_json(found)
     choice = dict(verdict.get("choice") or {})
     choice |= {key: told[key] for key in _HINGES if told.get(key)}
     choice["incomplete"] = incomplete_lines(found)
-    return render_verdict({**verdict, "choice": choice})
+    return html(on_verdict({**verdict, "choice": choice}))

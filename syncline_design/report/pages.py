@@ -3,11 +3,5 @@
 from __future__ import annotations
 
 from syncline_design.report.on_diagnosis import render_diagnosis
-from syncline_design.report.on_verdict import render_verdict
-from syncline_design.report.overview_page import render_verdicts
 
-__all__ = [
-    "render_diagnosis",
-    "render_verdict",
-    "render_verdicts",
-]
+__all__ = ["render_diagnosis"]

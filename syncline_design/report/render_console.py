@@ -138,3 +138,10 @@ def table_lines(
 def _padded(text: str, width: int, tone: Tone, head: Head, paint: Paint | None) -> str:
     aligned = text.rjust(width) if head.numeric else text.ljust(width)
     return paint(aligned, tone) if paint else aligned
+
+
+def aligned(rows: Sequence[Sequence[str]], indent: int = 2) -> list[str]:
+    """Rows without heads as columns."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ("  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) for row in rows)
+    return [" " * indent + line.rstrip() for line in lines]

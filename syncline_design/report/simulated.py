@@ -108,5 +108,8 @@ def histogram_chart(monte_carlo: Json, syncline_m: float | None) -> list[Node]:
 
         return error_histogram(Histogram(known, density, marks, target, syncline_m))
 
-    caption = "Density of the error, with quantiles, target and Syncline where known."
+    caption = (
+        "Density of the error of the simulated samples, with quantiles, target and Syncline where "
+        "known."
+    )
     return [Chart("histogram", draw, caption)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from syncline_design.report import numbers
-from syncline_design.report.markdown import markdown_table
+from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import markdown_safe, sentence_list, visible
 from syncline_design.report.verdict_words import OUTCOMES, Outcome

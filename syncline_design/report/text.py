@@ -75,5 +75,6 @@ def harmless(value: Any) -> Any:
 
 
 def shortened(text: str, most: int = 30) -> str:
-    """Text for a figure's label; the tables have it in full."""
-    return text if len(text) <= most else text[: most - 1] + "\N{HORIZONTAL ELLIPSIS}"
+    """Text made harmless for a figure's label; the tables have it in full."""
+    shown = visible(text)
+    return shown if len(shown) <= most else shown[: most - 1] + "\N{HORIZONTAL ELLIPSIS}"
