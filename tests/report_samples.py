@@ -344,8 +344,8 @@ def infeasible() -> dict[str, Any]:
     verdict["infeasibility"] = {
         "text": [
             "No design meets this spec.",
-            "  No option for attitude of uav: the nearest, sbg_ellipse stamped by gpio, has 1.8 times "
-            "the timestamp error that its own tau_crit allows.",
+            "  No option for attitude of uav: the nearest, sbg_ellipse stamped by gpio, has 1.8 "
+            "times the timestamp error that its own tau_crit allows.",
         ],
         "roles_without_options": [
             {"stage": "uav", "role": "attitude", "nearest": "sbg_ellipse with gpio",
