@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 from study_specs import SPEC
 from syncline_design.comparison.diff import diff
+from syncline_design.comparison.difference import SCHEMA, Difference
+from syncline_design.machine.records import read_as, schema_of
 from syncline_design.report.json_out import json_text
 from syncline_design.report.on_difference import DIFF_FORMATS, headline, on_difference, render_diff
 from syncline_design.report.render_console import console
@@ -42,8 +45,8 @@ DISTANCE = (
 
 def test_equal_specs_differ_in_nothing(files: tuple[Path, Path]) -> None:
     data = diff(*files, PLAIN)
-    assert data["causes"] == []
-    assert data["payload"] == []
+    assert data.causes == ()
+    assert data.payload == ()
     assert headline(data) == (
         "Nothing in the files differs: same payload, still meets its requirements."
     )
@@ -55,12 +58,12 @@ def test_one_change_names_cause_payload_and_price(files: tuple[Path, Path]) -> N
     change(new, DISTANCE)
     data = diff(old, new, PLAIN)
     before, after = check_file(old, PLAIN), check_file(new, PLAIN)
-    assert [(c["key"], c["old"], c["new"]) for c in data["causes"]] == [
+    assert [(c.key, c.old, c.new) for c in data.causes] == [
         ("stages[uav].distance", "100 m", "40 m")
     ]
-    cost = next(s for s in data["sums"] if s["name"] == "cost")
-    assert cost["change"] == after["design"]["cost"] - before["design"]["cost"] != 0
-    roles = [entry["role"] for entry in data["payload"]]
+    cost = next(s for s in data.sums if s.name == "cost")
+    assert cost.change == after["design"]["cost"] - before["design"]["cost"] != 0
+    roles = [entry.role for entry in data.payload]
     sensors = [
         f"uav.{role}"
         for role, entry in before["design"]["stages"][0]["roles"].items()
@@ -77,20 +80,20 @@ def test_several_changes_say_which_one_does_it(files: tuple[Path, Path]) -> None
     old, new = files
     change(new, DISTANCE, ("limit: 0.30 m", "limit: 0.15 m"))
     data = diff(old, new, PLAIN)
-    effects = {c["key"]: c["effect"]["verdict"]["new"] for c in data["causes"]}
+    effects = {c.key: c.effect.verdict.new for c in data.causes if c.effect is not None}
     assert effects == {
         "requirements[ACC-1].limit": "infeasible",
         "stages[uav].distance": "meets",
     }
-    assert data["exit_code"] == 0
+    assert data.exit_code == 0
     assert "alone: now no design meets the requirements" in console(on_difference(data))
 
 
 def test_the_exit_code_is_that_of_the_new_one(files: tuple[Path, Path]) -> None:
     old, new = files
     change(new, ("limit: 0.30 m", "limit: 1 mm"))
-    assert diff(old, new, PLAIN)["exit_code"] == 1
-    assert diff(new, old, PLAIN)["exit_code"] == 0
+    assert diff(old, new, PLAIN).exit_code == 1
+    assert diff(new, old, PLAIN).exit_code == 0
     assert "now no design meets the requirements" in headline(diff(old, new, PLAIN))
 
 
@@ -105,9 +108,9 @@ def test_verdict_files_compare_like_their_specs(files: tuple[Path, Path]) -> Non
     of_specs, of_files = diff(old, new, PLAIN), diff(*saved)
     mixed = diff(old, saved[1], PLAIN)
     for key in ("verdict", "payload", "sums", "error", "exit_code"):
-        assert of_specs[key] == of_files[key] == mixed[key]
+        assert getattr(of_specs, key) == getattr(of_files, key) == getattr(mixed, key)
     keys = {"stages[uav].distance_m"}
-    assert {c["key"] for c in of_files["causes"]} == keys
+    assert {c.key for c in of_files.causes} == keys
 
 
 def test_a_catalog_price_is_a_cause(files: tuple[Path, Path], tmp_path: Path) -> None:
@@ -122,10 +125,10 @@ def test_a_catalog_price_is_a_cause(files: tuple[Path, Path], tmp_path: Path) ->
         change(path, ("[sbg_apogee, sbg_ellipse]", "[own_ins]"))
         path.write_text(path.read_text() + f"catalogs: [{name}]\n", encoding="utf-8")
     data = diff(old, new, PLAIN)
-    causes = {c["key"]: (c["old"], c["new"]) for c in data["causes"]}
+    causes = {c.key: (c.old, c.new) for c in data.causes}
     assert causes["catalog.sensors[own_ins].cost"] == ("100 EUR", "150 EUR")
-    cost = next(s for s in data["sums"] if s["name"] == "cost")
-    assert cost["change"] == 50.0
+    cost = next(s for s in data.sums if s.name == "cost")
+    assert cost.change == 50.0
 
 
 def test_candidates_requirements_and_stages_that_come_and_go(files: tuple[Path, Path]) -> None:
@@ -135,7 +138,7 @@ def test_candidates_requirements_and_stages_that_come_and_go(files: tuple[Path, 
         ("[sbg_apogee, sbg_ellipse]", "[sbg_apogee]"),
         ("  - {id: COST-1, kind: cost, limit: 100000 EUR}\n", ""),
     )
-    causes = {c["key"]: (c["old"], c["new"]) for c in diff(old, new, PLAIN)["causes"]}
+    causes = {c.key: (c.old, c.new) for c in diff(old, new, PLAIN).causes}
     assert causes["stages[uav].attitude.candidates"] == (
         '["sbg_apogee", "sbg_ellipse"]', '["sbg_apogee"]',
     )  # fmt: skip
@@ -210,11 +213,13 @@ def test_each_side_keeps_its_currency(
         assert f"{euros} {first}" in plain
         assert f"{dollars} {second}" in plain
         assert f"{euros} {second}" not in plain
-    cost = next(entry for entry in data["sums"] if entry["name"] == "cost")
-    assert (cost["old_unit"], cost["unit"], cost["change"]) == (first, second, None)
+    cost = next(entry for entry in data.sums if entry.name == "cost")
+    assert (cost.old_unit, cost.unit, cost.change) == (first, second, None)
     assert f"price in {second} (before: {first})" in headline(data)
-    limits = next(r for r in data["requirements"] if r["kind"] == "cost")
-    assert (limits["old"]["unit"], limits["new"]["unit"]) == (first, second)
+    limits = next(r for r in data.requirements if r.kind == "cost")
+    assert limits.old is not None
+    assert limits.new is not None
+    assert (limits.old.unit, limits.new.unit) == (first, second)
 
 
 def test_what_was_taken_out_reads_as_it_was_written(files: tuple[Path, Path]) -> None:
@@ -228,3 +233,16 @@ def test_what_was_taken_out_reads_as_it_was_written(files: tuple[Path, Path]) ->
     assert '"quantile": 0.950, "limit": "0.90 m"' in text
     assert '"parameters": {"latency_s": 0.0010}' in text
     assert '"number"' not in text
+
+
+def test_a_difference_satisfies_its_schema_and_reads_back(files: tuple[Path, Path]) -> None:
+    """Real ones: causes tried alone, designs on both sides, none on either."""
+    change(files[1], DISTANCE, ("limit: 0.30 m", "limit: 0.15 m"))
+    several = diff(*files, PLAIN)
+    change(files[1], ("limit: 0.15 m", "limit: 1 mm"))
+    schema = schema_of(Difference, SCHEMA, "difference")
+    jsonschema.Draft202012Validator.check_schema(schema)
+    for found in (several, diff(*files, PLAIN), diff(files[1], files[1], PLAIN)):
+        text = json_text(found.to_json())
+        jsonschema.validate(json.loads(text), schema)
+        assert read_as(Difference, text) == found

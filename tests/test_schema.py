@@ -9,8 +9,11 @@ from typing import Any
 
 import jsonschema
 import pytest
+from typer.testing import CliRunner
 
+from syncline_design.cli.app import app
 from syncline_design.report.key_glossary import KEYS, STUDY_KEYS
+from syncline_design.report.result_schemas import RESULT_NAMES, result_schema_text
 from syncline_design.report.scaffold import (
     SCHEMA_NAME,
     SPEC_NAME,
@@ -182,3 +185,12 @@ def test_init_leaves_nothing_when_it_cannot_write(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="there already"):
         init_project(tmp_path)
     assert not os.path.lexists(tmp_path / SCHEMA_NAME)
+
+
+@pytest.mark.parametrize("name", RESULT_NAMES)
+def test_the_schema_of_every_result_is_valid_and_printed(name: Any) -> None:
+    """What real results satisfy is tested beside each of them."""
+    text = result_schema_text(name)
+    jsonschema.Draft202012Validator.check_schema(json.loads(text))
+    printed = CliRunner().invoke(app, ["schema", name])
+    assert (printed.exit_code, printed.stdout) == (0, text)

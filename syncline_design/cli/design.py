@@ -196,6 +196,6 @@ def diff(
     from syncline_design.verdict.verify import CheckSettings
 
     targets = output_targets(output, DIFF_FORMATS, [old, new])
-    data = compare(old, new, CheckSettings(seed=seed))
-    emit(console(on_difference(data)), targets, lambda name: render_diff(name, data), quiet=quiet)
-    return int(data["exit_code"])
+    found = compare(old, new, CheckSettings(seed=seed))
+    emit(console(on_difference(found)), targets, lambda name: render_diff(name, found), quiet=quiet)
+    return found.exit_code

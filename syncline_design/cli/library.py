@@ -47,13 +47,19 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 @guarded
 def schema(
     name: Annotated[
-        Literal["spec", "catalog", "study"], typer.Argument(help="spec, catalog or study")
+        Literal["spec", "catalog", "study", "difference"],
+        typer.Argument(help="A kind of file (spec, catalog, study) or of result (difference)."),
     ],
 ) -> int:
-    """Print the JSON Schema of specs, catalogs or studies, for editors."""
+    """Print the JSON Schema of a kind of file, for editors, or of a kind of result."""
+    from syncline_design.report.result_schemas import result_schema_text
     from syncline_design.report.schema import schema_text
 
-    show(schema_text(name))
+    match name:
+        case "spec" | "catalog" | "study":
+            show(schema_text(name))
+        case _:
+            show(result_schema_text(name))
     return 0
 
 

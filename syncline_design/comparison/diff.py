@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from syncline_design.comparison.difference import Cause, Difference, changes, difference
 from syncline_design.comparison.verdict_file import read_verdict, text_of
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.factors import label
@@ -28,7 +29,6 @@ from syncline_design.spec.yaml_text import Document, KeyPath, parse
 from syncline_design.verdict.verify import CheckSettings, check_loaded, exit_code
 
 Json = dict[str, Any]
-SCHEMA = "syncline-design/diff/v1"
 MOST_TRIED = 8  # changes that are also tried one by one
 _ABSENT = object()
 _NAMED = {"stages": "name", "requirements": "id"}
@@ -45,39 +45,22 @@ class Side:
     document: Document | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Cause:
-    """One thing that the files say differently; None: not there.
-
-    effect: what this change alone does to the old spec, where it was tried.
-    """
-
-    key: str
-    old: str | None
-    new: str | None
-    path: KeyPath | None = None
-    effect: Json | None = None
-
-    def to_json(self) -> Json:
-        """The entry under `causes`."""
-        return {"key": self.key, "old": self.old, "new": self.new, "effect": self.effect}
+Found = Iterator[tuple[Cause, KeyPath | None]]  # with its place in the old spec, where it has one
 
 
-def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None) -> Json:
+def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None) -> Difference:
     """The difference of two specs or verdict files (schema syncline-design/diff/v1)."""
     chosen = settings or CheckSettings()
     before, after = read_side(Path(old), chosen), read_side(Path(new), chosen)
     causes = list(_causes(before, after))
     if before.case is not None and after.case is not None and 1 < len(causes) <= MOST_TRIED:
-        causes = [_tried(cause, before, after, chosen) for cause in causes]
-    return {
-        "schema": SCHEMA,
-        "old": {"file": before.file, "verdict": before.verdict["verdict"]},
-        "new": {"file": after.file, "verdict": after.verdict["verdict"]},
-        "causes": [cause.to_json() for cause in causes],
-        **changes(before.verdict, after.verdict),
-        "exit_code": exit_code(after.verdict),
-    }
+        causes = [(_tried(cause, path, before, after, chosen), path) for cause, path in causes]
+    return difference(
+        (before.file, after.file),
+        tuple(cause for cause, _ in causes),
+        changes(before.verdict, after.verdict),
+        exit_code(after.verdict),
+    )
 
 
 def read_side(path: Path, settings: CheckSettings) -> Side:
@@ -91,7 +74,7 @@ def read_side(path: Path, settings: CheckSettings) -> Side:
     return Side(str(path), check_loaded(case, settings), case, document)
 
 
-def _causes(before: Side, after: Side) -> Iterator[Cause]:
+def _causes(before: Side, after: Side) -> Found:
     if before.case is not None and after.case is not None:
         yield from _spec_causes(_expanded(before), _expanded(after), (), "")
     else:
@@ -114,17 +97,17 @@ def _expanded(side: Side) -> Any:
     return {**side.document.data, "stages": tuple(stages)}
 
 
-def _platform_causes(old: Json, new: Json, path: KeyPath, shown: str) -> Iterator[Cause]:
+def _platform_causes(old: Json, new: Json, path: KeyPath, shown: str) -> Found:
     if old["use"] != new["use"]:
-        yield Cause(shown, old["use"] or "in place", new["use"] or "in place", path)
+        yield Cause(shown, old["use"] or "in place", new["use"] or "in place"), path
         return
     stage = shown.removesuffix(".platform")
     for key in PLATFORM_KEYS:
         if old[key] != new[key]:
-            yield Cause(f"{stage}.{key}", old[key], new[key], (*path, key))
+            yield Cause(f"{stage}.{key}", old[key], new[key]), (*path, key)
 
 
-def _spec_causes(old: Any, new: Any, path: KeyPath, shown: str) -> Iterator[Cause]:
+def _spec_causes(old: Any, new: Any, path: KeyPath, shown: str) -> Found:
     """Every place at which two specs' data differ; stages and requirements by their names."""
     if _same(old, new):
         return
@@ -145,12 +128,12 @@ def _spec_causes(old: Any, new: Any, path: KeyPath, shown: str) -> Iterator[Caus
         yield from _named_causes(old, new, path, shown, name)
         return
     tried = None if new is _ABSENT else path
-    yield Cause(shown, _text(old), _text(new), tried)
+    yield Cause(shown, _text(old), _text(new)), tried
 
 
 def _named_causes(
     old: tuple[Any, ...], new: tuple[Any, ...], path: KeyPath, shown: str, key: str
-) -> Iterator[Cause]:
+) -> Found:
     before = {str(item.get(key)): (i, item) for i, item in enumerate(old)}
     after = {str(item.get(key)): item for item in new}
     for identity in dict.fromkeys((*before, *after)):
@@ -160,7 +143,7 @@ def _named_causes(
             yield from _spec_causes(item, after[identity], (*path, index), below)
         else:
             one = before[identity][1] if identity in before else _ABSENT
-            yield Cause(below, _text(one), _text(after.get(identity, _ABSENT)))
+            yield Cause(below, _text(one), _text(after.get(identity, _ABSENT))), None
 
 
 def _same(old: Any, new: Any) -> bool:
@@ -171,35 +154,35 @@ def _text(value: Any) -> str | None:
     return None if value is _ABSENT else label(value)
 
 
-def _verdict_causes(old: Json, new: Json) -> Iterator[Cause]:
+def _verdict_causes(old: Json, new: Json) -> Found:
     """What two verdicts say about their inputs: motion, models, limits."""
     before, after = old.get("spec") or {}, new.get("spec") or {}
     for key in ("sync_model", "objective", "coverage_factor", "currency"):
         if before.get(key) != after.get(key):
-            yield Cause(key, label(before.get(key)), label(after.get(key)))
+            yield Cause(key, label(before.get(key)), label(after.get(key))), None
     stages = {s["name"]: s["platform"] for s in before.get("stages") or ()}
     for stage in after.get("stages") or ():
         platform = stages.get(stage["name"], {})
         for key, value in stage["platform"].items():
             if platform.get(key) != value and key != "name":
                 one = label(platform[key]) if key in platform else None
-                yield Cause(f"stages[{stage['name']}].{key}", one, label(value))
+                yield Cause(f"stages[{stage['name']}].{key}", one, label(value)), None
     limits = {r["id"]: r.get("limit") for r in old["requirements"]}
     for row in new["requirements"]:
         if row["id"] in limits and limits[row["id"]] != row.get("limit"):
             key = f"requirements[{row['id']}].limit"
-            yield Cause(key, label(limits[row["id"]]), label(row.get("limit")))
+            yield Cause(key, label(limits[row["id"]]), label(row.get("limit"))), None
 
 
-def _provenance_causes(old: Json, new: Json) -> Iterator[Cause]:
+def _provenance_causes(old: Json, new: Json) -> Found:
     before, after = old.get("provenance") or {}, new.get("provenance") or {}
     words = {"version": "version", "catalogs_sha256": "catalogs (hash)", "seed": "seed"}
     for key, word in words.items():
         if before.get(key) != after.get(key):
-            yield Cause(word, label(before.get(key)), label(after.get(key)))
+            yield Cause(word, label(before.get(key)), label(after.get(key))), None
 
 
-def _catalog_causes(old: Case, new: Case) -> Iterator[Cause]:
+def _catalog_causes(old: Case, new: Case) -> Found:
     """Catalog entries that both specs can see and that differ."""
     if old.catalogs_sha256 == new.catalogs_sha256:
         return
@@ -213,7 +196,7 @@ def _catalog_causes(old: Case, new: Case) -> Iterator[Cause]:
                 first, second = getattr(one, key), getattr(other, key)
                 if first != second and key not in _SILENT_KEYS:
                     name = f"catalog.{section}[{identity}].{key}"
-                    yield Cause(name, _figure(first), _figure(second))
+                    yield Cause(name, _figure(first), _figure(second)), None
 
 
 def _figure(value: Any) -> str | None:
@@ -225,20 +208,22 @@ def _figure(value: Any) -> str | None:
     return str(getattr(value, "text", None) or value)
 
 
-def _tried(cause: Cause, before: Side, after: Side, settings: CheckSettings) -> Cause:
+def _tried(
+    cause: Cause, place: KeyPath | None, before: Side, after: Side, settings: CheckSettings
+) -> Cause:
     """The cause with what it does alone; nothing where it cannot stand alone."""
-    if cause.path is None or before.case is None or after.document is None:
+    if place is None or before.case is None or after.document is None:
         return cause
     assert before.document is not None
     original = before.document.data
-    whole = cause.path[2:] == ("platform",)
+    whole = place[2:] == ("platform",)
     there = after.document.data if whole else _expanded(after)
-    value = _value_there(there, cause.path, original)
+    value = _value_there(there, place, original)
     if value is _ABSENT:
         return cause
     plain = replace(settings, monte_carlo=False)
     try:
-        data = put(original, cause.path, value)
+        data = put(original, place, value)
         document = replace(before.document, data=data)
         path = before.case.path
         alone = load_document(document, path, catalogs_of(document, path))
@@ -263,85 +248,3 @@ def _value_there(new: Any, path: KeyPath, old: Any) -> Any:
         if new is _ABSENT:
             return _ABSENT
     return new
-
-
-def changes(old: Json, new: Json) -> Json:
-    """Verdict, payload, sums, error and margins of two verdicts, side by side."""
-    currency = _currency(new)
-    sums = (("cost", (_currency(old), currency)), ("mass", ("kg", "kg")), ("power", ("W", "W")))
-    return {
-        "verdict": {"old": old["verdict"], "new": new["verdict"]},
-        "currency": currency,
-        "payload": list(_payload(old, new)),
-        "sums": [
-            _pair(name, units, _design(old, name), _design(new, name)) for name, units in sums
-        ],
-        "error": _pair("error", ("m", "m"), _total(old), _total(new)),
-        "requirements": list(_requirements(old, new)),
-    }
-
-
-def _currency(verdict: Json) -> str:
-    design, spec = verdict.get("design") or {}, verdict.get("spec") or {}
-    return str(design.get("currency") or spec.get("currency") or "EUR")
-
-
-def _design(verdict: Json, key: str) -> float | None:
-    value = (verdict.get("design") or {}).get(key)
-    return float(value) if isinstance(value, int | float) else None
-
-
-def _total(verdict: Json) -> float | None:
-    value = (verdict.get("syncline") or {}).get("total_m")
-    return float(value) if isinstance(value, int | float) else None
-
-
-def _pair(name: str, units: tuple[str, str], old: float | None, new: float | None) -> Json:
-    """Both sides in their own units; amounts in different currencies have no difference."""
-    before, unit = units
-    change = None if old is None or new is None or before != unit else new - old
-    figures = {"old": old, "new": new, "change": change}
-    return {"name": name, "unit": unit, "old_unit": before, **figures}
-
-
-def _picks(verdict: Json) -> dict[str, Json]:
-    stages = (verdict.get("design") or {}).get("stages") or ()
-    return {f"{s['name']}.{role}": entry for s in stages for role, entry in s["roles"].items()}
-
-
-def _payload(old: Json, new: Json) -> Iterator[Json]:
-    """Roles whose sensor or timestamping is another one."""
-    before, after = _picks(old), _picks(new)
-    for role in dict.fromkeys((*before, *after)):
-        one, other = _pick(before.get(role)), _pick(after.get(role))
-        if one != other:
-            yield {"role": role, "old": one, "new": other}
-
-
-def _pick(entry: Json | None) -> Json | None:
-    if entry is None:
-        return None
-    keys = ("sensor", "name", "primitive", "timestamping")
-    return {key: entry.get(key) for key in keys}
-
-
-def _requirements(old: Json, new: Json) -> Iterator[Json]:
-    before = {row["id"]: row for row in old["requirements"]}
-    after = {row["id"]: row for row in new["requirements"]}
-    for identity in dict.fromkeys((*before, *after)):
-        one, other = before.get(identity), after.get(identity)
-        any_row = other or one or {}
-        yield {
-            "id": identity,
-            "kind": any_row.get("kind"),
-            "unit": any_row.get("unit"),
-            "old": _standing(one),
-            "new": _standing(other),
-        }
-
-
-def _standing(row: Json | None) -> Json | None:
-    if row is None:
-        return None
-    keys = ("status", "value", "limit", "margin", "unit", "line", "column")
-    return {key: row.get(key) for key in keys}

@@ -2,21 +2,31 @@
 
 from __future__ import annotations
 
+from syncline_design.comparison.difference import (
+    Cause,
+    Changes,
+    Difference,
+    FigureChange,
+    Pick,
+    RequirementChange,
+    Standing,
+    VerdictChange,
+)
 from syncline_design.report import numbers
 from syncline_design.report.document import Document, Items, Node, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list, visible
-from syncline_design.report.verdict_words import STATUSES, Json, items, kind_text, outcome, part
+from syncline_design.report.verdict_words import KINDS, OUTCOMES, STATUSES
 
 
-def render_diff(name: str, data: Json) -> str:
-    """The text of one format (data: schema syncline-design/diff/v1)."""
+def render_diff(name: str, data: Difference) -> str:
+    """The text of one format."""
     match name:
         case "json":
             from syncline_design.report.json_out import json_text
 
-            return json_text(data)
+            return json_text(data.to_json())
         case "html":
             from syncline_design.report.render_html import html
 
@@ -26,27 +36,29 @@ def render_diff(name: str, data: Json) -> str:
 
             return markdown(on_difference(data))
         case "github":
-            level = "notice" if data.get("exit_code") == 0 else "error"
+            level = "notice" if data.exit_code == 0 else "error"
             text = visible(headline(data)).replace("%", "%25")
-            file = visible(part(data, "new").get("file"))
+            file = visible(data.new.file)
             place = file.replace("%", "%25").replace(":", "%3A").replace(",", "%2C")
             return f"::{level} file={place},line=1::{text}\n"
         case _:
             raise ValueError(f"unknown format {name}")
 
 
-def on_difference(data: Json) -> Document:
-    """A difference as a document (data: schema syncline-design/diff/v1)."""
-    lines = tuple(_cause_line(cause) for cause in items(data, "causes"))
+def on_difference(data: Difference) -> Document:
+    """A difference as a document."""
+    lines = tuple(_cause_line(cause) for cause in data.causes)
     causes: list[Node] = [*show(_causes(data), silent=True, reach="page")]
     causes += [Items(lines, reach="text")] if lines else []
-    old, new = (str(part(data, side).get("file") or side) for side in ("old", "new"))
     return Document(
         family="Difference",
-        outcome=outcome({"verdict": part(data, "verdict").get("new")}),
-        name=f"{old} \N{RIGHTWARDS ARROW} {new}",
+        outcome=OUTCOMES[data.verdict.new],
+        name=f"{data.old.file} \N{RIGHTWARDS ARROW} {data.new.file}",
         sentences=(headline(data),),
-        facts=tuple(_facts(data)),
+        facts=(
+            ("Before", OUTCOMES[data.verdict.old].word),
+            ("Now", OUTCOMES[data.verdict.new].word),
+        ),
         sections=(
             *section("causes", "What differs", causes),
             *section("payload", "Payload", show(_payload(data), silent=True)),
@@ -56,17 +68,9 @@ def on_difference(data: Json) -> Document:
     )
 
 
-def _facts(data: Json) -> list[tuple[str, str]]:
-    verdict = part(data, "verdict")
-    return [
-        (label, outcome({"verdict": verdict.get(side)}).word)
-        for label, side in (("Before", "old"), ("Now", "new"))
-    ]
-
-
-def headline(data: Json) -> str:
+def headline(data: Difference) -> str:
     """`stages[uav].distance 100 m to 60 m: payload changes, -26 500 EUR, still meets.`"""
-    causes = [cause_words(cause) for cause in items(data, "causes")]
+    causes = [cause_words(cause) for cause in data.causes]
     if not causes:
         lead = "Nothing in the files differs"
     elif len(causes) <= 3:
@@ -76,40 +80,32 @@ def headline(data: Json) -> str:
     return f"{lead}: {effect_words(data)}."
 
 
-def effect_words(data: Json) -> str:
+def effect_words(data: Difference | Changes) -> str:
     """`payload changes, +1 900 EUR, error 12 mm larger, still meets its requirements`."""
-    parts = ["payload changes" if items(data, "payload") else "same payload"]
-    cost = next((s for s in items(data, "sums") if s.get("name") == "cost"), {})
-    change = numbers.finite(cost.get("change"))
-    if change:
-        parts.append(signed_change(change, str(data.get("currency"))))
-    elif units_differ(cost):
-        parts.append(f"price in {cost['unit']} (before: {cost['old_unit']})")
-    error = numbers.finite(part(data, "error").get("change"))
+    parts = ["payload changes" if data.payload else "same payload"]
+    cost, error = data.sums[0], data.error.change
+    if cost.change:
+        parts.append(signed_change(cost.change, data.currency))
+    elif cost.units_differ:
+        parts.append(f"price in {cost.unit} (before: {cost.old_unit})")
     if error and abs(error) > 1e-12:
         word = "larger" if error > 0 else "smaller"
         parts.append(f"Syncline error {numbers.length(abs(error))} {word}")
-    if not _has_designs(data):
+    if None in (data.error.old, data.error.new):  # a side has no design
         parts = []
-    return ", ".join([*parts, _verdict_words(part(data, "verdict"))])
+    return ", ".join([*parts, _verdict_words(data.verdict)])
 
 
-def _has_designs(data: Json) -> bool:
-    error = part(data, "error")
-    return error.get("old") is not None and error.get("new") is not None
-
-
-def _verdict_words(verdict: Json) -> str:
-    old, new = str(verdict.get("old")), str(verdict.get("new"))
+def _verdict_words(verdict: VerdictChange) -> str:
     words = {
         "meets": "meets its requirements",
         "fails": "does not meet its requirements",
         "infeasible": "no design meets the requirements",
         "indeterminate": "no verdict",
     }
-    if old == new:
-        return f"still {words.get(new, new)}"
-    return f"now {words.get(new, new)} (before: {words.get(old, old)})"
+    if verdict.old == verdict.new:
+        return f"still {words[verdict.new]}"
+    return f"now {words[verdict.new]} (before: {words[verdict.old]})"
 
 
 def signed_change(change: float, unit: str) -> str:
@@ -118,99 +114,71 @@ def signed_change(change: float, unit: str) -> str:
     return sign + numbers.in_unit(abs(change), unit)
 
 
-def cause_words(cause: Json) -> str:
-    key, old, new = cause.get("key"), cause.get("old"), cause.get("new")
-    if old is None:
-        return f"{key} added ({new})"
-    return f"{key} removed ({old})" if new is None else f"{key} {old} to {new}"
+def cause_words(cause: Cause) -> str:
+    if cause.old is None:
+        return f"{cause.key} added ({cause.new})"
+    if cause.new is None:
+        return f"{cause.key} removed ({cause.old})"
+    return f"{cause.key} {cause.old} to {cause.new}"
 
 
-def _cause_line(cause: Json) -> str:
-    effect = part(cause, "effect")
-    return cause_words(cause) + (f"; alone: {effect_words(effect)}" if effect else "")
+def _cause_line(cause: Cause) -> str:
+    alone = f"; alone: {effect_words(cause.effect)}" if cause.effect is not None else ""
+    return cause_words(cause) + alone
 
 
-def pick_words(entry: Json) -> str:
-    if not entry:
+def pick_words(pick: Pick | None) -> str:
+    if pick is None:
         return "nothing"
-    name = entry.get("name") or entry.get("sensor")
-    return f"{name} ({entry.get('timestamping')}, {entry.get('primitive')})"
+    return f"{pick.name or pick.sensor} ({pick.timestamping}, {pick.primitive})"
 
 
-def units_of(entry: Json) -> tuple[str, str]:
-    """The units of a sum before and now; currencies may differ."""
-    unit = str(entry.get("unit"))
-    return str(entry.get("old_unit") or unit), unit
-
-
-def units_differ(entry: Json) -> bool:
-    """Whether a sum is given in two currencies and so has no difference."""
-    before, now = units_of(entry)
-    return before != now and None not in (entry.get("old"), entry.get("new"))
-
-
-def sum_name(entry: Json) -> str:
-    """The word for one of the sums."""
-    name = str(entry.get("name"))
-    return "Syncline error" if name == "error" else name
-
-
-def _causes(data: Json) -> Table | None:
+def _causes(data: Difference) -> Table | None:
     rows = [
-        (cause_words(cause), effect_words(part(cause, "effect")) if cause.get("effect") else "")
-        for cause in items(data, "causes")
+        (cause_words(cause), "" if cause.effect is None else effect_words(cause.effect))
+        for cause in data.causes
     ]
     heads = ("Change", "What it does alone")
     return table("What the two files say differently", heads, rows) if rows else None
 
 
-def _payload(data: Json) -> Table | None:
-    rows = [
-        (str(e.get("role")), pick_words(part(e, "old")), pick_words(part(e, "new")))
-        for e in items(data, "payload")
-    ]
+def _payload(data: Difference) -> Table | None:
+    rows = [(one.role, pick_words(one.old), pick_words(one.new)) for one in data.payload]
     heads = ("Role", "Before", "Now")
     return table("Roles whose sensor or timestamping is another one", heads, rows) if rows else None
 
 
-def _sums(data: Json) -> Table | None:
-    rows = []
-    for entry in [*items(data, "sums"), part(data, "error")]:
-        before, unit = units_of(entry)
-        old, new = numbers.finite(entry.get("old")), numbers.finite(entry.get("new"))
-        change = numbers.finite(entry.get("change"))
-        rows.append((
-            sum_name(entry),
-            Cell(numbers.in_unit(old, before), old),
-            Cell(numbers.in_unit(new, unit), new),
-            Cell(numbers.MISSING if change is None else signed_change(change, unit), change),
-        ))  # fmt: skip
+def _sums(data: Difference) -> Table:
+    rows = [_sum_row(figure) for figure in (*data.sums, data.error)]
     return table("Sums, before and now", ("Sum", "Before #", "Now #", "Change #"), rows)
 
 
-def _margins(data: Json) -> Table | None:
-    rows: list[tuple[Cell | str, ...]] = []
-    for entry in items(data, "requirements"):
-        cells = [_standing(part(entry, side)) for side in ("old", "new")]
-        rows.append((Cell(str(entry.get("id"))), kind_text(entry), *cells))
+def _sum_row(figure: FigureChange) -> tuple[Cell | str, ...]:
+    change = figure.change
+    return (
+        "Syncline error" if figure.name == "error" else figure.name,
+        Cell(numbers.in_unit(figure.old, figure.old_unit), figure.old),
+        Cell(numbers.in_unit(figure.new, figure.unit), figure.new),
+        Cell(numbers.MISSING if change is None else signed_change(change, figure.unit), change),
+    )
+
+
+def _margins(data: Difference) -> Table | None:
+    rows = [_margin_row(entry) for entry in data.requirements]
     heads = ("Requirement", "Limits", "Before", "Now")
     return table("Requirements, before and now", heads, rows) if rows else None
 
 
-def _standing(row: Json) -> Cell:
+def _margin_row(entry: RequirementChange) -> tuple[Cell | str, ...]:
+    kind = str(entry.kind)
+    return Cell(entry.id), KINDS.get(kind, kind), _standing(entry.old), _standing(entry.new)
+
+
+def _standing(row: Standing | None) -> Cell:
     """`0.29 m of 0.3 m` with the requirement's status as colour and symbol."""
-    if not row:
+    if row is None:
         return Cell("not required")
-    state = STATUSES.get(str(row.get("status")), STATUSES["indeterminate"])
-    return Cell(
-        f"{value_of_limit(row)}, {state.word}",
-        numbers.finite(row.get("value")),
-        state.tone,
-        state.mark,
-    )
-
-
-def value_of_limit(row: Json) -> str:
-    """`0.29 m of 0.3 m`, in that side's own unit."""
-    unit = str(row.get("unit") or "")
-    return f"{numbers.in_unit(row.get('value'), unit)} of {numbers.in_unit(row.get('limit'), unit)}"
+    state = STATUSES.get(str(row.status), STATUSES["indeterminate"])
+    unit = row.unit or ""  # that side's own
+    shown = f"{numbers.in_unit(row.value, unit)} of {numbers.in_unit(row.limit, unit)}"
+    return Cell(f"{shown}, {state.word}", row.value, state.tone, state.mark)

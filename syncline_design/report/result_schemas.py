@@ -1,0 +1,27 @@
+"""JSON Schema of every result, made from the type that it is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Final, Literal, get_args
+
+from syncline_design.comparison import difference
+from syncline_design.machine.records import Record, schema_of
+from syncline_design.report.json_out import json_text
+
+ResultName = Literal["difference"]
+_RESULTS: Final[Mapping[ResultName, tuple[type[Record], str]]] = {
+    "difference": (difference.Difference, difference.SCHEMA),
+}
+RESULT_NAMES: Final[tuple[ResultName, ...]] = get_args(ResultName)
+
+
+def result_schema(name: ResultName) -> dict[str, Any]:
+    """The schema of one kind of result as plain data (draft 2020-12)."""
+    kind, schema = _RESULTS[name]
+    return schema_of(kind, schema, f"syncline-design {name}")
+
+
+def result_schema_text(name: ResultName) -> str:
+    """The schema as JSON text."""
+    return json_text(result_schema(name))
