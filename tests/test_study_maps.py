@@ -13,9 +13,11 @@ import pytest
 
 from study_specs import SPEC, write
 from syncline_design.report.figures_study import cost_map, sampled_cases
+from syncline_design.report.on_study import on_study
+from syncline_design.report.render_console import console
 from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.studies import render_study
-from syncline_design.report.study_words import MOST_ACROSS, heat_table, study_text
+from syncline_design.report.study_words import MOST_ACROSS, heat_table
 from syncline_design.spec.factors import Factor
 from syncline_design.studies import StudyResult, StudySettings, run_study
 from syncline_design.studies.scatter import scatter
@@ -79,7 +81,7 @@ def test_a_sample_is_points_and_never_a_grid_with_empty_cells(tmp_path: Path, co
         assert f">meets ({count - missed})<" in svg
     page = str(render_study("html", result))
     assert "no case meets" not in page
-    assert "Least cost" not in study_text(result)
+    assert "Least cost" not in console(on_study(result))
 
 
 def test_named_axes_and_words_are_kept(tmp_path: Path) -> None:
@@ -218,7 +220,11 @@ def test_prices_in_two_currencies_are_never_compared(tmp_path: Path, more: str) 
     }
     said = "Prices are in USD and EUR, so there is no least cost among them."
     page = render_study("html", result).replace("\N{NO-BREAK SPACE}", " ")
-    for text in (study_text(result), render_study("markdown", result), page):
+    for text in (
+        " ".join(console(on_study(result)).split()),
+        render_study("markdown", result),
+        page,
+    ):
         assert said in text
     for cost in euros:
         shown = f"{cost:,.2f}".replace(",", " ").removesuffix(".00")

@@ -13,9 +13,11 @@ import pytest
 
 from report_samples import HOSTILE
 from study_specs import SPEC, STUDY, write
+from syncline_design.report.on_study import on_study
 from syncline_design.report.progress_line import ProgressLine
+from syncline_design.report.render_console import console, table_lines
 from syncline_design.report.studies import STUDY_FORMATS, render_study
-from syncline_design.report.study_words import plain_table, progress_text, study_text
+from syncline_design.report.study_words import progress_text
 from syncline_design.report.table import table
 from syncline_design.studies import Progress, StudyResult, StudySettings, run_study
 
@@ -96,7 +98,7 @@ def test_the_page_is_offline_and_complete(result: StudyResult) -> None:
 
 
 def test_the_console_summary_names_counts_and_table(result: StudyResult) -> None:
-    text = study_text(result)
+    text = console(on_study(result))
     assert f"{result.counts['meets']} of {len(result)} cases meet their requirements" in text
     assert "Least cost of a payload" in text
     assert "uav.attitude" in text
@@ -123,7 +125,7 @@ def test_hostile_names_stay_text(tmp_path: Path, hostile: str) -> None:
     assert all(line.startswith("::notice ::") for line in text_of("github", done).splitlines())
     for line in csv.reader(io.StringIO(text_of("csv", done))):
         assert not any(cell.startswith(("=", "@", "+")) for cell in line)
-    assert "\x1b" not in study_text(done) + text_of("markdown", done) + page
+    assert "\x1b" not in console(on_study(done)) + text_of("markdown", done) + page
 
 
 def test_progress_says_what_is_left() -> None:
@@ -143,5 +145,5 @@ def test_progress_in_a_log_is_written_now_and_then() -> None:
 
 
 def test_console_tables_line_up() -> None:
-    shown = plain_table(table("T", ("a", "b #"), [("x", "1"), ("long", "22")]))
-    assert shown == "T\n  a      b\n  x      1\n  long  22"
+    shown = table_lines(table("T", ("a", "b #"), [("x", "1"), ("long", "22")]))
+    assert list(shown) == ["T", "  a      b", "  x      1", "  long  22"]

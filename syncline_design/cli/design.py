@@ -158,9 +158,11 @@ def study(
     ] = False,
 ) -> int:
     """Sweep specs over grids or samples of their keys; a stopped study resumes."""
+    from syncline_design.report.on_study import on_study
     from syncline_design.report.progress_line import ProgressLine
+    from syncline_design.report.render_console import console
     from syncline_design.report.studies import STUDY_FORMATS, render_study
-    from syncline_design.report.study_words import study_text
+    from syncline_design.report.study_words import stored_text
     from syncline_design.studies import StudySettings, run_study
     from syncline_design.studies.store import FOLDER
 
@@ -169,7 +171,8 @@ def study(
     _keep_cases([Path(t.path) for t in targets], store or study_file.parent / FOLDER)
     settings = StudySettings(seed, workers, store, scheduler, dask, fresh=fresh)
     result = run_study(study_file, settings, None if quiet else ProgressLine())
-    emit(study_text(result), targets, lambda name: render_study(name, result), quiet=quiet)
+    text = f"{console(on_study(result))}\n{stored_text(result)}"
+    emit(text, targets, lambda name: render_study(name, result), quiet=quiet)
     return result.exit_code
 
 

@@ -1,13 +1,25 @@
-"""A study as one offline HTML page."""
+"""What `study` says: outcome, least cost, who wins, where feasibility ends, fronts, cases."""
 
 from __future__ import annotations
 
-from typing import Any
+from functools import partial
 
 from syncline_design import __version__
-from syncline_design.report import figures_study, numbers, page
+from syncline_design.report import figures_study, numbers
+from syncline_design.report.document import (
+    Chart,
+    Document,
+    Node,
+    Text,
+    given,
+    provenance,
+    section,
+    show,
+)
 from syncline_design.report.study_rows import reason
 from syncline_design.report.study_words import (
+    LEAST_COST,
+    MOST_DOWN,
     MOST_KEYS,
     boundary_table,
     currency_sentence,
@@ -29,54 +41,81 @@ MOST_CASES = 500  # rows of the case table; CSV and Parquet have them all
 MOST_FRONTS = 8
 
 
-def render_study_page(result: StudyResult) -> str:
-    """The page of a study: what holds, least cost, who wins, where it ends, fronts, cases."""
+def on_study(result: StudyResult) -> Document:
+    """A study as a document: what holds, least cost, who wins, where it ends, fronts, cases."""
     summary = summarise(result)
-    currency, *others = summary.currencies
+    note = (given(result.study.note),) if result.study.note else ()
+    winners = show(winners_table(summary), silent=True)
+    cases = show(_case_table(summary), silent=True, reach="page")
+    return Document(
+        family="Trade study",
+        outcome=outcome(result),
+        name=result.study.name,
+        sentences=(rule_sentence(result) + currency_sentence(summary), *note),
+        facts=tuple(_facts(result)),
+        sections=(
+            *section("heat", LEAST_COST, _heat(summary), "Least cost"),
+            *section("sampled", "Sample", _sampled(summary)),
+            *section("winners", "Which sensor and method wins where, of the cases that meet",
+                     winners, "What wins where"),
+            *section("ends", "Where feasibility ends", _ends(summary), "Where it ends"),
+            *section("fronts", "Cost against error, front by case", _fronts(summary), "Fronts"),
+            *section("cases", "Cases", cases),
+            *provenance(_provenance(result)),
+        ),
+    )  # fmt: skip
+
+
+def _heat(summary: Summary) -> list[Node]:
+    """Least cost over two factors; on a terminal only where its table is short."""
     heat = heat_map(summary)
-    sampled = scatter(summary) if heat is None and not others else None
-    shown = outcome(result)
-    fronts = _distinct_fronts(summary)
-    ends = boundary_table(summary)
-    parts = {
-        "heat": heat is not None,
-        "sampled": sampled is not None,
-        "winners": True,
-        "ends": bool(ends.rows),
-        "fronts": bool(fronts),
-        "cases": True,
-        "provenance": True,
-    }
-    titles = {
-        "heat": "Least cost", "sampled": "Sample", "winners": "What wins where",
-        "ends": "Where it ends", "fronts": "Fronts", "cases": "Cases", "provenance": "Provenance",
-    }  # fmt: skip
-    return page.render_page(
-        "study.html.j2",
-        kind="Trade study",
-        name=visible(result.study.name),
-        note=visible(result.study.note),
-        contents=[(key, title) for key, title in titles.items() if parts[key]],
-        outcome=shown,
-        rule=rule_sentence(result) + currency_sentence(summary),
-        facts=_facts(result),
-        heat_figure=_svg(figures_study.cost_map(heat, currency)) if heat is not None else None,
-        heat_table=heat_table(heat, currency) if heat is not None else None,
-        sampled_figure=None
-        if sampled is None
-        else _svg(figures_study.sampled_cases(sampled, currency)),
-        sampled_caption="" if sampled is None else visible(_sampled_caption(sampled)),
-        winners=winners_table(summary),
-        ends=ends if ends.rows else None,
-        fronts_figure=_fronts_figure(summary, fronts) if fronts else None,
-        fronts_table=_fronts_table(summary) if fronts else None,
-        cases=_case_table(summary),
-        provenance=_provenance(result),
+    if heat is None:
+        return []
+    currency = summary.currencies[0]
+    shown = heat_table(heat, currency)
+    caption = (
+        "Least cost of a payload that meets the requirements; the stronger the colour, the dearer. "
+        "A cross: computed, and no case is known to meet."
     )
+    short = show(shown, silent=True, reach="text")
+    if len(shown.rows) > MOST_DOWN:
+        size = f"{len(heat.x_labels)} by {len(heat.y_labels)} values"
+        short = [Text(f"Over {size}: see the page or the CSV table.", reach="text")]
+    return [
+        Chart("heat", lambda: figures_study.cost_map(heat, currency), caption),
+        *show(shown, silent=True, reach="page"),
+        *short,
+    ]
 
 
-def _svg(figure: Any) -> Any:
-    return page.trusted_svg(figure.svg)
+def _sampled(summary: Summary) -> list[Node]:
+    """Cases drawn over two factors, where these are no grid."""
+    currency, *others = summary.currencies
+    if others or heat_map(summary) is not None:
+        return []
+    found = scatter(summary)
+    if found is None:
+        return []
+    draw = partial(figures_study.sampled_cases, found, currency)
+    return [Chart("sampled", draw, _sampled_caption(found))]
+
+
+def _ends(summary: Summary) -> list[Node]:
+    return [
+        *show(boundary_table(summary), silent=True, reach="page"),
+        *show(boundary_table(summary, MOST_DOWN), silent=True, reach="text"),
+    ]
+
+
+def _fronts(summary: Summary) -> list[Node]:
+    chosen = _distinct_fronts(summary)
+    nodes: list[Node] = []
+    if len({front.currency for front in chosen}) == 1:
+        named = [figures_study.NamedFront(_common(summary, f), f.points) for f in chosen]
+        draw = partial(figures_study.fronts, named, chosen[0].currency)
+        caption = "At most eight fronts are drawn; the table has all that differ."
+        nodes.append(Chart("fronts", draw, caption))
+    return [*nodes, *show(_fronts_table(summary), silent=True, reach="page")]
 
 
 def _facts(result: StudyResult) -> list[tuple[str, str]]:
@@ -107,15 +146,6 @@ def _common(summary: Summary, front: Front) -> str:
         if len(values) == 1:
             parts.append(f"{factor.key} = {values.pop()}")
     return visible(", ".join(parts)) or "every case"
-
-
-def _fronts_figure(summary: Summary, chosen: list[Front]) -> Any:
-    """The fronts on one axis of cost; None where they are in different currencies."""
-    currency, *others = dict.fromkeys(front.currency for front in chosen)
-    if others:
-        return None
-    named = [figures_study.NamedFront(_common(summary, f), f.points) for f in chosen]
-    return _svg(figures_study.fronts(named, currency))
 
 
 def _fronts_table(summary: Summary) -> Table:

@@ -23,13 +23,15 @@ def render_study(name: str, result: StudyResult) -> str | bytes:
 
             return json_text(study_data(result))
         case "html":
-            from syncline_design.report.on_study import render_study_page
+            from syncline_design.report.on_study import on_study
+            from syncline_design.report.render_html import html
 
-            return render_study_page(result)
+            return html(on_study(result))
         case "markdown":
-            from syncline_design.report.study_words import study_markdown
+            from syncline_design.report.on_study import on_study
+            from syncline_design.report.render_markdown import markdown
 
-            return study_markdown(result)
+            return markdown(on_study(result))
         case _:
             return _for_ci(name, result)
 

@@ -1,13 +1,10 @@
-"""A study in words: outcome, summary text for the console, Markdown for a pull request."""
+"""A study in words and tables: outcome, least cost, who wins, where feasibility ends."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from syncline_design.report import numbers
-from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.text import markdown_safe, sentence_list, visible
+from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_words import OUTCOMES, Outcome
 from syncline_design.studies.progress import Progress
 from syncline_design.studies.result import StudyResult
@@ -15,8 +12,6 @@ from syncline_design.studies.summary import (
     HeatMap,
     Summary,
     boundaries,
-    heat_map,
-    summarise,
     varied,
     winners,
 )
@@ -73,43 +68,13 @@ def rule_sentence(result: StudyResult) -> str:
     return text
 
 
-def study_text(result: StudyResult) -> str:
-    """The summary for the console."""
-    summary = summarise(result)
-    shown = outcome(result)
-    lines = [f"{shown.mark} {visible(result.study.name)}: {shown.word}."]
-    lines += [rule_sentence(result) + currency_sentence(summary), ""]
-    heat = heat_map(summary)
-    costs = None if heat is None else heat_table(heat, summary.currencies[0])
-    if costs is not None and len(costs.rows) <= MOST_DOWN:
-        lines += [plain_table(costs), ""]
-    elif heat is not None:
-        size = f"{len(heat.x_labels)} by {len(heat.y_labels)} values"
-        lines += [f"Least cost over {size}: see --output html: or csv:", ""]
-    lines += [plain_table(winners_table(summary)), ""]
-    ends = boundary_table(summary, MOST_DOWN)
-    if ends.rows:
-        lines += [plain_table(ends), *([f"  {ends.note}"] if ends.note else []), ""]
+def stored_text(result: StudyResult) -> str:
+    """What was computed and what was there already: it differs from run to run."""
     retried = f", {result.retried} done again after a worker died" if result.retried else ""
-    lines.append(
+    return (
         f"{result.computed} cases computed, {result.reused} already there{retried}; "
-        f"kept in {result.store.folder}"
+        f"kept in {result.store.folder}\n"
     )
-    return "\n".join(lines) + "\n"
-
-
-def study_markdown(result: StudyResult) -> str:
-    """The summary for a pull request."""
-    summary = summarise(result)
-    shown = outcome(result)
-    lines = [f"## {shown.mark} {markdown_safe(result.study.name)}: {shown.word}", ""]
-    lines += [markdown_safe(rule_sentence(result) + currency_sentence(summary)), ""]
-    heat = heat_map(summary)
-    tables = [] if heat is None else [heat_table(heat, summary.currencies[0])]
-    for found in (*tables, winners_table(summary), boundary_table(summary)):
-        if found.rows:
-            lines += [f"**{markdown_safe(found.caption)}**", "", markdown_table(found)]
-    return "\n".join(lines).rstrip() + "\n"
 
 
 def currency_sentence(summary: Summary) -> str:
@@ -209,22 +174,6 @@ def _with_words(fixed: list[str]) -> str:
     if len(fixed) <= 3:
         return " | ".join(fixed)
     return f"{len(fixed)} combinations, {fixed[0]} to {fixed[-1]}"
-
-
-def plain_table(shown: Table) -> str:
-    """A table for the console, columns lined up."""
-    cells = [[head.text for head in shown.heads]]
-    cells += [[f"{c.mark} {c.text}".strip() for c in row] for row in shown.rows]
-    lines = [[visible(text).replace("\u00a0", " ") for text in row] for row in cells]
-    widths = [max(len(text) for text in column) for column in zip(*lines, strict=True)]
-    sides = ["rjust" if head.numeric else "ljust" for head in shown.heads]
-    drawn = ["  ".join(_aligned(row, widths, sides)).rstrip() for row in lines]
-    return "\n".join([shown.caption, *(f"  {line}" for line in drawn)])
-
-
-def _aligned(row: list[str], widths: list[int], sides: list[str]) -> Iterable[str]:
-    for text, width, side in zip(row, widths, sides, strict=True):
-        yield text.rjust(width) if side == "rjust" else text.ljust(width)
 
 
 def progress_text(progress: Progress) -> str:
