@@ -18,8 +18,8 @@ from syncline_design.report.render_console import console
 from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.studies import render_study
 from syncline_design.report.study_words import MOST_ACROSS, heat_table
-from syncline_design.spec.factors import Factor
 from syncline_design.studies import StudyResult, StudySettings, run_study
+from syncline_design.studies.definition import Factor
 from syncline_design.studies.scatter import scatter
 from syncline_design.studies.summary import HeatMap, heat_map, summarise
 from test_report_browser import Opened, browser  # noqa: F401  a fixture

@@ -15,8 +15,7 @@ from typing import Any
 from syncline_design.comparison.difference import Cause, Difference, changes, difference
 from syncline_design.comparison.verdict_file import read_verdict, text_of
 from syncline_design.spec.catalog import SECTIONS
-from syncline_design.spec.factors import label
-from syncline_design.spec.keys import PLATFORM_KEYS, put
+from syncline_design.spec.keys import PLATFORM_KEYS, label, put
 from syncline_design.spec.load import (
     BadInput,
     Case,

@@ -7,7 +7,7 @@ import time
 from typing import TextIO
 
 from syncline_design.report.study_words import progress_text
-from syncline_design.studies.progress import Progress
+from syncline_design.studies.result import Progress
 
 ON_TERMINAL_S, IN_LOG_S = 0.2, 10.0
 SILENT_S = 1.0  # nothing is said of what is done within a second

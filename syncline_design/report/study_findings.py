@@ -148,7 +148,7 @@ def study_data(result: StudyResult) -> dict[str, Any]:
 
     from syncline_design import __version__
     from syncline_design.report.study_rows import rows, si_unit
-    from syncline_design.spec.factors import label
+    from syncline_design.spec.keys import label
     from syncline_design.studies.summary import boundaries, heat_map, summarise, winners
 
     study, summary = result.study, summarise(result)

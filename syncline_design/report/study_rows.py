@@ -8,7 +8,7 @@ from typing import Any
 from syncline_design.model.quantity import Dimension
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import design_sentence, items
-from syncline_design.spec.factors import Factor, figure_of
+from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import CaseResult, StudyResult
 from syncline_design.studies.summary import picks_of
 

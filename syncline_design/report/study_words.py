@@ -6,8 +6,7 @@ from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_words import OUTCOMES, Outcome
-from syncline_design.studies.progress import Progress
-from syncline_design.studies.result import StudyResult
+from syncline_design.studies.result import Progress, StudyResult
 from syncline_design.studies.summary import (
     HeatMap,
     Summary,

@@ -2,18 +2,20 @@
 
 A selector in brackets is the name of a stage, the id of a requirement, or an index.  Motion and
 distance of a stage may be named without their `platform`.  `catalog.sensors[ID].cost` means an
-entry of the catalogs instead of the spec.
+entry of the catalogs instead of the spec.  Values are as the YAML reader left them; `label` writes
+one for people, `plain` for JSON.
 """
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.fields import did_you_mean
-from syncline_design.spec.yaml_text import KeyPath
+from syncline_design.spec.yaml_text import KeyPath, Number
 
 CATALOG = "catalog"
 PLATFORM_KEYS = ("v_max", "omega_max", "distance", "baseline")
@@ -135,3 +137,33 @@ def value_at(data: Any, path: KeyPath) -> Any:
     for step in path:
         data = _below(data, step)
     return data
+
+
+def label(value: Any) -> str:
+    """A value as the tables show it: text as it is, lists and mappings as compact JSON."""
+    if isinstance(value, str):
+        return value
+    if isinstance(value, bool) or value is None:
+        return json.dumps(value)
+    if isinstance(value, int | float):
+        return str(getattr(value, "text", None) or value)
+    return _compact(value)
+
+
+def _compact(value: Any) -> str:
+    """Compact JSON whose numbers are written as the file has them."""
+    if isinstance(value, Mapping):
+        pairs = (f"{_compact(str(key))}: {_compact(item)}" for key, item in value.items())
+        return "{" + ", ".join(pairs) + "}"
+    if isinstance(value, tuple | list):
+        return "[" + ", ".join(map(_compact, value)) + "]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str) else label(value)
+
+
+def plain(value: Any) -> Any:
+    """Data of the YAML reader as JSON can hold it, decimals with their own digits as text."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, tuple | list):
+        return [plain(item) for item in value]
+    return {"number": value.text} if isinstance(value, Number) else value

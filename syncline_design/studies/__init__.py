@@ -1,8 +1,7 @@
 """Trade studies: one spec or several, checked over grids and samples of their keys."""
 
 from syncline_design.studies.loading import Study, load_study
-from syncline_design.studies.progress import Progress
-from syncline_design.studies.result import CaseResult, StudyResult
+from syncline_design.studies.result import CaseResult, Progress, StudyResult
 from syncline_design.studies.run import StudyError, StudySettings, StudyStoppedError, run_study
 
 __all__ = [

@@ -10,18 +10,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import date
 from importlib import metadata
+from pathlib import Path
 from typing import Any
 
 from syncline_design import __version__
 from syncline_design.machine.input_files import ReplacedInputError, noting
-from syncline_design.spec.factors import plain
+from syncline_design.spec.keys import plain
 from syncline_design.spec.load import BadInput, Case, without_simulated
 from syncline_design.spec.yaml_text import Problem
 from syncline_design.studies.inputs import inputs_of
-from syncline_design.studies.loading import Base, Study, engine_sha256
+from syncline_design.studies.loading import Base, Study
 
 Json = dict[str, Any]
 SCHEMA = "syncline-design/study-case/v1"
+# Layers that a check cannot import: they show its results.
+ABOVE_CHECKS = ("__main__.py", "cli", "comparison", "diagnosis", "logs", "paper", "report")
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,18 @@ def libraries() -> tuple[str, ...]:
         with contextlib.suppress(metadata.PackageNotFoundError):
             found.append(f"{name} {metadata.version(name)}")
     return tuple(found)
+
+
+def engine_sha256() -> str:
+    """Hash of the sources that a check runs through: other code, other cases."""
+    digest = hashlib.sha256()
+    root = Path(__file__).resolve().parent.parent
+    for file in sorted(root.rglob("*.py")):
+        if file.relative_to(root).parts[0] in ABOVE_CHECKS:
+            continue
+        digest.update(file.relative_to(root).as_posix().encode())
+        digest.update(b"\0" + file.read_bytes() + b"\0")
+    return digest.hexdigest()
 
 
 def canonical(data: Any) -> str:

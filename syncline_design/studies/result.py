@@ -1,14 +1,14 @@
-"""What a study came to: its cases, read back from their files as they are asked for."""
+"""How far a study is, and what it came to: cases, read back from their files when asked for."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-from syncline_design.spec.factors import label
+from syncline_design.spec.keys import label
 from syncline_design.studies.loading import Study
 from syncline_design.studies.store import Store, StoreError
 
@@ -124,3 +124,25 @@ def study_verdict(counts: dict[str, int], meets_when: str) -> str:
     if failed:
         return "fails"
     return "indeterminate" if counts["indeterminate"] else "meets"
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Cases done of all, how many of them were there already, and the time it took so far."""
+
+    done: int
+    total: int
+    reused: int
+    elapsed_s: float
+    retried: int = 0
+
+    @property
+    def remaining_s(self) -> float | None:
+        """What is left at the rate so far; None while there is no rate yet."""
+        computed = self.done - self.reused
+        if computed <= 0:
+            return None if self.done < self.total else 0.0
+        return self.elapsed_s / computed * (self.total - self.done)
+
+
+Report = Callable[[Progress], None]

@@ -16,8 +16,7 @@ from syncline_design.studies.cluster import ClusterError, run_on_cluster
 from syncline_design.studies.inputs import Looked, full_key
 from syncline_design.studies.loading import Study, load_study
 from syncline_design.studies.pool import Pool, PoolError, Result, encoded_case
-from syncline_design.studies.progress import Progress, Report
-from syncline_design.studies.result import StudyResult
+from syncline_design.studies.result import Progress, Report, StudyResult
 from syncline_design.studies.store import FOLDER, Store, StoreError
 
 Json = dict[str, Any]

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from syncline_design.spec.factors import Factor, figure_of
 from syncline_design.spec.yaml_text import plain_scalar
+from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.summary import Summary, axis_values, varied
 
 LOG_SPAN = 30.0  # an axis whose ends differ by more than this factor is logarithmic

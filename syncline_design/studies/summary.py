@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
-from syncline_design.spec.factors import Factor, figure_of, label
+from syncline_design.spec.keys import label
+from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import CaseResult, StudyResult
 
 MOST_FRONTS = 500
