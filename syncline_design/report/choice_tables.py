@@ -9,7 +9,8 @@ from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_tables import currency_of
-from syncline_design.report.verdict_words import KINDS, PRIMITIVES, Json, items, named, part
+from syncline_design.report.verdict_words import Json, items, named, part
+from syncline_design.report.words import KINDS, PRIMITIVES
 
 
 def choice_tables(verdict: Json) -> list[Table]:

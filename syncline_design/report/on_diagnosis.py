@@ -8,10 +8,11 @@ from typing import Any, Final
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import figures_diagnosis as drawings
 from syncline_design.report import numbers, page
+from syncline_design.report.document import Outcome
 from syncline_design.report.svg import InlineFigure
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import harmless, sentence_list
-from syncline_design.report.verdict_words import Json, Outcome, items, named, part
+from syncline_design.report.verdict_words import Json, items, named, part
 
 DIAGNOSES: Final[dict[str, Outcome]] = {
     "agrees": Outcome("good", "\u2713", "Log and simulation agree"),

@@ -17,7 +17,7 @@ from syncline_design.report.document import Document, Items, Node, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list, visible
-from syncline_design.report.verdict_words import KINDS, OUTCOMES, STATUSES
+from syncline_design.report.words import KINDS, OUTCOMES, STATUSES
 
 
 def render_diff(name: str, data: Difference) -> str:

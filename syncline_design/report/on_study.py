@@ -30,7 +30,7 @@ from syncline_design.report.study_words import (
 )
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list, visible
-from syncline_design.report.verdict_words import OUTCOMES
+from syncline_design.report.words import OUTCOMES
 from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import StudyResult

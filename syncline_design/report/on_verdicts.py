@@ -22,6 +22,7 @@ from syncline_design.report.document import (
 from syncline_design.report.on_verdict import on_verdict, problems
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import Json, items, part
+from syncline_design.report.words import OUTCOMES
 
 
 def on_verdicts(verdicts: Sequence[Json]) -> Document:
@@ -29,7 +30,7 @@ def on_verdicts(verdicts: Sequence[Json]) -> Document:
     if len(verdicts) == 1 and verdicts[0].get("verdict") != "refused":
         return on_verdict(verdicts[0])
     good = sum(verdict.get("verdict") == "meets" for verdict in verdicts)
-    known = verdict_words.OUTCOMES["meets" if good == len(verdicts) else "fails"]
+    known = OUTCOMES["meets" if good == len(verdicts) else "fails"]
     word = f"{good} of {len(verdicts)} specs meet every requirement"
     specs = [node for n, verdict in enumerate(verdicts, 1) for node in _spec(verdict, n)]
     return Document(

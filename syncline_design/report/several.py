@@ -7,15 +7,8 @@ from collections.abc import Sequence
 
 from syncline_design.report.text import sentence_list, visible
 from syncline_design.report.verdict_words import Json
+from syncline_design.report.words import VERBS
 from syncline_design.spec.folders import Skipped
-
-_WORDS = {
-    "meets": ("meets its requirements", "meet their requirements"),
-    "fails": ("does not meet them", "do not meet them"),
-    "infeasible": ("is infeasible", "are infeasible"),
-    "indeterminate": ("has no verdict", "have no verdict"),
-    "refused": ("is refused", "are refused"),
-}
 
 
 def summary_line(verdicts: Sequence[Json]) -> str:
@@ -23,7 +16,7 @@ def summary_line(verdicts: Sequence[Json]) -> str:
     if not verdicts:
         return "No spec to check."
     counts = Counter(str(verdict.get("verdict")) for verdict in verdicts)
-    parts = [f"{counts[word]} {_WORDS[word][counts[word] > 1]}" for word in _WORDS if counts[word]]
+    parts = [f"{counts[word]} {VERBS[word][counts[word] > 1]}" for word in VERBS if counts[word]]
     many = "spec" if len(verdicts) == 1 else "specs"
     return f"{len(verdicts)} {many}: {sentence_list(parts)}."
 

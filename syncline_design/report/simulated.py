@@ -8,15 +8,11 @@ from syncline_design.report import numbers
 from syncline_design.report.document import Chart, Node
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import Json, named, part
+from syncline_design.report.words import ENVELOPES
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
 
-ENVELOPES: Final = {
-    "limits": "speed and turn rate at their limits, directions free",
-    "inside": "speed and turn rate uniform up to their limits, directions free",
-    "trajectory": "along the trajectory",
-}
 BEYOND: Final = (
     "Samples exceed a sum of one-sigma terms often (39 % of them where position noise is all there "
     "is) and do not contradict the Syncline."

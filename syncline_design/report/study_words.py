@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from syncline_design.report import numbers
+from syncline_design.report.document import Outcome
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list
-from syncline_design.report.verdict_words import OUTCOMES, Outcome
+from syncline_design.report.words import OUTCOMES, VERBS
 from syncline_design.studies.result import Progress, StudyResult
 from syncline_design.studies.summary import (
     HeatMap,
@@ -20,20 +21,7 @@ MOST_ACROSS = 8  # columns of figures in any table: more fit neither page nor co
 MOST_DOWN = 20  # of tables on the console
 MOST_KEYS = 3  # columns of their own for what varies; of more, one column names them all
 LEAST_COST = "Least cost of a payload that meets the requirements"
-_VERDICT_WORDS = {
-    "meets": "meet their requirements",
-    "fails": "do not meet them",
-    "infeasible": "are infeasible",
-    "refused": "cannot be as combined",
-    "indeterminate": "got no verdict",
-}
-_ONE = {
-    "meets": "meets its requirements",
-    "fails": "does not meet them",
-    "infeasible": "is infeasible",
-    "refused": "cannot be as combined",
-    "indeterminate": "got no verdict",
-}
+_COMBINED = "cannot be as combined"  # a case that is refused
 _WHEN = {
     "all": "every case meets its requirements",
     "any": "at least one case meets its requirements",
@@ -49,11 +37,10 @@ def outcome(result: StudyResult) -> Outcome:
 
 def count_sentence(result: StudyResult) -> str:
     """`13 of 25 cases meet their requirements, 12 are infeasible`."""
+    verbs = VERBS | {"refused": (_COMBINED, _COMBINED)}
     counts = result.counts
-    words = _ONE if counts["meets"] == 1 else _VERDICT_WORDS
-    parts = [f"{counts['meets']} of {len(result)} cases {words['meets']}"]
-    others = [(n, _ONE if n == 1 else _VERDICT_WORDS, w) for w, n in counts.items() if n]
-    parts += [f"{n} {said[w]}" for n, said, w in others if w != "meets"]
+    parts = [f"{counts['meets']} of {len(result)} cases {verbs['meets'][counts['meets'] != 1]}"]
+    parts += [f"{n} {verbs[word][n > 1]}" for word, n in counts.items() if n and word != "meets"]
     return sentence_list(parts)
 
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import (
-    PRIMITIVES,
     Json,
     items,
     kind_text,
@@ -21,6 +20,7 @@ from syncline_design.report.verdict_words import (
     value_text,
     waiver_text,
 )
+from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, TIMELINES
 
 
 def roles(verdict: Json) -> Iterator[tuple[str, str, Json]]:
@@ -72,7 +72,7 @@ def payload(verdict: Json) -> Table:
             str(entry.get("name") or entry.get("sensor")),
             PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive"))),
             str(entry.get("timestamping_name") or entry.get("timestamping")),
-            {"utc": "UTC", "host": "host clock"}.get(str(entry.get("timeline")), ""),
+            TIMELINES.get(str(entry.get("timeline")), ""),
             Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
             selection_reason(verdict, stage, role),
         )
@@ -139,12 +139,11 @@ def taus(verdict: Json) -> Table:
 
 def ledger(verdict: Json) -> Table:
     """Every term of the total error."""
-    words = {"sensor": "sensor", "sync": "synchronisation", "systematic": "known effect"}
     rows = [
         (
             term_text(entry),
             str(entry.get("stage") or ""),
-            words.get(str(entry.get("kind")), str(entry.get("kind"))),
+            LEDGER_KINDS.get(str(entry.get("kind")), str(entry.get("kind"))),
             Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
             Cell(numbers.percent(entry.get("share")), numbers.finite(entry.get("share"))),
         )
@@ -157,11 +156,10 @@ def models(verdict: Json) -> Table:
     """Both synchronisation models and the lever-arm variant, side by side."""
     syncline = part(verdict, "syncline")
     used = str(syncline.get("model") or "syncline")
-    names = {"syncline": "Syncline (the paper's)", "per_sensor": "per sensor (tighter)"}
     rows = []
     for key, entry in named(syncline, "models"):
         rows.append((
-            names.get(str(key), str(key)) + (" \u2014 decides" if key == used else ""),
+            SYNC_MODELS.get(str(key), str(key)) + (" \u2014 decides" if key == used else ""),
             Cell(numbers.length(entry.get("sync_error_m")), entry.get("sync_error_m")),
             Cell(numbers.length(entry.get("total_m")), entry.get("total_m")),
         ))  # fmt: skip

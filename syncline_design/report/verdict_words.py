@@ -4,56 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, Final
+from typing import Any
 
 from syncline_design.report import numbers
-from syncline_design.report.document import Outcome as Outcome
+from syncline_design.report.document import Outcome
 from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.words import (
+    KINDS,
+    OBJECTIVES,
+    OUTCOMES,
+    PRIMITIVES,
+    QUALIFYING,
+    STATUSES,
+    TERMS,
+)
 
 Json = Mapping[str, Any]
-
-
-OUTCOMES: Final[dict[str, Outcome]] = {
-    "meets": Outcome("good", "\u2713", "Meets every requirement"),
-    "fails": Outcome("bad", "\u2717", "Does not meet its requirements"),
-    "infeasible": Outcome("bad", "\u2298", "Infeasible: no design meets the requirements"),
-    "indeterminate": Outcome("warn", "?", "No verdict"),
-    "refused": Outcome("bad", "!", "Refused: the spec cannot be read"),
-}
-QUALIFYING: Final[dict[str, str]] = {
-    "worst-case-above-limit": "its certified worst case at one sigma",
-    "quantile-above-limit": "its 95 % quantile",
-}
-STATUSES: Final[dict[str, Outcome]] = {
-    "pass": Outcome("good", "\u2713", "pass"),
-    "fail": Outcome("bad", "\u2717", "fail"),
-    "waived": Outcome("warn", "\u25d0", "waived"),
-    "indeterminate": Outcome("warn", "?", "no verdict"),
-}
-KINDS: Final[dict[str, str]] = {
-    "accuracy": "Syncline error",
-    "sync": "\u03c4 / \u03c4_crit, largest",
-    "cost": "cost",
-    "mass": "mass",
-    "power": "power",
-    "monte_carlo": "simulated error, quantile",
-    "feasible": "entries that cannot work where they stand",
-}
-TERMS: Final[dict[str, str]] = {
-    "sigma_p": "position noise \u03c3_p",
-    "sigma_Theta*d": "attitude noise \u03c3_\u0398\u00b7d",
-    "sigma_r": "range noise \u03c3_r",
-    "sigma_u*d": "bearing noise \u03c3_u\u00b7d",
-    "v_max*tau": "translation v_max\u00b7\u03c4",
-    "d*omega_max*tau": "rotation d\u00b7\u03c9_max\u00b7\u03c4",
-}
-PRIMITIVES: Final[dict[str, str]] = {
-    "pps": "1PPS input",
-    "network": "network time",
-    "tov": "time-of-validity pulse",
-    "trigger": "trigger",
-    "arrival": "on arrival",
-}
 
 
 def part(source: Json | None, key: str) -> Json:
@@ -228,8 +194,7 @@ def selection_reason(verdict: Json, stage: str, role: str) -> str:
     if not isinstance(open_roles, list) or f"{stage}.{role}" not in open_roles:
         return "pinned in the spec"
     objective = str(part(verdict, "spec").get("objective") or "cost")
-    word = {"error": "smallest error", "cost": "least cost", "mass": "least mass",
-            "power": "least power"}.get(objective, objective)  # fmt: skip
+    word = OBJECTIVES.get(objective, objective)
     excluded = [entry for entry in items(part(verdict, "choice"), "excluded")
                 if (entry.get("stage"), entry.get("role")) == (stage, role)]  # fmt: skip
     if not excluded:

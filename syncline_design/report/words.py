@@ -1,0 +1,78 @@
+"""The words of the results, each once: what a code of ours is called wherever a person reads it."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from syncline_design.report.document import Outcome
+
+OUTCOMES: Final[dict[str, Outcome]] = {
+    "meets": Outcome("good", "\u2713", "Meets every requirement"),
+    "fails": Outcome("bad", "\u2717", "Does not meet its requirements"),
+    "infeasible": Outcome("bad", "\u2298", "Infeasible: no design meets the requirements"),
+    "indeterminate": Outcome("warn", "?", "No verdict"),
+    "refused": Outcome("bad", "!", "Refused: the spec cannot be read"),
+}
+QUALIFYING: Final[dict[str, str]] = {
+    "worst-case-above-limit": "its certified worst case at one sigma",
+    "quantile-above-limit": "its 95 % quantile",
+}
+STATUSES: Final[dict[str, Outcome]] = {
+    "pass": Outcome("good", "\u2713", "pass"),
+    "fail": Outcome("bad", "\u2717", "fail"),
+    "waived": Outcome("warn", "\u25d0", "waived"),
+    "indeterminate": Outcome("warn", "?", "no verdict"),
+}
+KINDS: Final[dict[str, str]] = {
+    "accuracy": "Syncline error",
+    "sync": "\u03c4 / \u03c4_crit, largest",
+    "cost": "cost",
+    "mass": "mass",
+    "power": "power",
+    "monte_carlo": "simulated error, quantile",
+    "feasible": "entries that cannot work where they stand",
+}
+TERMS: Final[dict[str, str]] = {
+    "sigma_p": "position noise \u03c3_p",
+    "sigma_Theta*d": "attitude noise \u03c3_\u0398\u00b7d",
+    "sigma_r": "range noise \u03c3_r",
+    "sigma_u*d": "bearing noise \u03c3_u\u00b7d",
+    "v_max*tau": "translation v_max\u00b7\u03c4",
+    "d*omega_max*tau": "rotation d\u00b7\u03c9_max\u00b7\u03c4",
+}
+PRIMITIVES: Final[dict[str, str]] = {
+    "pps": "1PPS input",
+    "network": "network time",
+    "tov": "time-of-validity pulse",
+    "trigger": "trigger",
+    "arrival": "on arrival",
+}
+# A spec or a case as the subject of a sentence: of one, of several.
+VERBS: Final[dict[str, tuple[str, str]]] = {
+    "meets": ("meets its requirements", "meet their requirements"),
+    "fails": ("does not meet them", "do not meet them"),
+    "infeasible": ("is infeasible", "are infeasible"),
+    "indeterminate": ("got no verdict", "got no verdict"),
+    "refused": ("is refused", "are refused"),
+}
+ENVELOPES: Final[dict[str, str]] = {
+    "limits": "speed and turn rate at their limits, directions free",
+    "inside": "speed and turn rate uniform up to their limits, directions free",
+    "trajectory": "along the trajectory",
+}
+OBJECTIVES: Final[dict[str, str]] = {
+    "error": "smallest error",
+    "cost": "least cost",
+    "mass": "least mass",
+    "power": "least power",
+}
+TIMELINES: Final[dict[str, str]] = {"utc": "UTC", "host": "host clock"}
+LEDGER_KINDS: Final[dict[str, str]] = {
+    "sensor": "sensor",
+    "sync": "synchronisation",
+    "systematic": "known effect",
+}
+SYNC_MODELS: Final[dict[str, str]] = {
+    "syncline": "Syncline (the paper's)",
+    "per_sensor": "per sensor (tighter)",
+}
