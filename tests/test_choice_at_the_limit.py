@@ -86,13 +86,13 @@ def test_strictly_below_the_limit_or_not_at_all(seed: int, tmp_path: Path) -> No
         share = 1 - Fraction(below, 10**16)
         kept = float(limit * share) < float(limit)
         spec = loaded(tmp_path, texts, tau * share, "tie, safe")
-        verdict = check_loaded(spec, CheckSettings(monte_carlo=False))
+        verdict = check_loaded(spec, CheckSettings(monte_carlo=False)).to_json()
         assert verdict["verdict"] == "meets"
         sensor = verdict["design"]["stages"][0]["roles"]["position"]["sensor"]
         assert (sensor == "tie") is kept
         pinned = check_loaded(
             loaded(tmp_path, texts, tau * share, "tie"), CheckSettings(monte_carlo=False)
-        )
+        ).to_json()
         assert (pinned["verdict"] == "meets") is kept
 
 
@@ -101,6 +101,6 @@ def test_optimize_and_check_agree_at_the_limit(seed: int, tmp_path: Path) -> Non
     texts, tau = tie_case(random.Random(100 + seed))
     spec = loaded(tmp_path, texts, tau, "tie, safe")
     found = optimize(spec, OptimizeSettings(pareto=True))
-    verdict = check_loaded(spec, CheckSettings(monte_carlo=False))
+    verdict = check_loaded(spec, CheckSettings(monte_carlo=False)).to_json()
     assert found.exit_code == (0 if verdict["verdict"] == "meets" else 1)
     assert len(found.front) <= 1  # the sensor at the limit is on no front

@@ -157,7 +157,9 @@ def check(
 ) -> dict[str, Any]:
     text, own = text_of(world, requirements, distance)
     (folder / "own.yaml").write_text(own)
-    return check_loaded(load_text(text, folder / "spec.yaml"), CheckSettings(monte_carlo=False))
+    return check_loaded(
+        load_text(text, folder / "spec.yaml"), CheckSettings(monte_carlo=False)
+    ).to_json()
 
 
 def random_requirements(rng: random.Random, found: list[Figures]) -> list[Requirement]:
@@ -351,7 +353,7 @@ def test_one_combination_is_judged_alike_by_check_and_optimize(
     (tmp_path / "alone.yaml").write_text(ALONE_CATALOG)
     text = ALONE.replace("LIMIT", limit).replace("WRITTEN", written)
     loaded = load_text(text, tmp_path / "spec.yaml")
-    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False))
+    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()
     chosen = optimisation_json(optimize(loaded, OptimizeSettings()))
     if meets:
         assert verdict["verdict"] == chosen["verdict"] == "meets"
@@ -379,7 +381,7 @@ def test_a_spec_that_pins_every_role_is_verified_with_its_figures(
     text = ALONE.replace("LIMIT", "70 mm").replace("WRITTEN", written)
     verdict = check_loaded(
         load_text(text, tmp_path / "spec.yaml"), CheckSettings(monte_carlo=False)
-    )
+    ).to_json()
     assert verdict["verdict"] == "fails"
     assert verdict["syncline"]["total_m"] == pytest.approx(0.071, rel=1e-12)
 
@@ -399,7 +401,7 @@ def test_a_role_that_misses_by_nothing_visible_says_so(
     text = text.replace("stages:", f"  - {{id: S, kind: sync, limit: {limit}}}\nstages:")
     verdict = check_loaded(
         load_text(text, tmp_path / "spec.yaml"), CheckSettings(monte_carlo=False)
-    )
+    ).to_json()
     (gap,) = verdict["infeasibility"]["roles_without_options"]
     assert words in gap["text"]
     assert "has 1 times" not in gap["text"]

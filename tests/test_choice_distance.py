@@ -73,7 +73,9 @@ def distance_fixes(
     requirements = [("A", "accuracy", f"{accuracy!r} m"), ("S", "sync", repr(sync))]
     text, own = text_of(world, requirements, distance)
     (folder / "own.yaml").write_text(own)
-    verdict = check_loaded(load_text(text, folder / "spec.yaml"), CheckSettings(monte_carlo=False))
+    verdict = check_loaded(
+        load_text(text, folder / "spec.yaml"), CheckSettings(monte_carlo=False)
+    ).to_json()
     if verdict["verdict"] == "meets":
         return None
     return [f for f in verdict["infeasibility"]["fixes"] if f["figure"] == "distance"]
@@ -185,7 +187,7 @@ def simulated(folder: Path, catalog: dict[str, str], limit: float, before: str) 
     for name, value in catalog.items():
         own = own.replace(name, value)
     (folder / "own.yaml").write_text(own)
-    return check_loaded(load_text(text, folder / "spec.yaml"), CheckSettings())
+    return check_loaded(load_text(text, folder / "spec.yaml"), CheckSettings()).to_json()
 
 
 def the_distance_fix(verdict: dict[str, Any]) -> tuple[float, str]:

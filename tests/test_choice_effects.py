@@ -94,7 +94,7 @@ def test_front_and_designs_carry_an_effect_of_the_sensor(tmp_path: Path, factor:
         (PRICE[name] + 20, pytest.approx(total_m(name, factor), rel=1e-12))
         for name in ("coarse", "fine")
     ]
-    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False))
+    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()
     assert verdict["syncline"]["total_m"] == pytest.approx(total_m("coarse", factor), rel=1e-12)
     assert verdict["choice"]["next_best"][0]["error_m"] == pytest.approx(
         total_m("fine", factor), rel=1e-12
@@ -108,14 +108,14 @@ def test_the_choice_is_made_with_the_effect(tmp_path: Path) -> None:
     assert limit < total_m("coarse", 3.0)
     requirements = [f"{{id: A, kind: accuracy, limit: {limit!r} m}}"]
     loaded = spec(tmp_path, requirements, [UNDERSTATED.format(3)])
-    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False))
+    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()
     assert verdict["verdict"] == "meets"
     assert verdict["design"]["stages"][0]["roles"]["position"]["sensor"] == "fine"
 
 
 def test_a_printed_accuracy_fix_holds_when_it_is_written(tmp_path: Path) -> None:
     loaded = spec(tmp_path, ["{id: A, kind: accuracy, limit: 10 cm}"], [UNDERSTATED.format(4.0)])
-    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False))
+    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()
     assert verdict["verdict"] == "infeasible"
     (fix,) = [f for f in verdict["infeasibility"]["fixes"] if f["kind"] == "accuracy"]
     assert total_m("fine", 4.0) <= fix["to"] < total_m("fine", 4.0) * 1.01
@@ -125,7 +125,7 @@ def test_a_printed_accuracy_fix_holds_when_it_is_written(tmp_path: Path) -> None
             [f"{{id: A, kind: accuracy, limit: {limit!r} m}}"],
             [UNDERSTATED.format(4.0)],
         )
-        assert check_loaded(again, CheckSettings(monte_carlo=False))["verdict"] == word
+        assert check_loaded(again, CheckSettings(monte_carlo=False)).to_json()["verdict"] == word
 
 
 def test_more_failing_designs_than_a_hundred_still_end_in_a_verdict(tmp_path: Path) -> None:
@@ -142,7 +142,7 @@ def test_more_failing_designs_than_a_hundred_still_end_in_a_verdict(tmp_path: Pa
     )
     names = ", ".join(f"m{k}" for k in range(150))
     loaded = load_text(loaded.text.replace("arrival_bench", names), tmp_path / "spec.yaml")
-    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False))
+    verdict = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()
     assert verdict["verdict"] == "infeasible"
     assert [m["id"] for m in verdict["infeasibility"]["conflict"]["requirements"]] == ["A"]
 
@@ -186,7 +186,9 @@ def test_a_distance_fix_takes_the_effect_at_the_new_distance(tmp_path: Path) -> 
     slope = (total_m("fine", 1.0) - rigid) / 10.0 + 0.05
     limit = rigid + slope * 4.0
     loaded = spec(tmp_path, [f"{{id: A, kind: accuracy, limit: {limit!r} m}}"], effects)
-    fixes = check_loaded(loaded, CheckSettings(monte_carlo=False))["infeasibility"]["fixes"]
+    fixes = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()["infeasibility"][
+        "fixes"
+    ]
     (fix,) = [f for f in fixes if f["text"].startswith("distance")]
     assert 3.98 <= fix["to"] <= 4.0
 

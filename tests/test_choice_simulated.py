@@ -29,7 +29,7 @@ from syncline_design.verdict.optimise import (
     optimisation_text,
     optimize,
 )
-from syncline_design.verdict.verify import CheckSettings, check_loaded, exit_code
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 FACTOR = {q: float(chi.ppf(q, 3)) for q in (0.5, 0.95, 0.997)}
 SENSORS = {  # sigma [m], cost
@@ -117,7 +117,7 @@ def test_everything_that_is_listed_meets_the_simulated_limit(
     loaded = spec(tmp_path, [simulated(limit, quantile)])
     names = passing(limit, quantile)
     cheapest = min(names, key=lambda n: SENSORS[n][1])
-    verdict = check_loaded(loaded, CheckSettings())
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
     assert (verdict["verdict"], position(verdict["design"])) == ("meets", cheapest)
     front = [(p["cost"], p["error_m"]) for p in verdict["choice"]["front"]]
     assert front == [(c, pytest.approx(e, rel=1e-12)) for c, e in plain_front(names)]
@@ -131,7 +131,7 @@ def test_everything_that_is_listed_meets_the_simulated_limit(
 
 
 def test_a_better_design_that_fails_is_said_to_be_passed_over(tmp_path: Path) -> None:
-    verdict = check_loaded(spec(tmp_path, [simulated(0.30)]), CheckSettings())
+    verdict = check_loaded(spec(tmp_path, [simulated(0.30)]), CheckSettings()).to_json()
     assert verdict["choice"]["proof"]["passed_over"] == 3
     assert [w["code"] for w in verdict["warnings"]].count("passed-over") == 1
 
@@ -140,7 +140,7 @@ def test_no_design_passes_is_infeasible_in_check_and_optimize(tmp_path: Path) ->
     loaded = spec(tmp_path, [simulated(0.10), sums("accuracy", "5 m", "ACC")])
     verdict = check_loaded(loaded, CheckSettings())
     found = optimize(loaded, OptimizeSettings())
-    assert (verdict["verdict"], exit_code(verdict), found.exit_code) == ("infeasible", 1, 1)
+    assert (verdict.verdict, verdict.exit_code, found.exit_code) == ("infeasible", 1, 1)
     data = optimisation_json(found)
     assert data["verdict"] == "infeasible"
     assert data["designs"] == []
@@ -159,18 +159,18 @@ def fix_of(verdict: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def test_a_simulated_limit_is_moved_as_little_as_needed(tmp_path: Path) -> None:
-    fix = fix_of(check_loaded(spec(tmp_path, [simulated(0.10)]), CheckSettings()), "MC")
+    fix = fix_of(check_loaded(spec(tmp_path, [simulated(0.10)]), CheckSettings()).to_json(), "MC")
     least = FACTOR[0.95] * SENSORS["f"][0]
     assert least * 0.99 < fix["to"] < least * 1.03
     written = fix["text"].rsplit(" to ", 1)[1]
     again = spec(tmp_path, [simulated(0.1) | {"limit": written}])
-    assert check_loaded(again, CheckSettings())["verdict"] == "meets"
+    assert check_loaded(again, CheckSettings()).to_json()["verdict"] == "meets"
 
 
 def test_a_conflict_of_cost_and_simulation_names_both(tmp_path: Path) -> None:
     """0.30 m needs d, e or f; 800 EUR buys a, b or c."""
     loaded = spec(tmp_path, [simulated(0.30), sums("cost", "800 EUR", "COST")])
-    verdict = check_loaded(loaded, CheckSettings())
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
     why = verdict["infeasibility"]
     assert {m["id"] for m in why["conflict"]["requirements"]} == {"MC", "COST"}
     assert fix_of(verdict, "COST")["to"] == 900
@@ -178,19 +178,19 @@ def test_a_conflict_of_cost_and_simulation_names_both(tmp_path: Path) -> None:
     assert least * 0.99 < fix_of(verdict, "MC")["to"] < least * 1.03
     assert any("without any one of them a design exists" in line for line in why["text"])
     for fixed in ([simulated(0.30), sums("cost", "900 EUR", "COST")],):
-        assert check_loaded(spec(tmp_path, fixed), CheckSettings())["verdict"] == "meets"
+        assert check_loaded(spec(tmp_path, fixed), CheckSettings()).to_json()["verdict"] == "meets"
 
 
 def test_two_simulated_requirements_each_count(tmp_path: Path) -> None:
     """The median lets c pass, the 99.7 % quantile asks for d."""
     median, tail = FACTOR[0.5] * 0.16, FACTOR[0.997] * 0.11
     loaded = spec(tmp_path, [simulated(median, 0.5, "MED"), simulated(tail, 0.997, "TAIL")])
-    verdict = check_loaded(loaded, CheckSettings())
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
     assert position(verdict["design"]) == "d"
     tight = spec(
         tmp_path, [simulated(median, 0.5, "MED"), simulated(0.03 * FACTOR[0.997], 0.997, "TAIL")]
     )
-    why = check_loaded(tight, CheckSettings())["infeasibility"]
+    why = check_loaded(tight, CheckSettings()).to_json()["infeasibility"]
     assert [m["id"] for m in why["conflict"]["requirements"]] == ["TAIL"]
 
 
@@ -204,7 +204,7 @@ def test_a_design_that_its_samples_leave_open_carries_the_requirement(
     monkeypatch.setattr(acceptance, "DEFAULT_CAP", 300_000)
     limit = FACTOR[0.95] * 0.15 * (1 + 1e-9)
     loaded = spec(tmp_path, [simulated(limit)], sensors={"c": (0.15, 50)})
-    verdict = check_loaded(loaded, CheckSettings())
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
     assert verdict["verdict"] == "meets"
     assert position(verdict["design"]) == "d"
     marked = {position(d["design"]): d.get("undecided") for d in verdict["choice"]["next_best"]}
@@ -231,7 +231,7 @@ def test_a_known_effect_decides_in_simulation_too(tmp_path: Path) -> None:
     effects = [{"effect": "noise_understated", "sensor": "position", "parameters": {"factor": 2.0}}]
     limit = 2.0 * FACTOR[0.95] * 0.15 * 1.05
     loaded = spec(tmp_path, [simulated(limit)], effects=effects)
-    verdict = check_loaded(loaded, CheckSettings())
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
     assert position(verdict["design"]) == "c"
     assert {position(p["design"]) for p in verdict["choice"]["front"]} == {"c", "d", "f"}
 
@@ -259,7 +259,7 @@ def test_the_ledger_ends_where_simulation_fails(tmp_path: Path) -> None:
 def test_a_waived_simulated_requirement_excludes_nothing(tmp_path: Path) -> None:
     waiver = {"reason": "the buoy is out", "expires": "2999-01-01"}
     loaded = spec(tmp_path, [simulated(0.001) | {"waiver": waiver}])
-    verdict = check_loaded(loaded, CheckSettings())
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
     assert verdict["verdict"] == "meets"
     assert position(verdict["design"]) == "a"
 
@@ -326,7 +326,7 @@ def test_lists_that_simulation_cuts_short_say_so(
     assert "not complete: front, next best designs" in optimisation_text(found)
     assert "not complete: front, next best designs" in render_optimize("html", found)
     assert "gave up" not in render_optimize("html", whole)
-    verdict = check_loaded(loaded, CheckSettings())
+    verdict = check_loaded(loaded, CheckSettings()).to_json()
     assert verdict["verdict"] == "meets"
     (said,) = [w["message"] for w in verdict["warnings"] if w["code"] == "search-gave-up"]
     assert "front, next best designs" in said

@@ -106,7 +106,7 @@ def test_currency_is_only_a_name(tmp_path: Path, code: str, objective: str) -> N
     found = []
     for name in ("EUR", code):
         text = spec_text(name).replace("objective: error", f"objective: {objective}")
-        found.append(check_file(written(tmp_path, text, catalog(currency=name)), QUICK))
+        found.append(check_file(written(tmp_path, text, catalog(currency=name)), QUICK).to_json())
     for key in ("requirements", "syncline", "monte_carlo"):
         assert found[0][key] == found[1][key]
     fronts = [[(p["cost"], p["error_m"]) for p in v["choice"]["front"]] for v in found]
@@ -125,7 +125,7 @@ def test_shipped_entry_without_a_rate_is_refused_where_it_can_be_chosen(tmp_path
     assert "add exchange_rates: {EUR: RATE USD}" in message
     assert f"{path}:" in message
     path.write_text(text.replace("requirements:", "exchange_rates: {EUR: 1.1 USD}\nrequirements:"))
-    assert check_file(path, QUICK)["verdict"] == "meets"
+    assert check_file(path, QUICK).to_json()["verdict"] == "meets"
 
 
 def test_remedies_of_an_infeasible_spec_need_no_rate(tmp_path: Path) -> None:
@@ -194,7 +194,7 @@ def test_what_does_not_say_is_not_on_that_front(
             "    position:", "    clock: {candidates: [free, locked]}\n    position:"
         )
     found, missing = front_of(written(tmp_path, text, catalog({entry: resource})), resource)
-    verdict = check_file(tmp_path / "spec.yaml", QUICK)
+    verdict = check_file(tmp_path / "spec.yaml", QUICK).to_json()
     expected, nothing = front_of(written(tmp_path, text.replace(*drop), catalog()), resource)
     assert found == expected
     assert expected
@@ -220,7 +220,9 @@ def test_optimize_says_what_is_not_on_the_front(tmp_path: Path) -> None:
 
 def test_unused_hardware_without_a_price_has_no_influence(tmp_path: Path) -> None:
     shelves: tuple[dict[str, str], ...] = ({}, {"shelf": "cost"})
-    verdicts = [check_file(written(tmp_path, spec_text(), catalog(s)), QUICK) for s in shelves]
+    verdicts = [
+        check_file(written(tmp_path, spec_text(), catalog(s)), QUICK).to_json() for s in shelves
+    ]
     for verdict in verdicts:
         verdict.pop("provenance")
     assert verdicts[0] == verdicts[1]
@@ -240,5 +242,5 @@ def test_unknown_amounts_come_last_among_ties(tmp_path: Path) -> None:
         text = spec_text().replace("[gnss_a, gnss_b]", "[gnss_a, gnss_z]")
         path = written(tmp_path, text, own)
         for road in ("auto", "front", "milp", "enumerate"):
-            found = check_file(path, CheckSettings(monte_carlo=False, method=road))  # type: ignore[arg-type]
+            found = check_file(path, CheckSettings(monte_carlo=False, method=road)).to_json()  # type: ignore[arg-type]
             assert found["design"]["stages"][0]["roles"]["position"]["sensor"] == priced, road

@@ -57,7 +57,7 @@ def test_one_change_names_cause_payload_and_price(files: tuple[Path, Path]) -> N
     old, new = files
     change(new, DISTANCE)
     data = diff(old, new, PLAIN)
-    before, after = check_file(old, PLAIN), check_file(new, PLAIN)
+    before, after = check_file(old, PLAIN).to_json(), check_file(new, PLAIN).to_json()
     assert [(c.key, c.old, c.new) for c in data.causes] == [
         ("stages[uav].distance", "100 m", "40 m")
     ]
@@ -103,7 +103,7 @@ def test_verdict_files_compare_like_their_specs(files: tuple[Path, Path]) -> Non
     saved = []
     for path in files:
         target = path.with_suffix(".json")
-        target.write_text(json_text(check_file(path, PLAIN)), encoding="utf-8")
+        target.write_text(json_text(check_file(path, PLAIN).to_json()), encoding="utf-8")
         saved.append(target)
     of_specs, of_files = diff(old, new, PLAIN), diff(*saved)
     mixed = diff(old, saved[1], PLAIN)
@@ -196,7 +196,7 @@ def test_each_side_keeps_its_currency(
     """
     _priced(files[1], "USD", 1.17)
     sides = (files[1], files[0]) if back else files
-    verdicts = [check_file(side, PLAIN) for side in sides]
+    verdicts = [check_file(side, PLAIN).to_json() for side in sides]
     if stored:
         names = [tmp_path / "old.json", tmp_path / "new.json"]
         for name, verdict in zip(names, verdicts, strict=True):

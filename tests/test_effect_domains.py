@@ -105,7 +105,7 @@ def test_a_negative_factor_ends_every_command_as_bad_input(tmp_path: Path, comma
 def test_values_up_to_the_ends_of_what_exists_are_taken(
     tmp_path: Path, effect: str, sensor: str, values: str
 ) -> None:
-    verdict = check_file(written(tmp_path, effect, sensor, values), CheckSettings())
+    verdict = check_file(written(tmp_path, effect, sensor, values), CheckSettings()).to_json()
     assert verdict["verdict"] == "meets"
 
 
@@ -123,7 +123,7 @@ def test_a_convention_that_a_sensor_cannot_have_is_refused_at_its_place(
     for convention in sorted(set().union(*MEANT.values())):
         path = written(tmp_path, "frame_convention", sensor, f"convention: {convention}")
         if convention in MEANT[sensor]:
-            assert check_file(path, CheckSettings(monte_carlo=False))["effects"]
+            assert check_file(path, CheckSettings(monte_carlo=False)).to_json()["effects"]
             continue
         with pytest.raises(BadInput, match=f"found {convention}") as refused:
             check_file(path, CheckSettings())
@@ -157,7 +157,7 @@ def test_tails_are_charged_with_the_standard_deviation_of_students_t(
     """Oracle: scipy's standard deviation; just above 2 the charge stopped at that of 2.1."""
     values = f"degrees_of_freedom: {freedom}, outlier_rate: 0"
     path = written(tmp_path, "heavy_tails", "position", values)
-    verdict = check_file(path, CheckSettings(monte_carlo=False))
+    verdict = check_file(path, CheckSettings(monte_carlo=False)).to_json()
     rows = {row["term"]: row["value_m"] for row in verdict["syncline"]["ledger"]}
     noise = rows["sigma_p"] + rows["heavy_tails (position)"]
     assert noise == pytest.approx(math.sqrt(3.0) * 0.05 * float(student.std(freedom)), rel=1e-9)

@@ -356,5 +356,5 @@ effects: [{{effect: timestamp_jitter, sensor: position, parameters: {{std_s: 2 m
 def test_jitter_is_covered_as_every_normal_error(k: str, tmp_path: Path) -> None:
     path = tmp_path / "car.yaml"
     path.write_text(SPEC.format(k=k))
-    found = check_file(path, CheckSettings(monte_carlo=False))["syncline"]["total_m"]
+    found = check_file(path, CheckSettings(monte_carlo=False)).to_json()["syncline"]["total_m"]
     assert found == pytest.approx(math.sqrt(3) * 0.01 + 20.0 * float(k) * (1e-3 + 2e-3), rel=1e-12)

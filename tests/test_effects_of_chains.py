@@ -88,7 +88,7 @@ def test_a_transponder_that_stands_off_is_charged_and_simulated(
     tmp_path: Path, transponder: str
 ) -> None:
     """It was refused where the spec gave the transponder no arm."""
-    verdict = check_file(chain(tmp_path, transponder, "lever_arm"), CheckSettings())
+    verdict = check_file(chain(tmp_path, transponder, "lever_arm"), CheckSettings()).to_json()
     off = math.sqrt(1.0 + 4.0 + 0.25)
     assert verdict["monte_carlo"]["quantiles"]["0.5"]["value_m"] == pytest.approx(off, abs=2e-3)
     assert verdict["syncline"]["total_m"] == pytest.approx(off, abs=2e-3)

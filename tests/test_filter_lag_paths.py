@@ -69,7 +69,7 @@ def check(folder: Path, trajectory: str, lag_s: float, arm: float, omega: float)
     spec = folder / "boat.yaml"
     text = SPEC.format(trajectory=trajectory, lag=lag_s, arm=arm, omega=omega)
     spec.write_text(text, encoding="utf-8")
-    return check_file(spec, CheckSettings())
+    return check_file(spec, CheckSettings()).to_json()
 
 
 def agrees(verdict: dict[str, Any], expected: Array, shares: tuple[str, ...]) -> None:

@@ -23,7 +23,7 @@ from syncline_design.spec.load import BadInput, load
 from syncline_design.spec.selection import ClockSelection, RoleSelection, Selection
 from syncline_design.verdict.recheck import recheck
 from syncline_design.verdict.recheck_facts import impossible
-from syncline_design.verdict.verify import CheckSettings, check_file, exit_code
+from syncline_design.verdict.verify import CheckSettings, check_file
 
 QUICK = CheckSettings(monte_carlo=False)
 
@@ -99,7 +99,8 @@ def test_a_pinned_method_of_a_single_stage(
     keys: Stage, has: bool, method: str, tmp_path: Path
 ) -> None:
     path = written(tmp_path, stamped(single(**keys), "attitude", method))
-    verdict = check_file(path, QUICK)
+    found = check_file(path, QUICK)
+    verdict = found.to_json()
     assert verdict["verdict"] == ("meets" if has else "fails")
     row = facts(verdict)
     assert (row is None) == has
@@ -108,7 +109,7 @@ def test_a_pinned_method_of_a_single_stage(
         assert row["value"] == 1
         assert row["margin"] < 0
         assert method in row["note"]
-        assert exit_code(verdict) == 1
+        assert found.exit_code == 1
         (gone,) = verdict["choice"]["excluded"]
         assert gone["code"] == "gnss"
         assert (gone["stage"], gone["role"], gone["method"]) == ("fish", "attitude", method)
@@ -122,7 +123,7 @@ def test_a_pinned_clock_of_a_single_stage(
     keys: Stage, has: bool, clock: str, tmp_path: Path
 ) -> None:
     path = written(tmp_path, single(**keys, clock=clock))
-    verdict = check_file(path, QUICK)
+    verdict = check_file(path, QUICK).to_json()
     assert verdict["verdict"] == ("meets" if has else "fails")
     assert (facts(verdict) is None) == has
     roles = [(gone["role"], gone["sensor"]) for gone in verdict["choice"]["excluded"]]
@@ -132,14 +133,14 @@ def test_a_pinned_clock_of_a_single_stage(
 @pytest.mark.parametrize("clock", ["free_running", "tcxo", "ocxo", "ocxo_disciplined", "rubidium"])
 def test_oscillators_dive(clock: str, tmp_path: Path) -> None:
     """What was set before the dive needs no GNSS in it."""
-    verdict = check_file(written(tmp_path, single(depth="300 m", clock=clock)), QUICK)
+    verdict = check_file(written(tmp_path, single(depth="300 m", clock=clock)), QUICK).to_json()
     assert facts(verdict) is None
 
 
 @pytest.mark.parametrize(("keys", "has"), SINGLE)
 def test_a_sensor_of_type_gnss(keys: Stage, has: bool, tmp_path: Path) -> None:
     receiver = {"sensor": "ublox_f9p_rtk", "primitive": "pps", "timestamping": "hardware"}
-    verdict = check_file(written(tmp_path, single(**keys, position=receiver)), QUICK)
+    verdict = check_file(written(tmp_path, single(**keys, position=receiver)), QUICK).to_json()
     assert verdict["verdict"] == ("meets" if has else "fails")
     if not has:
         (gone,) = verdict["choice"]["excluded"]
@@ -159,7 +160,9 @@ def test_a_receiver_by_any_of_its_names(kind: str, tmp_path: Path) -> None:
     antenna = single(depth="50 m")["position"]
     antenna = antenna | {"sensor": antenna["sensor"] | {"type": kind}}
     path = written(tmp_path, single(depth="50 m", position=antenna))
-    assert check_file(path, QUICK)["verdict"] == ("fails" if kind in RECEIVERS else "meets")
+    assert check_file(path, QUICK).to_json()["verdict"] == (
+        "fails" if kind in RECEIVERS else "meets"
+    )
     roles = [RoleSelection("fish", role, f"fish.{role}", "pps", "hardware")  # type: ignore[arg-type]
              for role in ("position", "attitude", "ranging")]  # fmt: skip
     named = impossible(load(path), Selection(tuple(roles), (ClockSelection("fish", None),)))
@@ -174,7 +177,7 @@ def test_a_position_sensor_of_no_type_is_told_of_where_gnss_is_not(
     """Only its type tells that a receiver is one: a silent entry met 50 m down without a word."""
     antenna = single(**keys)["position"]
     antenna = antenna | {"sensor": antenna["sensor"] | {"type": kind}}
-    verdict = check_file(written(tmp_path, single(**keys, position=antenna)), QUICK)
+    verdict = check_file(written(tmp_path, single(**keys, position=antenna)), QUICK).to_json()
     told = [one for one in verdict["warnings"] if one["code"] == "unknown-fact"]
     assert bool(told) == (not has and not kind.strip())
     assert all((one["key"], "GNSS" in one["message"]) == ("type", True) for one in told)
@@ -213,7 +216,7 @@ def test_cables_pass_time_on_and_no_antenna(case: int, tmp_path: Path) -> None:
             stages[at] |= {"clock": "pps_gpio"} if what == "clock" else {"attitude": compass}
         path = written(tmp_path, *stages)
         allowed = received[at] if what == "sensor" else timed[at]
-        assert (facts(check_file(path, QUICK)) is None) == allowed, (at, what)
+        assert (facts(check_file(path, QUICK).to_json()) is None) == allowed, (at, what)
 
 
 def test_stages_on_one_vehicle_share_its_clock(tmp_path: Path) -> None:
@@ -221,11 +224,11 @@ def test_stages_on_one_vehicle_share_its_clock(tmp_path: Path) -> None:
     stamps straight from GNSS stands where it has it."""
     ship = single(name="ship", vehicle="ship", clock="pps_gpio")
     fish = later("fish", vehicle="ship", depth="20 m")
-    assert facts(check_file(written(tmp_path, ship, fish), QUICK)) is None
+    assert facts(check_file(written(tmp_path, ship, fish), QUICK).to_json()) is None
     straight = stamped(fish, "ranging", "pps_gnss")
-    assert facts(check_file(written(tmp_path, ship, straight), QUICK)) is not None
+    assert facts(check_file(written(tmp_path, ship, straight), QUICK).to_json()) is not None
     cable = straight | {"timing_from": "ship"}
-    assert facts(check_file(written(tmp_path, ship, cable), QUICK)) is None
+    assert facts(check_file(written(tmp_path, ship, cable), QUICK).to_json()) is None
 
 
 # ------------------------------------------------------------------ catalogs of one's own
@@ -279,13 +282,13 @@ def test_own_entries_say_what_they_need(role: str, name: str, tmp_path: Path) ->
             stage |= {"clock": name}
         else:
             stage["attitude"] = stage["attitude"] | {"sensor": name}
-        verdict = check_file(written(tmp_path, stage, parts=OWN), QUICK)
+        verdict = check_file(written(tmp_path, stage, parts=OWN), QUICK).to_json()
         assert (facts(verdict) is None) == (depth == "0 m")
 
 
 def test_what_needs_nothing_works_anywhere(tmp_path: Path) -> None:
     stage = stamped(single(depth="40 m", clock="chip"), "position", "by_chance")
-    assert check_file(written(tmp_path, stage, parts=OWN), QUICK)["verdict"] == "meets"
+    assert check_file(written(tmp_path, stage, parts=OWN), QUICK).to_json()["verdict"] == "meets"
 
 
 # ------------------------------------------------------------------ the choice
@@ -300,7 +303,7 @@ def test_the_choice_leaves_out_what_cannot_work(tmp_path: Path) -> None:
         stage = single(depth=depth, clock=clocks)
         for role in ("position", "attitude", "ranging"):
             stage = stamped(stage, role, methods)
-        verdict = check_file(written(tmp_path, stage), QUICK)
+        verdict = check_file(written(tmp_path, stage), QUICK).to_json()
         assert verdict["verdict"] == "meets"
         roles = verdict["design"]["stages"][0]["roles"]
         names = {roles[role]["timestamping"] for role in roles}
@@ -324,9 +327,10 @@ def test_nothing_left_is_infeasible_and_says_why(what: str, tmp_path: Path) -> N
         receivers = {"candidates": ["ublox_f9p_rtk", "ublox_f9p_pvt"]}
         stage["position"] = receivers | {"timestamping": "hardware"}
     path = written(tmp_path, stage)
-    verdict = check_file(path, QUICK)
+    found = check_file(path, QUICK)
+    verdict = found.to_json()
     assert verdict["verdict"] == "infeasible"
-    assert exit_code(verdict) == 1
+    assert found.exit_code == 1
     (gap,) = verdict["infeasibility"]["roles_without_options"]
     assert gap["role"] == ("clock" if what == "clock" else "position")
     assert "depth: 200 m" in gap["text"]
@@ -346,7 +350,7 @@ def test_remedies_offer_nothing_that_cannot_work(tmp_path: Path) -> None:
         stage = stage | {role: slow}
     accuracy = [{"id": "ACC-1", "kind": "accuracy", "limit": "40 cm"},
                 {"id": "SYNC-1", "kind": "sync", "limit": 1000}]  # fmt: skip
-    verdict = check_file(written(tmp_path, stage, requirements=accuracy), QUICK)
+    verdict = check_file(written(tmp_path, stage, requirements=accuracy), QUICK).to_json()
     assert verdict["verdict"] == "infeasible"
     texts = [fix["text"] for fix in verdict["infeasibility"]["fixes"]]
     assert texts
@@ -365,7 +369,7 @@ def test_a_written_design_keeps_what_the_stage_says(tmp_path: Path) -> None:
     fish = yaml.safe_load(design.read_text())["stages"][1]
     assert (fish["depth"], fish["timing_from"]) == ("30 m", "ship")
     assert fish["ranging"]["timestamping"] == "pps_gnss"
-    assert check_file(design, QUICK)["verdict"] == "meets"
+    assert check_file(design, QUICK).to_json()["verdict"] == "meets"
 
 
 # ------------------------------------------------------------------ against a plain loop

@@ -39,7 +39,7 @@ ARM = "lever_arm: [3 m, 4 m, -10.5 m]"  # 13 m from the ranging sensor: longer t
 
 def verdict(effect: str, horizon: str = HORIZON, antenna: str = ARM) -> dict[str, Any]:
     text = SPEC.format(effect=effect, horizon=horizon, antenna=antenna)
-    return check_loaded(load_text(text, "boat.yaml"), CheckSettings(monte_carlo=False))
+    return check_loaded(load_text(text, "boat.yaml"), CheckSettings(monte_carlo=False)).to_json()
 
 
 def charged_m(effect: str, **spec: str) -> float:

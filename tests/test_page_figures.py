@@ -33,7 +33,7 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "deg": math.pi / 180.0, "mdeg": math
 @pytest.mark.parametrize("name", ["car_mapping", "rov_relay", "subsea_survey_small_sv"])
 def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
     """Every role, every shared piece and every clock: to the cent."""
-    verdict = check_file(ROOT / "specs" / f"{name}.yaml", PLAIN)
+    verdict = check_file(ROOT / "specs" / f"{name}.yaml", PLAIN).to_json()
     assert any(clock["cost"] for clock in verdict["design"]["clocks"])
     cells: list[str] = []
     text = html(on_verdict(verdict))
@@ -51,7 +51,7 @@ def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
 @pytest.mark.parametrize("method", ["front", "milp", "enumerate"])
 def test_the_page_says_in_words_how_the_choice_was_proven(method: Any) -> None:
     words = {"front": "Pareto front", "milp": "integer program", "enumerate": "enumeration of all"}
-    verdict = check_file(MULTIROTOR, CheckSettings(method=method, monte_carlo=False))
+    verdict = check_file(MULTIROTOR, CheckSettings(method=method, monte_carlo=False)).to_json()
     assert verdict["choice"]["proof"]["method"] == method
     sentence = re.search(r"Found by [^<]*", Page(html(on_verdict(verdict))).text)
     assert sentence is not None
@@ -95,7 +95,9 @@ def test_a_figure_in_the_unit_of_another(written: str, value_si: float, shown: s
 
 @pytest.fixture(scope="module")
 def simulated_page() -> str:
-    page = html(on_verdict(check_file(ROOT / "specs" / "usv_mapping.yaml", CheckSettings())))
+    page = html(
+        on_verdict(check_file(ROOT / "specs" / "usv_mapping.yaml", CheckSettings()).to_json())
+    )
     return re.sub(r"[\u00a0\u202f\u2009]", " ", page)
 
 

@@ -60,7 +60,7 @@ def test_whole_verdicts_of_random_specs(tmp_path: Path) -> None:
         spec = with_accuracy(drawn, rng)
         path = tmp_path / f"{len(words)}.yaml"
         path.write_text(yaml.safe_dump(spec, sort_keys=False), "utf-8")
-        verdict = check_loaded(load(path), WITHOUT_SIMULATION)
+        verdict = check_loaded(load(path), WITHOUT_SIMULATION).to_json()
         outcomes = list(Enumeration(spec))
         good = [outcome for outcome in outcomes if not failed(spec, outcome)]
         words.append(verdict["verdict"])

@@ -169,10 +169,10 @@ def places(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
 
 def test_broken_verdict_files_are_refused_not_stumbled_over(folder: Path) -> None:
     """300 random places of a verdict, each set to something else: a difference or bad input."""
-    verdict = json.loads(json.dumps(check_file(folder / "missed.yaml")))
+    verdict = json.loads(json.dumps(check_file(folder / "missed.yaml").to_json()))
     rng, values = random.Random(5), [None, "x", [], {}, [1], True, -1, 1e308, 10**400, [None]]
     good, broken = folder / "good.json", folder / "broken.json"
-    good.write_text(json.dumps(check_file(folder / "good.yaml")))
+    good.write_text(json.dumps(check_file(folder / "good.yaml").to_json()))
     found = [p for p in places(verdict) if p[0] not in ("choice", "monte_carlo", "infeasibility")]
     refused = 0
     for _ in range(300):

@@ -301,7 +301,7 @@ def test_a_pipe_among_the_case_files_is_not_waited_for(folder: Path) -> None:
 
 def test_a_verdict_names_every_file_that_entered_it(folder: Path) -> None:
     """Hashes by hashlib over the files; the shipped catalogs have their own key."""
-    found = check_file(folder / "spec.yaml")["provenance"]["files"]
+    found = check_file(folder / "spec.yaml").to_json()["provenance"]["files"]
     names = ["delays.txt", "more/below.yaml", "more/logger.txt", "own.yaml", "path.csv"]
     assert [entry["file"] for entry in found] == names
     for entry in found:

@@ -59,7 +59,7 @@ def check(
 ) -> dict[str, Any]:
     spec = folder / "line.yaml"
     spec.write_text(SPEC.format(effects=effects, trajectory=trajectory), encoding="utf-8")
-    return check_loaded(load(spec), CheckSettings())
+    return check_loaded(load(spec), CheckSettings()).to_json()
 
 
 def said(verdict: dict[str, Any]) -> str:

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 
 from syncline_design.spec.load import BadInput, load_text
-from syncline_design.verdict.verify import CheckSettings, check_loaded, exit_code
+from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 PINNED = """\
 syncline: 1
@@ -37,7 +38,7 @@ SENSOR_ERROR = 0.13 + 0.01 + (math.sqrt(3) + math.sqrt(2)) * math.radians(0.1) *
 SYNC_RATE = 20 + 50 * math.radians(60)
 
 
-def check(
+def checked(
     *,
     limit: str = "1 m",
     tau: str = "1 ms",
@@ -45,12 +46,17 @@ def check(
     more: str = "",
     baseline: str = "1 m",
     **settings: Any,
-) -> dict[str, Any]:
+) -> Verdict:
     """The verdict of one pinned system, worked out by hand above."""
     text = PINNED.format(
         limit=limit, tau=tau, requirements=requirements, more=more, baseline=baseline
     )
     return check_loaded(load_text(text, "pinned.yaml"), CheckSettings(**settings))
+
+
+def check(**keys: Any) -> dict[str, Any]:
+    """The same as it is written."""
+    return checked(**keys).to_json()
 
 
 def requirement(verdict: dict[str, Any], identity: str) -> dict[str, Any]:
@@ -86,10 +92,10 @@ def test_every_key_of_the_interface_is_there_and_is_json() -> None:
 def test_a_limit_met_exactly_passes_and_one_missed_by_1e_12_fails() -> None:
     total = check()["syncline"]["total_m"]
     assert requirement(check(limit=f"{total!r} m"), "ACC-1")["status"] == "pass"
-    short = check(limit=f"{total * (1 - 1e-12)!r} m")
-    assert requirement(short, "ACC-1")["status"] == "fail"
-    assert short["verdict"] == "fails"
-    assert exit_code(short) == 1
+    short = checked(limit=f"{total * (1 - 1e-12)!r} m")
+    assert requirement(short.to_json(), "ACC-1")["status"] == "fail"
+    assert short.verdict == "fails"
+    assert short.exit_code == 1
 
 
 def test_sync_is_strict_and_implied_when_the_spec_is_silent() -> None:
@@ -170,12 +176,12 @@ def test_the_lever_arm_is_warned_of_only_where_it_changes_more_than_a_tenth() ->
 
 
 def test_a_monte_carlo_requirement_is_undecided_without_simulation() -> None:
-    verdict = check(
+    verdict = checked(
         requirements="  - {id: M, kind: monte_carlo, quantile: 0.95, limit: 1 m}",
         monte_carlo=False,
     )
-    assert verdict["verdict"] == "indeterminate"
-    assert exit_code(verdict) == 3
+    assert verdict.verdict == "indeterminate"
+    assert verdict.exit_code == 3
 
 
 def test_the_same_spec_and_seed_give_the_same_verdict_and_another_seed_other_samples() -> None:
@@ -187,12 +193,12 @@ def test_the_same_spec_and_seed_give_the_same_verdict_and_another_seed_other_sam
 def test_an_open_spec_falls_back_to_the_next_design_that_passes_monte_carlo(tmp_path: Path) -> None:
     text = (Path(__file__).parent.parent / "specs" / "uav_corridor.yaml").read_text("utf-8")
     loaded = load_text(text, "specs/uav_corridor.yaml")
-    cheapest = check_loaded(loaded, CheckSettings())
+    cheapest = check_loaded(loaded, CheckSettings()).to_json()
     value = requirement(cheapest, "MC-1")["value"]
     tighter = text.replace("limit: 0.40 m", f"limit: {value - 0.004:.4f} m").replace(
         "limit: 65000 EUR", "limit: 165000 EUR"
     )
-    verdict = check_loaded(load_text(tighter, "specs/uav_corridor.yaml"), CheckSettings())
+    verdict = check_loaded(load_text(tighter, "specs/uav_corridor.yaml"), CheckSettings()).to_json()
     assert verdict["verdict"] == "meets"
     assert verdict["design"]["cost"] > cheapest["design"]["cost"]
     assert verdict["warnings"][0]["code"] == "passed-over"

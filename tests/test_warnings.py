@@ -44,7 +44,7 @@ WORST = "worst-case-above-limit"
 
 def verdict(limit: str, more: str = "") -> dict[str, Any]:
     text = SPEC.format(limit=limit, more=more)
-    return check_loaded(load_text(text, "boat.yaml"), CheckSettings())
+    return check_loaded(load_text(text, "boat.yaml"), CheckSettings()).to_json()
 
 
 def worst_by_hand_m() -> float:
@@ -174,7 +174,7 @@ def test_a_bound_that_normal_errors_often_exceed_is_told_of(factor: float, where
     if where == "jitter":
         text += "effects:\n  - {effect: timestamp_jitter, sensor: attitude, "
         text += "parameters: {std_s: 1 us}}\n"
-    found = check_loaded(load_text(text, "boat.yaml"), CheckSettings(monte_carlo=False))
+    found = check_loaded(load_text(text, "boat.yaml"), CheckSettings(monte_carlo=False)).to_json()
     told = [one["message"] for one in found["warnings"] if one["code"] == "coverage-factor"]
     assert len(told) == (where != "nowhere" and factor in EXCEEDED)
     assert all(f"{EXCEEDED[factor]} of normal timestamp errors" in words for words in told)
@@ -219,7 +219,7 @@ def test_timelines_that_differ_between_stages_of_one_vehicle_are_told_of(
     text = CHAIN_OF_ONE_VEHICLE.format(*stamps)
     if clock:
         text = text.replace("    vehicle: ship\n", "    vehicle: ship\n    clock: ntp_internet\n")
-    found = check_loaded(load_text(text, "ship.yaml"), CheckSettings(monte_carlo=False))
+    found = check_loaded(load_text(text, "ship.yaml"), CheckSettings(monte_carlo=False)).to_json()
     codes = [one["code"] for one in found["warnings"]]
     assert ("common-clock" in codes) == (told and not clock)
     offset = 0.005 if told and clock else 0.0  # ntp_internet: within 5 ms

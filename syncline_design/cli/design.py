@@ -49,31 +49,33 @@ def check(
     from syncline_design.report.several import skipped_text, summary_line
     from syncline_design.report.write import STDOUT, OutputError
     from syncline_design.spec.folders import spec_files
-    from syncline_design.verdict.verify import CheckSettings, check_files, exit_code
+    from syncline_design.verdict.tree import Refused
+    from syncline_design.verdict.verify import CheckSettings, check_files
 
     found = spec_files(spec, skip_others=skip_others)
     targets = output_targets(output, CHECK_FORMATS, found.files)
     settings = CheckSettings(seed=seed, method=road(method))
     with watched(deadline, targets, quiet=quiet):
         verdicts = check_files(found.files, settings)
-    refused = [verdict for verdict in verdicts if verdict["verdict"] == "refused"]
+    refused = [verdict for verdict in verdicts if isinstance(verdict, Refused)]
     for verdict in refused:
-        say(verdict["text"])
+        say(verdict.text)
     if refused:  # no file is written; what goes to standard output may say so
         targets = [target for target in targets if target.path == STDOUT]
-    text = "\n".join(console(on_verdict(v)) for v in verdicts if v not in refused)
+    plain = [verdict.to_json() for verdict in verdicts]
+    text = "\n".join(console(on_verdict(v)) for v in plain if v["verdict"] != "refused")
     if len(found.files) != 1 or any(path.is_dir() for path in spec):
-        summary = summary_line(verdicts)
+        summary = summary_line(plain)
         text = f"{text}\n{summary}\n" if text else f"{summary}\n"
     if found.skipped and not quiet:
         say(skipped_text(found.skipped))
     try:
-        emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
+        emit(text, targets, lambda name: render_checks(name, plain), quiet=quiet)
     except OutputError as error:
         if len(refused) < len(verdicts):
             raise
         say(f"syncline-design: {error}")  # nothing was computed: that the specs are bad stands
-    return max((exit_code(verdict) for verdict in verdicts), default=0)
+    return max((verdict.exit_code for verdict in verdicts), default=0)
 
 
 @guarded

@@ -25,7 +25,8 @@ from syncline_design.spec.load import (
 )
 from syncline_design.spec.resolve import platform_of
 from syncline_design.spec.yaml_text import Document, KeyPath, parse
-from syncline_design.verdict.verify import CheckSettings, check_loaded, exit_code
+from syncline_design.verdict.tree import EXIT_CODES
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 Json = dict[str, Any]
 MOST_TRIED = 8  # changes that are also tried one by one
@@ -58,7 +59,7 @@ def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None
         (before.file, after.file),
         tuple(cause for cause, _ in causes),
         changes(before.verdict, after.verdict),
-        exit_code(after.verdict),
+        EXIT_CODES[after.verdict["verdict"]],
     )
 
 
@@ -70,7 +71,7 @@ def read_side(path: Path, settings: CheckSettings) -> Side:
     if document.data is None:
         raise BadInput(document.problems)
     case = load_document(document, path, catalogs_of(document, path))
-    return Side(str(path), check_loaded(case, settings), case, document)
+    return Side(str(path), check_loaded(case, settings).to_json(), case, document)
 
 
 def _causes(before: Side, after: Side) -> Found:
@@ -226,8 +227,8 @@ def _tried(
         document = replace(before.document, data=data)
         path = before.case.path
         alone = load_document(document, path, catalogs_of(document, path))
-        verdict = check_loaded(without_simulated(alone), plain)
-        start = check_loaded(without_simulated(before.case), plain)
+        verdict = check_loaded(without_simulated(alone), plain).to_json()
+        start = check_loaded(without_simulated(before.case), plain).to_json()
     except Exception:  # a change that needs the others; the whole difference stands without it
         return cause
     return replace(cause, effect=changes(start, verdict))

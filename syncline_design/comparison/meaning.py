@@ -13,7 +13,8 @@ from syncline_design.spec.edit import with_effects_text
 from syncline_design.spec.known_effects import NoBudget
 from syncline_design.spec.load import Case, load_text
 from syncline_design.verdict.optimise import pinned_text
-from syncline_design.verdict.tree import frame
+from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.verified import frame
 from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
 
 Json = dict[str, Any]
@@ -129,11 +130,11 @@ def meaning(case: Case, found: Diagnosis, seed: int = 0) -> DesignMeaning | None
 def _checked(case: Case, settings: CheckSettings) -> Json:
     """The verdict; `indeterminate` with its `refusal` where an effect has no place in a budget."""
     try:
-        return check_loaded(case, settings)
+        return check_loaded(case, settings).to_json()
     except NoBudget as refused:
         words = [f"{one.message}; {one.hint}" for one in refused.problems]
-        verdict = frame(case, build_problem(case), "indeterminate", settings.seed)
-        return {**verdict, "refusal": words}
+        parts = frame(case, build_problem(case), settings.seed)
+        return {**Verdict(verdict="indeterminate", **parts).to_json(), "refusal": words}
 
 
 def error_figures(before: Json, after: Json) -> tuple[ErrorFigure, ...]:

@@ -143,13 +143,13 @@ class Pieces:
         return found
 
     @property
-    def cautions(self) -> list[dict[str, str]]:
-        """The warnings that go with what is missing."""
+    def cautions(self) -> list[tuple[str, str]]:
+        """What to warn of where something is missing: code and message."""
         out = []
         if self.cut_short:
             message = "the time limit ended this before it was complete: "
-            out.append({"code": "time-limit", "message": message + ", ".join(self.cut_short)})
+            out.append(("time-limit", message + ", ".join(self.cut_short)))
         if self.gave_up:
             message = "designs may be missing here, as no further ones were simulated: "
-            out.append({"code": "search-gave-up", "message": message + ", ".join(self.gave_up)})
+            out.append(("search-gave-up", message + ", ".join(self.gave_up)))
         return out

@@ -26,7 +26,7 @@ def render_optimize(name: str, found: Optimisation) -> str:
     from syncline_design.report.on_verdict import on_verdict
     from syncline_design.report.render_html import html
 
-    verdict = found.verdict or {}
+    verdict = found.verdict.to_json() if found.verdict is not None else {}
     told = optimisation_json(found)
     choice = dict(verdict.get("choice") or {})
     choice |= {key: told[key] for key in _HINGES if told.get(key)}

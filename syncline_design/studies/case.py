@@ -164,7 +164,7 @@ def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Js
             monte_carlo=simulated,
             today=settings.today,
         ),
-    )
+    ).to_json()
     record = _record(verdict, left_out)
     proof = (verdict.get("choice") or {}).get("proof") or {}
     if proof.get("optimal") is False:  # as far as this machine came within the time limit

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from syncline_design.model.budget import differs
 from syncline_design.model.quantity import Dimension, format_quantity
@@ -13,44 +11,24 @@ from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.spec.load import Case
-from syncline_design.verdict.tree import Verified
+from syncline_design.verdict.tree import Assumption, Caution
+from syncline_design.verdict.verified import Verified
 
-Json = dict[str, Any]
 LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed their bound
 
 
-def cautions(case: Case, verified: Verified, assumed: Sequence[Mapping[str, Any]]) -> list[Json]:
+def cautions(case: Case, verified: Verified, assumed: Sequence[Assumption]) -> tuple[Caution, ...]:
     """The `warnings` of a verdict: a code to filter by, a sentence to read, what it is about."""
-    return [
-        caution.to_json()
-        for caution in (
-            *_worst_case(verified),
-            *_lever_arm(verified),
-            *_clocks(case, verified),
-            *_coverage(verified),
-            *_untyped(case, verified),
-            *_waivers(verified),
-            *_simulation(verified),
-            *_assumptions(assumed),
-        )
-    ]
-
-
-@dataclass(frozen=True, slots=True)
-class Caution:
-    """One warning; entry: of a catalog; key: its figure; requirement: an id of the spec."""
-
-    code: str
-    message: str
-    entry: str = ""
-    key: str = ""
-    requirement: str = ""
-
-    def to_json(self) -> Json:
-        """The entry under `warnings`; what it is not about is left out."""
-        about = {"entry": self.entry, "key": self.key, "requirement": self.requirement}
-        named = {name: text for name, text in about.items() if text}
-        return {"code": self.code, "message": self.message} | named
+    return (
+        *_worst_case(verified),
+        *_lever_arm(verified),
+        *_clocks(case, verified),
+        *_coverage(verified),
+        *_untyped(case, verified),
+        *_waivers(verified),
+        *_simulation(verified),
+        *_assumptions(assumed),
+    )
 
 
 def _time(value: float) -> str:
@@ -174,10 +152,10 @@ def _untyped(case: Case, verified: Verified) -> Iterator[Caution]:
 def _waivers(verified: Verified) -> Iterator[Caution]:
     for row in verified.requirements:
         if row.waiver is not None:
-            state = "expired on" if row.waiver["expired"] else "in force until"
+            state = "expired on" if row.waiver.expired else "in force until"
             yield Caution(
                 "waiver",
-                f"{row.id}: waiver {state} {row.waiver['expires']}: {row.waiver['reason']}",
+                f"{row.id}: waiver {state} {row.waiver.expires}: {row.waiver.reason}",
                 requirement=row.id,
             )
 
@@ -195,11 +173,11 @@ def _simulation(verified: Verified) -> Iterator[Caution]:
         )
 
 
-def _assumptions(assumed: Sequence[Mapping[str, Any]]) -> Iterator[Caution]:
+def _assumptions(assumed: Sequence[Assumption]) -> Iterator[Caution]:
     """Figures without a public source, one line an entry."""
     by_entry: dict[str, list[str]] = {}
     for one in assumed:
-        by_entry.setdefault(str(one["entry"]), []).append(str(one["figure"]))
+        by_entry.setdefault(one.entry, []).append(one.figure)
     for entry, figures in by_entry.items():
         message = f"assumption, no public source: {', '.join(figures)} of {entry}"
         yield Caution("assumption", message, entry=entry, key=", ".join(figures))

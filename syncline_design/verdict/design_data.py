@@ -14,7 +14,7 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.spec.catalog import Entry
 from syncline_design.spec.load import Case
 from syncline_design.spec.resolve import candidate_sensors, platform_of
-from syncline_design.verdict.tree import finite
+from syncline_design.verdict.tree import Assumption, Source, finite
 
 Json = dict[str, Any]
 
@@ -142,25 +142,18 @@ def used_entries(case: Case, problem: Problem, design: Design) -> list[UsedEntry
     return [UsedEntry(section, identity, entry) for (section, identity), entry in found.items()]
 
 
-def assumptions(entries: list[UsedEntry]) -> list[Json]:
+def assumptions(entries: list[UsedEntry]) -> tuple[Assumption, ...]:
     """Figures without a public source, entry by entry."""
-    found = []
+    found: list[Assumption] = []
     for used in entries:
         basis = used.entry.basis
         if basis is None:
             continue
         figures = list(basis) if isinstance(basis, Mapping) else _all_figures(used.entry)
-        found += [
-            {
-                "entry": used.id,
-                "section": used.section,
-                "figure": figure,
-                "value": figure_text(getattr(used.entry, figure, None)),
-                "note": used.entry.note,
-            }
-            for figure in figures
-        ]
-    return found
+        for figure in figures:
+            value = figure_text(getattr(used.entry, figure, None))
+            found.append(Assumption(used.id, used.section, figure, value, used.entry.note))
+    return tuple(found)
 
 
 _NOT_FIGURES = frozenset({"name", "source", "basis", "note", "modality", "type", "timeline"})
@@ -187,10 +180,8 @@ def figure_text(value: Any) -> str:
     return "" if value is None else str(value)
 
 
-def sources(entries: list[UsedEntry]) -> list[Json]:
+def sources(entries: list[UsedEntry]) -> tuple[Source, ...]:
     """Where the figures come from."""
-    return [
-        {"entry": used.id, "section": used.section, "source": used.entry.source}
-        for used in entries
-        if used.entry.source
-    ]
+    return tuple(
+        Source(used.id, used.section, used.entry.source) for used in entries if used.entry.source
+    )

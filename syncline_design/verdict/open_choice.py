@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from syncline_design.choice.table import Design, Problem
-from syncline_design.verdict.tree import Verified
+from syncline_design.verdict.verified import Verified
 
 if TYPE_CHECKING:
     from syncline_design.choice.outcome import Choice, Infeasible, Method

@@ -43,6 +43,7 @@ from syncline_design.verdict.choice_data import (
     unproven_json,
 )
 from syncline_design.verdict.open_choice import Picked, pick
+from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
 
 SCHEMA = "syncline-design/optimization/v1"
@@ -98,7 +99,7 @@ class Optimisation:
     explanation: Explanation | None
     cut_short: tuple[str, ...] = ()  # what the time limit left out or incomplete
     gave_up: tuple[str, ...] = ()  # what lacks designs because too many were simulated
-    verdict: Json | None = None
+    verdict: Verdict | None = None
     unfinished: str = ""
 
     @property
@@ -222,7 +223,7 @@ def _tolerances(
         return None
 
 
-def _verdict(found: Optimisation, checking: CheckSettings) -> Json:
+def _verdict(found: Optimisation, checking: CheckSettings) -> Verdict:
     """The verdict of the same design, for a page: nothing is chosen a second time."""
     assert found.picked is not None
     points = found.front if found.settings.pareto and found.settings.resource == "cost" else None

@@ -1,4 +1,7 @@
-"""A verdict as data: the JSON of `check`, schema syncline-design/verdict/v1."""
+"""The verdict, one typed tree: what `check` says (schema syncline-design/verdict/v1).
+
+Fields are the keys of the JSON in their order; what is unlimited or unknown is None.
+"""
 
 from __future__ import annotations
 
@@ -7,21 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from syncline_design import __version__
-from syncline_design.choice.table import Design
-from syncline_design.choice.table import Problem as DesignProblem
-from syncline_design.machine.records import json_of
-from syncline_design.model.budget import Budget, LeverArm
-from syncline_design.model.horizon import Horizon
-from syncline_design.model.system import System
-from syncline_design.simulation import MonteCarlo, SimulationError
-from syncline_design.simulation.certified import certified_worst_case_m
-from syncline_design.spec.known_effects import describe
-from syncline_design.spec.load import Case, Problem
-from syncline_design.spec.resolve import platform_of
-from syncline_design.verdict.recheck import Recheck
+from syncline_design.machine.records import Record, optional
+from syncline_design.model.budget import SyncModelName, TermKind
+from syncline_design.spec.load import FileRead
 
-Json = dict[str, Any]
 SCHEMA = "syncline-design/verdict/v1"
 Status = Literal["pass", "fail", "indeterminate"]
 Word = Literal["meets", "fails", "infeasible", "indeterminate"]
@@ -42,9 +34,27 @@ UNITS = {
 }
 
 
+def finite(value: float | None) -> float | None:
+    """JSON has no infinity: what is unlimited or unknown is null."""
+    return value if value is not None and math.isfinite(value) else None
+
+
 @dataclass(frozen=True, slots=True)
-class RequirementResult:
-    """One requirement, decided: value against limit; margin = limit - value."""
+class WaiverResult(Record):
+    """Why a requirement may be missed and until when; expired: whether it no longer counts."""
+
+    reason: str
+    expires: str
+    expired: bool
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RequirementResult(Record):
+    """One requirement, decided: value against limit; made by `decided`.
+
+    line, column: its place in the spec, None of one that no one wrote; quantile, low, high: of a
+    simulated one, with the interval of its value.
+    """
 
     id: str
     kind: str
@@ -52,48 +62,26 @@ class RequirementResult:
     value: float | None
     limit: float
     unit: str
+    margin: float | None
     line: int | None = None
     column: int | None = None
     implied: bool = False
-    quantile: float | None = None
-    low: float | None = None
-    high: float | None = None
     note: str = ""
-    waiver: Mapping[str, Any] | None = None
+    quantile: float | None = optional()
+    low: float | None = optional()
+    high: float | None = optional()
+    waiver: WaiverResult | None = optional()
 
     @property
     def is_waived(self) -> bool:
         """Whether a waiver in force covers this requirement."""
-        return self.waiver is not None and not self.waiver["expired"]
-
-    def to_json(self) -> Json:
-        """The entry under `requirements`."""
-        margin = None if self.value is None else self.limit - self.value
-        data: Json = {
-            "id": self.id,
-            "kind": self.kind,
-            "status": self.status,
-            "value": finite(self.value),
-            "limit": self.limit,
-            "unit": self.unit,
-            "margin": finite(margin),
-            "line": self.line,
-            "column": self.column,
-            "implied": self.implied,
-            "note": self.note,
-        }
-        optional = {
-            "quantile": self.quantile,
-            "low": self.low,
-            "high": self.high,
-            "waiver": self.waiver,
-        }
-        return data | {key: value for key, value in optional.items() if value is not None}
+        return self.waiver is not None and not self.waiver.expired
 
 
-def finite(value: float | None) -> float | None:
-    """JSON has no infinity: what is unlimited or unknown is null."""
-    return value if value is not None and math.isfinite(value) else None
+def decided(*, status: Status, value: float | None, limit: float, **rest: Any) -> RequirementResult:
+    """A requirement's result with its margin, limit - value."""
+    margin = None if value is None else finite(limit - value)
+    return RequirementResult(status=status, value=finite(value), limit=limit, margin=margin, **rest)
 
 
 def word_of(results: Iterable[RequirementResult]) -> Word:
@@ -108,186 +96,231 @@ def word_of(results: Iterable[RequirementResult]) -> Word:
 
 
 @dataclass(frozen=True, slots=True)
-class Verified:
-    """One design, verified: budget, exact recheck, Monte Carlo where it ran, requirements."""
+class PlatformFigures(Record):
+    """How a stage may move and how far it looks."""
 
-    design: Design
-    system: System
-    figures: Budget
-    exact: Recheck
-    monte_carlo: MonteCarlo | None
-    requirements: tuple[RequirementResult, ...]
-    trouble: str = ""  # why the Monte Carlo part is missing
+    id: str
+    name: str
+    v_max_mps: float
+    omega_max_radps: float
+    distance_m: float
+    baseline_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class StageFrame(Record):
+    """A stage of the spec."""
+
+    name: str
+    vehicle: str
+    platform: PlatformFigures
+
+
+@dataclass(frozen=True, slots=True)
+class SpecFrame(Record):
+    """What a verdict repeats of its spec; open_roles: `stage.role` that leave something open.
+
+    combinations: digits of a whole number of any size; None where time ended before it was known.
+    """
+
+    name: str
+    file: str
+    currency: str
+    sync_model: SyncModelName
+    objective: str
+    coverage_factor: float
+    open_roles: tuple[str, ...]
+    combinations: str | None
+    stages: tuple[StageFrame, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class MissionHorizon(Record):
+    """What drifts, grids and heave are charged for and simulated over."""
+
+    duration_s: float
+    extent_m: float
+    tilt_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class ModelTotal(Record):
+    """What one sync model says."""
+
+    sync_error_m: float
+    total_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class ModelTotals(Record):
+    """Both sync models side by side."""
+
+    syncline: ModelTotal
+    per_sensor: ModelTotal
+
+
+@dataclass(frozen=True, slots=True)
+class LeverArmFigures(Record):
+    """The same with the lever arm's rotation; differs: some figure changes by more than 10 %."""
+
+    tau_crit_s: float | None
+    total_m: float
+    sync_rate_mps: float
+    differs: bool
+
+
+@dataclass(frozen=True, slots=True)
+class StageSyncline(Record):
+    """One stage's part; tau_crit_s None: it has no limit."""
+
+    name: str
+    sensor_error_m: float
+    sync_rate_mps: float
+    tau_s: float
+    tau_crit_s: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LedgerRow(Record):
+    """One term of the total error; share: its part of the total, 0 to 1."""
+
+    term: str
+    stage: str
+    value_m: float
+    kind: TermKind
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class SynclineFigures(Record):
+    """What the Syncline says of a design, by the model of the spec and by both."""
+
+    model: SyncModelName
+    sensor_error_m: float
+    sync_rate_mps: float
+    tau_s: float
+    tau_crit_s: float | None
+    sync_error_m: float
+    systematic_error_m: float
+    total_m: float
+    models: ModelTotals
+    lever_arm: LeverArmFigures
+    stages: tuple[StageSyncline, ...]
+    ledger: tuple[LedgerRow, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Caution(Record):
+    """One warning; entry: of a catalog; key: its figure; requirement: an id of the spec."""
+
+    code: str
+    message: str
+    entry: str | None = optional()
+    key: str | None = optional()
+    requirement: str | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance(Record):
+    """What the numbers depend on."""
+
+    version: str
+    spec_sha256: str
+    catalogs_sha256: str
+    files: tuple[FileRead, ...]
+    seed: int
+    python: str
+    numpy: str
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorFigures(Record):
+    """The errors of a design, each named by its convention; only those that are computed."""
+
+    syncline_m: float | None
+    worst_case_1sigma_m: float | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class Assumption(Record):
+    """A figure of a catalog entry without a public source."""
+
+    entry: str
+    section: str
+    figure: str
+    value: str
+    note: str
+
+
+@dataclass(frozen=True, slots=True)
+class Source(Record):
+    """Where the figures of a catalog entry come from."""
+
+    entry: str
+    section: str
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class KnownEffect(Record):
+    """A known effect of the system and what it does, in words."""
+
+    effect: str
+    sensor: str
+    stage: str
+    parameters: Mapping[str, float | str]
+    sentence: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Verdict(Record):
+    """What `check` says of one spec; without a design its figures are None."""
+
+    schema: str = SCHEMA
+    verdict: Word
+    spec: SpecFrame
+    horizon: MissionHorizon
+    requirements: tuple[RequirementResult, ...] = ()
+    design: Mapping[str, Any] | None = None
+    syncline: SynclineFigures | None = None
+    monte_carlo: Mapping[str, Any] | None = None
+    warnings: tuple[Caution, ...] = ()
+    provenance: Provenance
+    infeasibility: Mapping[str, Any] | None = optional()
+    figures: ErrorFigures | None = optional()
+    assumptions: tuple[Assumption, ...] | None = optional()
+    sources: tuple[Source, ...] | None = optional()
+    effects: tuple[KnownEffect, ...] | None = optional()
+    choice: Mapping[str, Any] | None = optional()
 
     @property
-    def worst_case_1sigma_m(self) -> float | None:
-        """Certified worst case [m], sensors at one sigma; None of a system without sense."""
-        try:
-            return certified_worst_case_m(self.system)
-        except SimulationError:
-            return None
+    def exit_code(self) -> int:
+        """0 meets, 1 does not meet, 3 no verdict."""
+        return EXIT_CODES[self.verdict]
+
+
+@dataclass(frozen=True, slots=True)
+class FileProblem(Record):
+    """What is wrong with a file, and where."""
+
+    file: str
+    line: int
+    column: int
+    path: str
+    message: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Refused(Record):
+    """A file among several that could not be read; nothing of it was computed."""
+
+    schema: str = SCHEMA
+    verdict: Literal["refused"] = "refused"
+    file: str
+    problems: tuple[FileProblem, ...]
+    text: str
 
     @property
-    def word(self) -> Word:
-        """meets, fails or indeterminate."""
-        return word_of(self.requirements)
-
-
-def syncline_json(budget: Budget, model: str, total_m: float) -> Json:
-    """The `syncline` key; total_m is the rechecked total of the spec's own model."""
-    per_sensor = model == "per_sensor"
-    ledger = budget.ledger_per_sensor if per_sensor else budget.ledger
-    return {
-        "model": model,
-        "sensor_error_m": budget.sensor_error_m,
-        "sync_rate_mps": budget.sync_rate_mps,
-        "tau_s": budget.tau_s,
-        "tau_crit_s": finite(budget.tau_crit_s),
-        "sync_error_m": budget.sync_error_per_sensor_m if per_sensor else budget.sync_error_m,
-        "systematic_error_m": budget.systematic_m,
-        "total_m": total_m,
-        "models": {
-            "syncline": {"sync_error_m": budget.sync_error_m, "total_m": budget.total_m},
-            "per_sensor": {
-                "sync_error_m": budget.sync_error_per_sensor_m,
-                "total_m": budget.total_per_sensor_m,
-            },
-        },
-        "lever_arm": _lever_arm_json(budget.lever_arm, per_sensor),
-        "stages": [
-            {
-                "name": row.stage,
-                "sensor_error_m": row.sensor_error_m,
-                "sync_rate_mps": row.sync_rate_mps,
-                "tau_s": row.tau_s,
-                "tau_crit_s": finite(row.tau_crit_s),
-            }
-            for row in budget.stages
-        ],
-        "ledger": [
-            {
-                "term": term.term,
-                "stage": term.stage,
-                "value_m": term.value_m,
-                "kind": term.kind,
-                "share": term.share,
-            }
-            for term in ledger
-        ],
-    }
-
-
-def figures_json(verified: Verified) -> Json:
-    """The `figures` key: the errors of a design by their convention, those that are computed."""
-    worst = verified.worst_case_1sigma_m
-    figures: Json = {"syncline_m": finite(float(verified.exact.total_m))}
-    return figures if worst is None else figures | {"worst_case_1sigma_m": finite(worst)}
-
-
-def _lever_arm_json(lever_arm: LeverArm, per_sensor: bool) -> Json:
-    return {
-        "tau_crit_s": finite(lever_arm.tau_crit_s),
-        "total_m": lever_arm.total_per_sensor_m if per_sensor else lever_arm.total_m,
-        "sync_rate_mps": lever_arm.sync_rate_mps,
-        "differs": lever_arm.differs,
-    }
-
-
-def frame(case: Case, problem: DesignProblem | None, word: str, seed: int) -> Json:
-    """What every verdict holds, with or without a design; problem: None where time ended first."""
-    spec = case.spec
-    stages = []
-    for stage in spec.stages:
-        platform = platform_of(stage.platform, case.catalog)
-        identity = stage.platform.use or stage.platform.name or stage.name
-        stages.append(
-            {
-                "name": stage.name,
-                "vehicle": stage.vehicle_name,
-                "platform": {
-                    "id": identity,
-                    "name": platform.name or identity,
-                    "v_max_mps": float(platform.v_max),
-                    "omega_max_radps": float(platform.omega_max),
-                    "distance_m": float(platform.distance),
-                    "baseline_m": float(platform.baseline),
-                },
-            }
-        )
-    return {
-        "schema": SCHEMA,
-        "verdict": word,
-        "spec": {
-            "name": spec.name,
-            "file": str(case.path),
-            "currency": spec.currency,
-            "sync_model": spec.sync_model,
-            "objective": spec.objective,
-            "coverage_factor": float(spec.coverage_factor),
-            "open_roles": [
-                f"{table.stage_name}.{table.role}"
-                for table in (problem.roles if problem is not None else ())
-                if len(table.options) + len(table.excluded) > 1
-            ],
-            "combinations": None if problem is None else str(problem.combinations),
-            "stages": stages,
-        },
-        "horizon": horizon_json(spec.horizon.horizon()),
-        "requirements": [],
-        "design": None,
-        "syncline": None,
-        "monte_carlo": None,
-        "warnings": [],
-        "provenance": _provenance(case, seed),
-    }
-
-
-def horizon_json(horizon: Horizon) -> Json:
-    """The `horizon` key: what drifts, grids and heave are charged for."""
-    return {
-        "duration_s": horizon.duration_s,
-        "extent_m": horizon.extent_m,
-        "tilt_rad": horizon.tilt_rad,
-    }
-
-
-def _provenance(case: Case, seed: int) -> Json:
-    import platform
-
-    import numpy as np
-
-    return {
-        "version": __version__,
-        "spec_sha256": case.spec_sha256,
-        "catalogs_sha256": case.catalogs_sha256,
-        "files": json_of(case.files),
-        "seed": seed,
-        "python": platform.python_version(),
-        "numpy": np.__version__,
-    }
-
-
-def effects_json(system: System) -> list[Json]:
-    return [
-        {
-            "effect": entry.effect,
-            "sensor": entry.sensor,
-            "stage": entry.stage,
-            "parameters": dict(entry.parameters),
-            "sentence": describe(entry),
-        }
-        for entry in system.effects
-    ]
-
-
-def problem_json(problem: Problem) -> Json:
-    wanted = f"expected {problem.expected}" if problem.expected else ""
-    found = f"found {problem.found}" if problem.found else ""
-    parts = (problem.message, wanted, found, problem.hint)
-    return {
-        "file": problem.file,
-        "line": problem.line,
-        "column": problem.column,
-        "path": problem.path,
-        "message": "; ".join(part for part in parts if part),
-    }
+    def exit_code(self) -> int:
+        """2."""
+        return EXIT_CODES[self.verdict]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -34,17 +34,22 @@ from syncline_design.verdict.cautions import cautions
 from syncline_design.verdict.design_data import assumptions, design_json, sources, used_entries
 from syncline_design.verdict.recheck import Recheck, recheck
 from syncline_design.verdict.tree import (
-    EXIT_CODES,
-    SCHEMA,
     UNITS,
+    Caution,
+    Refused,
     RequirementResult,
     Status,
+    Verdict,
+    WaiverResult,
+    decided,
+)
+from syncline_design.verdict.verified import (
     Verified,
-    effects_json,
-    figures_json,
+    error_figures,
     frame,
-    problem_json,
-    syncline_json,
+    known_effects,
+    refused,
+    syncline_figures,
 )
 
 if TYPE_CHECKING:
@@ -52,7 +57,6 @@ if TYPE_CHECKING:
     from syncline_design.choice.variations import Build
     from syncline_design.verdict.open_choice import Picked
 
-Json = dict[str, Any]
 T = TypeVar("T")
 
 
@@ -71,7 +75,7 @@ class CheckSettings:
     today: date | None = None
 
 
-def check_file(path: str | Path, settings: CheckSettings | None = None) -> Json:
+def check_file(path: str | Path, settings: CheckSettings | None = None) -> Verdict:
     """The verdict of a spec file (schema syncline-design/verdict/v1)."""
     wanted = settings or CheckSettings()
     with within(_deadline(wanted)):
@@ -83,11 +87,10 @@ def _deadline(settings: CheckSettings) -> Deadline:
     return in_force() if settings.time_limit_s is None else Deadline(settings.time_limit_s)
 
 
-def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
+def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Verdict | Refused]:
     """Verdicts of specs, in the order given; a refused file stands among them as such.
 
-    Refused: {"verdict": "refused", "file", "problems"}, and nothing of that spec is computed.  A
-    time limit binds all of them together.
+    Of a refused file nothing is computed.  A time limit binds all of them together.
     """
     read = [_or_refused(path, load) for path in paths]  # all of them before anything is computed
     with within(_deadline(settings)):
@@ -95,26 +98,20 @@ def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Json]:
         return [_check_or_refuse(item, alone) for item in read]
 
 
-def _check_or_refuse(read: Case | Json, settings: CheckSettings) -> Json:
-    if isinstance(read, dict):
+def _check_or_refuse(read: Case | Refused, settings: CheckSettings) -> Verdict | Refused:
+    if isinstance(read, Refused):
         return read
     return _or_refused(read.path, lambda _: check_loaded(read, settings))
 
 
-def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Json:
+def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Refused:
     try:
         return work(path)
     except BadInput as error:
-        return {
-            "schema": SCHEMA,
-            "verdict": "refused",
-            "file": str(path),
-            "problems": [problem_json(problem) for problem in error.problems],
-            "text": str(error),
-        }
+        return refused(str(path), error)
 
 
-def check_loaded(case: Case, settings: CheckSettings) -> Json:
+def check_loaded(case: Case, settings: CheckSettings) -> Verdict:
     """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
     build = _build(settings)
     problem: DesignProblem | None = None
@@ -130,7 +127,7 @@ def check_loaded(case: Case, settings: CheckSettings) -> Json:
 
 def _sole_verdict(
     case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
-) -> Json:
+) -> Verdict:
     """The verdict on the only design that a spec leaves.
 
     Where the spec names candidates, that no design meets it is said as for any number of designs.
@@ -142,24 +139,26 @@ def _sole_verdict(
     everything, design = sole
     verified = verify(case, everything, design, settings)
     if verified.word == "fails" and names_candidates(case.spec):
-        return _infeasible_json(case, problem, settings, build)
-    return _verdict_json(case, everything, verified, settings, excluded_json(problem))
+        return _infeasible(case, problem, settings, build)
+    return _verdict(case, everything, verified, settings, excluded_json(problem))
 
 
 def unfinished_verdict(
     case: Case, problem: DesignProblem | None, settings: CheckSettings, why: str
-) -> Json:
+) -> Verdict:
     """A verdict that the time limit left without a design."""
     from syncline_design.verdict.choice_data import unproven_json
 
-    data = frame(case, problem, "indeterminate", settings.seed)
-    data["requirements"] = [
-        _placed(case, index, one, _unmet(case, one, in_conflict=False), settings).to_json()
-        for index, one in enumerate(case.spec.requirements)
-    ]
-    data["warnings"] = [{"code": "time-limit", "message": f"{why}; no design was found by then"}]
-    data["choice"] = {"proof": unproven_json(settings.method)}
-    return data
+    return Verdict(
+        verdict="indeterminate",
+        **frame(case, problem, settings.seed),
+        requirements=tuple(
+            _placed(case, index, one, _unmet(case, one, in_conflict=False), settings)
+            for index, one in enumerate(case.spec.requirements)
+        ),
+        warnings=(Caution("time-limit", f"{why}; no design was found by then"),),
+        choice={"proof": unproven_json(settings.method)},
+    )
 
 
 def _build(settings: CheckSettings) -> Build:
@@ -188,7 +187,9 @@ def picked_design(case: Case, seed: int = 0) -> tuple[DesignProblem, Design]:
     return problem, choice.design
 
 
-def _check_open(case: Case, problem: DesignProblem, settings: CheckSettings, build: Build) -> Json:
+def _check_open(
+    case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
+) -> Verdict:
     """Choose, then verify; without any design say why and what would help."""
     from syncline_design.verdict.open_choice import pick
 
@@ -208,7 +209,7 @@ def open_verdict(
     settings: CheckSettings,
     build: Build | None = None,
     points: Sequence[FrontPoint] | None = None,
-) -> Json:
+) -> Verdict:
     """The verdict on what was picked for a spec; points: its front of cost, where known."""
     from syncline_design.verdict.choice_data import choice_json, left_out_text
 
@@ -216,53 +217,52 @@ def open_verdict(
     if sole_design(problem) is not None:
         return _sole_verdict(case, problem, settings, build)
     if picked.verified is None:
-        return _infeasible_json(case, problem, settings, build)
+        return _infeasible(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
     choice = choice_json(case, problem, picked, pieces, points)
-    data = _verdict_json(case, problem, picked.verified, settings, choice)
-    if picked.verified.word != "meets" and not picked.exhausted:
-        data["verdict"] = "indeterminate"
-    data["warnings"][:0] = [*_unproven(picked), *pieces.cautions]
-    if choice["front_left_out"]:
-        text = left_out_text(choice["front_left_out"], "cost")
-        data["warnings"].append({"code": "unpriced", "message": text})
-    if picked.passed_over:
-        data["warnings"].insert(0, _passed_over(picked))
-    return data
+    found = _verdict(case, problem, picked.verified, settings, choice)
+    missing = choice["front_left_out"]
+    warnings = (
+        *_passed_over(picked),
+        *_unproven(picked),
+        *(Caution(code, message) for code, message in pieces.cautions),
+        *found.warnings,
+        *([Caution("unpriced", left_out_text(missing, "cost"))] if missing else ()),
+    )
+    is_open = picked.verified.word != "meets" and not picked.exhausted
+    return replace(found, verdict="indeterminate" if is_open else found.verdict, warnings=warnings)
 
 
-def _unproven(picked: Picked) -> list[Json]:
+def _unproven(picked: Picked) -> Iterator[Caution]:
     """What the time limit left open about a design that meets."""
     proof = picked.choice.proof
-    if proof.optimal:
-        return []
-    gap = "" if proof.gap is None else f" (by {100 * proof.gap:.3g} % at most)"
-    message = f"the time limit ended the search: a better design than this may exist{gap}"
-    return [{"code": "not-proven-optimal", "message": message}]
+    if not proof.optimal:
+        gap = "" if proof.gap is None else f" (by {100 * proof.gap:.3g} % at most)"
+        message = f"the time limit ended the search: a better design than this may exist{gap}"
+        yield Caution("not-proven-optimal", message)
 
 
-def _infeasible_json(
+def _infeasible(
     case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
-) -> Json:
+) -> Verdict:
     """Why there is no design, and which single changes would help."""
     from syncline_design.choice.explain import explain
     from syncline_design.verdict.choice_data import excluded_json
 
     found = explain(case, problem, build)
-    data = frame(case, problem, "infeasible", settings.seed)
-    data["infeasibility"] = found.to_json() | {"text": found.lines()}
     conflict = {m.id for members in (found.conflict, *found.further) for m in members}
-    data["requirements"] = [
-        _placed(
-            case, index, one, _unmet(case, one, one.id in conflict, found.minimal), settings
-        ).to_json()
-        for index, one in enumerate(case.spec.requirements)
-    ]
-    data["choice"] = excluded_json(problem)
-    if found.cut_short:
-        message = "the time limit ended the search for reasons and remedies"
-        data["warnings"] = [{"code": "time-limit", "message": message}]
-    return data
+    late = Caution("time-limit", "the time limit ended the search for reasons and remedies")
+    return Verdict(
+        verdict="infeasible",
+        **frame(case, problem, settings.seed),
+        requirements=tuple(
+            _placed(case, i, one, _unmet(case, one, one.id in conflict, found.minimal), settings)
+            for i, one in enumerate(case.spec.requirements)
+        ),
+        warnings=(late,) if found.cut_short else (),
+        infeasibility=found.to_json() | {"text": found.lines()},
+        choice=excluded_json(problem),
+    )
 
 
 def _unmet(
@@ -277,12 +277,15 @@ def _unmet(
     limit = one.limit
     if one.kind == "cost" and isinstance(limit, Quantity):
         limit = float(case.spec.in_currency(limit))
-    return RequirementResult(
-        one.id, one.kind, status, None, float(limit), unit, quantile=quantile, note=note
-    )
+    return decided(
+        id=one.id, kind=one.kind, status=status, value=None, limit=float(limit), unit=unit,
+        quantile=quantile, note=note,
+    )  # fmt: skip
 
 
-def _passed_over(picked: Picked) -> Json:
+def _passed_over(picked: Picked) -> Iterator[Caution]:
+    if not picked.passed_over:
+        return
     count = f"{picked.passed_over} design{'s' if picked.passed_over > 1 else ''}"
     message = f"{count} that come before this one keep every sum but not the Monte Carlo limits"
     if not picked.exhausted:
@@ -290,12 +293,7 @@ def _passed_over(picked: Picked) -> Json:
             f"{count} keep every sum but not the Monte Carlo limits; shown is the first; the "
             f"search stopped after {MOST_SIMULATED} simulated designs"
         )
-    return {"code": "passed-over", "message": message}
-
-
-def exit_code(verdict: Json) -> int:
-    """0 meets, 1 does not meet, 2 refused, 3 no verdict."""
-    return EXIT_CODES[verdict["verdict"]]
+    yield Caution("passed-over", message)
 
 
 def verify(case: Case, problem: DesignProblem, design: Design, settings: CheckSettings) -> Verified:
@@ -336,29 +334,29 @@ def _results(
     rechecked = {one.id: one for one in exact.requirements}
     for one in exact.requirements:
         if one.implied:
-            yield RequirementResult(
-                one.id, one.kind, "pass" if one.passed else "fail", one.value_float,
-                float(one.limit), UNITS[one.kind], implied=True,
+            yield decided(
+                id=one.id, kind=one.kind, status="pass" if one.passed else "fail",
+                value=one.value_float, limit=float(one.limit), unit=UNITS[one.kind], implied=True,
                 note=one.note,
             )  # fmt: skip
     for index, requirement in enumerate(case.spec.requirements):
         if requirement.kind == "monte_carlo":
-            result = _decided(case, requirement, system, found, settings)
+            result = _simulated(case, requirement, system, found, settings)
         else:
             one = rechecked[requirement.id]
-            result = RequirementResult(
-                one.id,
-                one.kind,
-                "pass" if one.passed else "fail",
-                one.value_float,
-                float(one.limit),
-                UNITS.get(one.kind, case.spec.currency),
+            result = decided(
+                id=one.id,
+                kind=one.kind,
+                status="pass" if one.passed else "fail",
+                value=one.value_float,
+                limit=float(one.limit),
+                unit=UNITS.get(one.kind, case.spec.currency),
                 note="" if one.value is not None else f"a catalog entry gives no {one.kind}",
             )
         yield _placed(case, index, requirement, result, settings)
 
 
-def _decided(
+def _simulated(
     case: Case,
     requirement: Requirement,
     system: System,
@@ -367,25 +365,26 @@ def _decided(
 ) -> RequirementResult:
     """A Monte Carlo requirement: sampled on until its interval leaves the limit."""
     limit, quantile = float(requirement.limit), float(requirement.quantile or 0.0)
-    blank = RequirementResult(
-        requirement.id, "monte_carlo", "indeterminate", None, limit, UNITS["monte_carlo"],
-        quantile=quantile,
-    )  # fmt: skip
+    about: dict[str, Any] = {
+        "id": requirement.id, "kind": "monte_carlo", "limit": limit,
+        "unit": UNITS["monte_carlo"], "quantile": quantile,
+    }  # fmt: skip
     if found is None:
-        return replace(blank, note="not simulated")
+        return decided(status="indeterminate", value=None, note="not simulated", **about)
     simulation = simulation_settings(case, settings.seed)
     try:
         decision = decide(system, simulation, quantile, limit, first=found)
     except OutOfTime:
-        return replace(blank, note="the time limit ended the simulation before it was decided")
+        note = "the time limit ended the simulation before it was decided"
+        return decided(status="indeterminate", value=None, note=note, **about)
     estimate = decision.estimate
-    return replace(
-        blank,
+    return decided(
         status=decision.status,
         value=estimate.value_m,
         low=estimate.low_m,
         high=estimate.high_m,
         note=_samples_note(decision, simulation.samples),
+        **about,
     )
 
 
@@ -408,33 +407,32 @@ def _placed(
     waiver = None
     if requirement.waiver is not None:
         today = settings.today or date.today()
-        waiver = {
-            "reason": requirement.waiver.reason,
-            "expires": requirement.waiver.expires,
-            "expired": not requirement.waiver.holds_on(today),
-        }
+        given = requirement.waiver
+        waiver = WaiverResult(given.reason, given.expires, not given.holds_on(today))
     return replace(result, line=line, column=column, note=note, waiver=waiver)
 
 
-def _verdict_json(
+def _verdict(
     case: Case,
     problem: DesignProblem,
     verified: Verified,
     settings: CheckSettings,
-    choice: Json,
-) -> Json:
+    choice: Mapping[str, Any],
+) -> Verdict:
     entries = used_entries(case, problem, verified.design)
-    model = case.spec.sync_model
-    data = frame(case, problem, verified.word, settings.seed)
-    data["requirements"] = [r.to_json() for r in verified.requirements]
-    data["design"] = design_json(case, problem, verified.design, verified.figures)
-    data["syncline"] = syncline_json(verified.figures, model, float(verified.exact.total_m))
-    data["figures"] = figures_json(verified)
-    data["monte_carlo"] = None if verified.monte_carlo is None else verified.monte_carlo.to_json()
-    data["assumptions"] = assumptions(entries)
-    data["sources"] = sources(entries)
-    data["effects"] = effects_json(verified.system)
-    data["warnings"] = cautions(case, verified, data["assumptions"])
-    if choice:
-        data["choice"] = choice
-    return data
+    assumed = assumptions(entries)
+    found = verified.monte_carlo
+    return Verdict(
+        verdict=verified.word,
+        **frame(case, problem, settings.seed),
+        requirements=verified.requirements,
+        design=design_json(case, problem, verified.design, verified.figures),
+        syncline=syncline_figures(verified, case.spec.sync_model),
+        monte_carlo=None if found is None else found.to_json(),
+        warnings=cautions(case, verified, assumed),
+        figures=error_figures(verified),
+        assumptions=assumed,
+        sources=sources(entries),
+        effects=known_effects(verified.system),
+        choice=choice or None,
+    )
