@@ -6,12 +6,14 @@ import copy
 import functools
 import itertools
 import math
+from dataclasses import replace
 from typing import Any
 
 from syncline_design.paper.reproduce import Reproduction, reproduce
 from syncline_design.report.document import Document
 from syncline_design.report.on_simulation import on_simulation
-from syncline_design.simulation import SimulationResult, SimulationSettings, simulate
+from syncline_design.simulation import Simulation, SimulationSettings, simulate
+from syncline_design.simulation.results import SpecName
 from tests.simulation_systems import fixed_wing as fixed_wing_system
 
 HOSTILE = (
@@ -422,12 +424,13 @@ def reproduction() -> Reproduction:
     return reproduce(simulate=False)
 
 
-def simulation() -> tuple[Document, SimulationResult]:
+def simulation() -> tuple[Document, Simulation]:
     """A simulated system whose name is hostile; real figures."""
     system = fixed_wing_system()
     settings = SimulationSettings(samples=500, limit_m=0.3, tau_grid_s=(1e-5, 0.1, 1.0))
-    result = simulate(system, settings)
-    return on_simulation(result, system, "".join(HOSTILE), "specs/uav.yaml"), result
+    named = SpecName("".join(HOSTILE), "specs/uav.yaml")
+    result = replace(simulate(system, settings), spec=named)
+    return on_simulation(result, system), result
 
 
 def diagnosis() -> dict[str, Any]:

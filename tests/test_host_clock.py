@@ -31,14 +31,12 @@ from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, S
 from syncline_design.model.timing import Constant, Empirical, Normal, TimingError, Uniform
 from syncline_design.simulation import SimulationSettings
 from syncline_design.simulation.sampling import sample_errors
-from syncline_design.simulation.worst_case import WorstCase
 from syncline_design.spec.load import load
 from syncline_design.verdict.recheck import recheck
 from syncline_design.verdict.verify import CheckSettings, check_file
 
 HOST, OTHER = "host:v", "host:w"
 EXACT = (0.0, 0.0, 0.0)
-WORST = WorstCase(0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def one(role: str, timeline: str, age_s: float = 0.0) -> Sensor:

@@ -91,7 +91,11 @@ def test_an_output_is_refused_in_the_place_of_an_input(
     def computed(*_: object, **__: object) -> None:
         raise AssertionError("computed before it was refused")
 
-    for place in ("verify.check_loaded", "study.run.run_loaded", "simulated_spec.simulate"):
+    for place in (
+        "verdict.verify.check_loaded",
+        "studies.run.run_loaded",
+        "verdict.simulated_spec.simulate",
+    ):
         monkeypatch.setattr(f"syncline_design.{place}", computed)
     if command == "diff":
         monkeypatch.undo()

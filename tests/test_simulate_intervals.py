@@ -16,10 +16,7 @@ from syncline_design.simulation.intervals import (
     proportion_interval,
     quantile_ranks,
 )
-from syncline_design.simulation.worst_case import WorstCase
 from tests.simulation_systems import fixed_wing, survey
-
-UNUSED = WorstCase(0.0, 1.0, 1.0, 1.0, 1.0, 0.0)
 
 
 @pytest.mark.parametrize("scale", [1.0, 10.0, 1e3, 1e5, 1e6])

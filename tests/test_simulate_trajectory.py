@@ -21,8 +21,8 @@ from syncline_design.report.on_simulation import on_simulation
 from syncline_design.report.render_console import console
 from syncline_design.report.simulations import CSV_HEADER, grid_csv
 from syncline_design.simulation import (
+    Simulation,
     SimulationError,
-    SimulationResult,
     SimulationSettings,
     cross_check,
     sample_errors,
@@ -348,7 +348,7 @@ def test_effects_that_do_not_fit(entry: EffectEntry, says: str) -> None:
         sample_errors(system, SimulationSettings(samples=10))
 
 
-def told(result: SimulationResult, system: System) -> str:
+def told(result: Simulation, system: System) -> str:
     """The console's text, its columns and lines closed up."""
     return " ".join(console(on_simulation(result, system)).split())
 
@@ -365,7 +365,7 @@ def test_summary_says_what_was_found() -> None:
         "Seed 0",
         f"95 % {numbers.length(result.monte_carlo.quantile(0.95).value_m)}",
         "Within the target of 50 mm",
-        f"{numbers.percent(worst.ratio, 4)} of the Syncline's",
+        f"{numbers.percent(worst.ratio_to_syncline, 4)} of the Syncline's",
         "do not contradict the Syncline",
         "range noise acts along the line of sight",
         "a turn moves the object along a chord",
@@ -393,7 +393,7 @@ def test_grid_as_csv() -> None:
     rows = list(csv.DictReader(io.StringIO(text)))
     assert text.splitlines()[0] == CSV_HEADER
     assert [float(r["tau_s"]) for r in rows] == [0.0, 1e-3]
-    assert float(rows[1]["worst_case_m"]) == result.grid[1].worst_case.value_m
+    assert float(rows[1]["worst_case_m"]) == result.grid[1].worst_case_m
     assert rows[0]["reason"] == result.grid[0].reason
 
 

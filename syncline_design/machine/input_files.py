@@ -16,6 +16,8 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from syncline_design.machine.records import Record
+
 Identity = tuple[int, int]  # device and inode: one file, whatever its names
 MISSING = "missing"
 
@@ -26,6 +28,17 @@ class UnsuitableError(Exception):
 
 class ReplacedInputError(Exception):
     """A result would take the place of a file that the command reads."""
+
+
+@dataclass(frozen=True, slots=True)
+class FileRead(Record):
+    """A file besides spec and shipped catalogs whose content entered a result.
+
+    file: its name from the spec's folder.
+    """
+
+    file: str
+    sha256: str
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,17 +31,17 @@ from syncline_design.report.simulated import (
 )
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.simulation.comparison import CAUSES
-from syncline_design.simulation.results import ComparisonRow, SimulationResult, versions
+from syncline_design.simulation.results import ComparisonRow, Simulation
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
 
 
-def on_simulation(
-    result: SimulationResult, system: System, name: str = "Simulated system", file: str = ""
-) -> Document:
+def on_simulation(result: Simulation, system: System) -> Document:
     """A simulated system as a document; no verdict is due here."""
     monte_carlo = result.monte_carlo.to_json()
+    name = result.spec.name if result.spec is not None else "Simulated system"
+    file = result.spec.file if result.spec is not None else ""
     where = f", along {result.trajectory}" if result.trajectory else ""
     return Document(
         family="Simulation",
@@ -50,13 +50,13 @@ def on_simulation(
         sentences=(f"The nonlinear measurement chain against the Syncline{where}.",),
         facts=(
             *simulation_facts(monte_carlo),
-            ("\u03c4_crit of the system", numbers.time_limit(result.tau_crit_s)),
+            ("\u03c4_crit of the system", numbers.time_limit(result.syncline.tau_crit_s)),
         ),
         sections=(
             *section("grid", "Worst case over the timestamp error", _grid(result), "Worst case"),
             *section("errors", "Distribution of the error", _errors(result), "Errors"),
             *section("effects", "Known effects acting", _effects(system), "Known effects"),
-            *provenance([*([("Spec file", file)] if file else []), *versions().items()]),
+            *provenance([*([("Spec file", file)] if file else []), *result.versions.items()]),
         ),
         source=file,
     )
@@ -64,19 +64,20 @@ def on_simulation(
 
 def _outcome(grid: tuple[ComparisonRow, ...]) -> Outcome:
     """How far the simulator leaves the Syncline, in words."""
-    ratios = [row.worst_case.ratio for row in grid if numbers.finite(row.worst_case.ratio)]
+    ratios = [row.ratio for row in grid if numbers.finite(row.ratio)]
     if not ratios:
         return Outcome("muted", "\u2192", "Simulated")
     ends = span(numbers.percent(min(ratios), 4), numbers.percent(max(ratios), 4))
     return Outcome("muted", "\u2192", f"Worst case {ends} of the Syncline")
 
 
-def _grid(result: SimulationResult) -> list[Node]:
+def _grid(result: Simulation) -> list[Node]:
     worst = result.monte_carlo.worst_case
     said = (
         f"At the system's own \u03c4, {numbers.time(worst.tau_s)}: "
-        f"{numbers.length(worst.value_m)}, {numbers.percent(worst.ratio, 4)} of the Syncline's "
-        f"{numbers.length(worst.syncline_m)}. {certificate(result.monte_carlo.to_json())}"
+        f"{numbers.length(worst.value_m)}, {numbers.percent(worst.ratio_to_syncline, 4)} of the "
+        f"Syncline's {numbers.length(worst.syncline_m)}. "
+        + certificate(result.monte_carlo.to_json())
     )
     return [
         Text("Every magnitude is held to its Syncline term and the directions are free: the "
@@ -93,9 +94,8 @@ def _grid_chart(grid: tuple[ComparisonRow, ...]) -> list[Node]:
     def draw() -> InlineFigure:
         from syncline_design.report.figures_results import GridPoint, simulated_against_syncline
 
-        found = (row.worst_case for row in grid)
         return simulated_against_syncline(
-            [GridPoint(w.tau_s, w.value_m, w.syncline_m) for w in found if w.tau_s > 0.0]
+            [GridPoint(r.tau_s, r.worst_case_m, r.syncline_m) for r in grid if r.tau_s > 0.0]
         )
 
     caption = "Line: Syncline. Dots: worst case of the simulator. Below: their ratio."
@@ -106,12 +106,11 @@ def _grid_table(grid: tuple[ComparisonRow, ...], *, reasons: bool) -> Table:
     """Worst case and Syncline at every tau; with the reason of the difference where asked for."""
     rows = []
     for row in grid:
-        found = row.worst_case
         cells = [
-            Cell(numbers.time(found.tau_s), found.tau_s),
-            Cell(numbers.length(found.value_m), found.value_m),
-            Cell(numbers.length(found.syncline_m), found.syncline_m),
-            Cell(numbers.percent(found.ratio, 4), numbers.finite(found.ratio)),
+            Cell(numbers.time(row.tau_s), row.tau_s),
+            Cell(numbers.length(row.worst_case_m), row.worst_case_m),
+            Cell(numbers.length(row.syncline_m), row.syncline_m),
+            Cell(numbers.percent(row.ratio, 4), numbers.finite(row.ratio)),
         ]
         rows.append([*cells, *([Cell(row.reason)] if reasons else [])])
     heads = ["\u03c4 #", "Worst case #", "Syncline #", "Ratio #"]
@@ -123,7 +122,7 @@ def _causes(grid: tuple[ComparisonRow, ...]) -> list[Node]:
     """Runs of neighbouring taus whose ratio leaves 1 for the same main cause, each in words."""
     lines = []
     for cause, run in groupby(grid, key=lambda row: row.causes[0] if row.causes else ""):
-        rows = [row.worst_case for row in run]
+        rows = list(run)
         if cause:
             ratios = [row.ratio for row in rows]
             taus = span(numbers.time(rows[0].tau_s), numbers.time(rows[-1].tau_s))
@@ -136,7 +135,7 @@ def _causes(grid: tuple[ComparisonRow, ...]) -> list[Node]:
     return [lead, Items(tuple(lines), reach="text")]
 
 
-def _errors(result: SimulationResult) -> list[Node]:
+def _errors(result: Simulation) -> list[Node]:
     monte_carlo = result.monte_carlo.to_json()
     told = ensemble(monte_carlo)
     return [

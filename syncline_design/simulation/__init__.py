@@ -12,21 +12,23 @@ from syncline_design.simulation.results import (
     MonteCarlo,
     ProportionEstimate,
     QuantileEstimate,
-    SimulationResult,
+    Simulation,
+    WorstCase,
 )
-from syncline_design.simulation.run import Decision, cross_check, decide, simulate
+from syncline_design.simulation.run import CrossCheck, Decision, cross_check, decide, simulate
 from syncline_design.simulation.sampling import sample_errors
 from syncline_design.simulation.settings import SimulationSettings
-from syncline_design.simulation.worst_case import WorstCase, worst_cases
+from syncline_design.simulation.worst_case import worst_cases
 
 __all__ = [
     "ComparisonRow",
+    "CrossCheck",
     "Decision",
     "MonteCarlo",
     "ProportionEstimate",
     "QuantileEstimate",
+    "Simulation",
     "SimulationError",
-    "SimulationResult",
     "SimulationSettings",
     "WorstCase",
     "comparison",

@@ -9,9 +9,9 @@ import numpy as np
 
 from syncline_design.model.system import System
 from syncline_design.simulation.bounds import StageBound, chain_bounds
-from syncline_design.simulation.results import ComparisonRow
+from syncline_design.simulation.results import ComparisonRow, WorstCase
 from syncline_design.simulation.settings import demand_simulable
-from syncline_design.simulation.worst_case import WorstCase, worst_cases
+from syncline_design.simulation.worst_case import worst_cases
 
 DEFAULT_GRID_S = tuple(float(f"{tau:.6g}") for tau in np.logspace(-6, 0, 25))
 CLOSE = 0.02  # a ratio this near to 1 needs no reason
@@ -35,17 +35,30 @@ def comparison(
     """
     demand_simulable(system)
     found = worst_cases(system, np.asarray(taus_s, dtype=np.float64), seed)
-    return tuple(ComparisonRow(row, *reason(system, row)) for row in found)
+    return tuple(_row(system, one) for one in found)
+
+
+def _row(system: System, found: WorstCase) -> ComparisonRow:
+    return ComparisonRow(
+        found.tau_s,
+        found.value_m,
+        found.syncline_m,
+        found.ratio_to_syncline,
+        found.bound_m,
+        found.certificate.gap,
+        *reason(system, found),
+    )
 
 
 def reason(system: System, found: WorstCase) -> tuple[str, tuple[str, ...]]:
     """(words, causes): where the worst case leaves the Syncline and why."""
-    if abs(found.ratio - 1.0) <= CLOSE:
+    ratio = found.ratio_to_syncline
+    if abs(ratio - 1.0) <= CLOSE:
         return f"within {100 * CLOSE:g} % of the Syncline", ()
     parts = sorted(_parts(system, found), reverse=True)
     told = [(cause, text) for share, cause, text in parts if share > WORTH_SAYING]
-    side = "above" if found.ratio > 1.0 else "below"
-    words = f"{100 * abs(found.ratio - 1.0):.1f} % {side} the Syncline"
+    side = "above" if ratio > 1.0 else "below"
+    words = f"{100 * abs(ratio - 1.0):.1f} % {side} the Syncline"
     if told:
         words += f": {'; '.join(text for _, text in told)}"
     return words, tuple(cause for cause, _ in told)

@@ -3,56 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 from syncline_design.effects.acting import by_stage, tilts
-from syncline_design.model.horizon import Horizon, duration_words
+from syncline_design.model.horizon import duration_words
 from syncline_design.model.system import System
 from syncline_design.simulation.draws import entering
+from syncline_design.simulation.results import Ensemble
 
-OVER_MISSIONS = "over_missions"
 SLOW = ("correlated_noise", "height_drift")  # correlated in time: one stationary draw a sample
-
-
-@dataclass(frozen=True, slots=True)
-class Ensemble:
-    """Every sample is a mission of its own.
-
-    mission_constants: what is one value all through a mission, and drawn anew in each sample;
-    per_sample: what else is drawn; horizon: over which time, place and tilt are drawn, None where
-    nothing depends on them; outside: where a file leaves the platform's limits or the horizon.
-    """
-
-    mission_constants: tuple[str, ...]
-    per_sample: tuple[str, ...]
-    horizon: Horizon | None
-    outside: tuple[str, ...] = ()
-
-    def text(self) -> str:
-        """One sentence for every output."""
-        constants = ", ".join(self.mission_constants) or "none is random here"
-        return (
-            "every sample is a mission of its own, so quantiles run over missions, not within one; "
-            f"constants of a mission: {constants}; drawn besides: {', '.join(self.per_sample)}"
-            + (f"; {self.outside_text()}" if self.outside else "")
-        )
-
-    def outside_text(self) -> str:
-        """What a trajectory does that Syncline and worst case do not allow for."""
-        return (
-            f"the trajectory goes beyond what the Syncline and the worst case allow for: "
-            f"{'; '.join(self.outside)}"
-        )
-
-    def to_json(self) -> dict[str, object]:
-        """The `ensemble` part of a simulation."""
-        return {
-            "over": OVER_MISSIONS,
-            "mission_constants": list(self.mission_constants),
-            "per_sample": list(self.per_sample),
-            "outside": list(self.outside),
-            "text": self.text(),
-        }
 
 
 def ensemble_of(
@@ -73,7 +31,22 @@ def ensemble_of(
         )
     if any(one.effect.name in SLOW for one in acting):
         drawn.append("slow noise, at its stationary size")
-    return Ensemble(_constants(system), tuple(drawn), system.horizon if acting else None, outside)
+    constants = _constants(system)
+    told = (
+        "every sample is a mission of its own, so quantiles run over missions, not within one; "
+        f"constants of a mission: {', '.join(constants) or 'none is random here'}; drawn besides: "
+        + ", ".join(drawn)
+        + (f"; {outside_words(outside)}" if outside else "")
+    )
+    return Ensemble("over_missions", constants, tuple(drawn), outside, told)
+
+
+def outside_words(outside: tuple[str, ...]) -> str:
+    """What a trajectory does that Syncline and worst case do not allow for."""
+    return (
+        "the trajectory goes beyond what the Syncline and the worst case allow for: "
+        f"{'; '.join(outside)}"
+    )
 
 
 def _over_the_horizon(system: System, envelope: str) -> list[str]:

@@ -1,43 +1,37 @@
-"""What a simulation found; frozen, with JSON beside each type."""
+"""What a simulation found."""
 
 from __future__ import annotations
 
 import math
 import platform
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
 
 import numpy as np
 
 from syncline_design import __version__
 from syncline_design.effects.record import Array
+from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.records import Record, Unbounded, optional
 from syncline_design.simulation.distribution import Binned, Values
-from syncline_design.simulation.ensemble import Ensemble
-from syncline_design.simulation.worst_case import WorstCase
+from syncline_design.simulation.settings import Envelope
 
-SCHEMA = "syncline-design/simulation/v1"
-Json = dict[str, object]
-
-
-@dataclass(frozen=True, slots=True)
-class QuantileEstimate:
-    """A quantile of |error| [m] with its confidence interval; an open side is 0 or inf."""
-
-    quantile: float
-    value_m: float
-    low_m: float
-    high_m: float
-
-    def to_json(self) -> Json:
-        return {
-            "value_m": finite(self.value_m),
-            "low_m": finite(self.low_m),
-            "high_m": finite(self.high_m),
-        }
+SCHEMA: Final = "syncline-design/simulation/v1"
+HISTOGRAM_BINS: Final = 60
 
 
 @dataclass(frozen=True, slots=True)
-class ProportionEstimate:
+class QuantileEstimate(Record):
+    """A quantile of |error| [m] with its confidence interval; an open side is 0 or infinite."""
+
+    value_m: Unbounded
+    low_m: Unbounded
+    high_m: Unbounded
+
+
+@dataclass(frozen=True, slots=True)
+class ProportionEstimate(Record):
     """P(|error| <= target_m) with its confidence interval."""
 
     target_m: float
@@ -45,17 +39,9 @@ class ProportionEstimate:
     low: float
     high: float
 
-    def to_json(self) -> Json:
-        return {
-            "target_m": self.target_m,
-            "value": self.value,
-            "low": self.low,
-            "high": self.high,
-        }
-
 
 @dataclass(frozen=True, slots=True)
-class Histogram:
+class Histogram(Record):
     """Density of |error|: edges_m (n + 1,), density (n,) [1/m]."""
 
     edges_m: tuple[float, ...]
@@ -63,133 +49,172 @@ class Histogram:
 
 
 @dataclass(frozen=True, slots=True)
-class MonteCarlo:
+class Ensemble(Record):
+    """Over what the quantiles run: every sample is a mission of its own.
+
+    mission_constants: what is one value all through a mission, and drawn anew in each sample;
+    per_sample: what else is drawn; outside: where a file leaves the platform's limits or the
+    horizon; text: all of it in one sentence.
+    """
+
+    over: Literal["over_missions"]
+    mission_constants: tuple[str, ...]
+    per_sample: tuple[str, ...]
+    outside: tuple[str, ...]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Bounded(Record):
+    """For what a bound holds: relative time shifts, tilt, and the sensors' errors."""
+
+    shift_s: float
+    tilt_rad: float
+    sensors: Literal["one sigma"]
+
+
+@dataclass(frozen=True, slots=True)
+class Certificate(Record):
+    """How much a better direction could still add to a worst case.
+
+    gap: how far, relatively, the bound is above what was found; triangle_m: the terms' sum, lever
+    arms included.
+    """
+
+    gap: float
+    triangle_m: float
+    envelope: Bounded
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class WorstCase(Record):
+    """The largest error found at relative shifts of at most tau_s.
+
+    value_m: |e| of the best directions found; syncline_m: the Syncline at tau_s plus systematic
+    terms; bound_m: nothing in the envelope of the certificate gives more.
+    """
+
+    tau_s: float
+    value_m: float
+    syncline_m: float
+    ratio_to_syncline: Unbounded
+    bound_m: float
+    certificate: Certificate
+
+
+@dataclass(frozen=True, slots=True)
+class MonteCarlo(Record):
     """The probabilistic answer, and the worst case at the system's tau."""
 
     samples: int
     seed: int
-    envelope: str
+    envelope: Envelope
+    estimator: Literal["plain"]  # the one there is: every sample drawn and counted alike
+    effective_samples: int
     confidence: float
-    quantiles: tuple[QuantileEstimate, ...]
-    within_target: ProportionEstimate | None
+    ensemble: Ensemble
+    quantiles: Mapping[str, QuantileEstimate]
+    probability_within_target: ProportionEstimate | None
     worst_case: WorstCase
     histogram: Histogram
-    ensemble: Ensemble | None = None
-    distribution: Values | Binned | None = field(default=None, repr=False, compare=False)
 
     def quantile(self, quantile: float) -> QuantileEstimate:
         """The estimate of one of the quantiles asked for."""
-        return next(found for found in self.quantiles if found.quantile == quantile)
-
-    def to_json(self) -> Json:
-        """The `monte_carlo` part of a verdict."""
-        within = self.within_target
-        return {
-            "samples": self.samples,
-            "seed": self.seed,
-            "envelope": self.envelope,
-            "estimator": "plain",  # the one there is: every sample drawn and counted alike
-            "effective_samples": self.samples,
-            "confidence": self.confidence,
-            "ensemble": None if self.ensemble is None else self.ensemble.to_json(),
-            "quantiles": {repr(q.quantile): q.to_json() for q in self.quantiles},
-            "probability_within_target": None if within is None else within.to_json(),
-            "worst_case": worst_case_json(self.worst_case),
-            "histogram": {
-                "edges_m": list(self.histogram.edges_m),
-                "density": list(self.histogram.density),
-            },
-        }
+        return self.quantiles[repr(quantile)]
 
 
 @dataclass(frozen=True, slots=True)
-class ComparisonRow:
+class ComparisonRow(Record):
     """The worst case against the Syncline at one tau, and in words why the ratio is what it is.
 
-    causes: of `lever_arm`, `chord`, `range_noise`, those that matter, strongest first; empty
-    where the ratio is near 1.
+    causes: of `lever_arm`, `chord`, `range_noise`, `tilt`, those that matter, strongest first;
+    empty where the ratio is near 1.
     """
 
-    worst_case: WorstCase
+    tau_s: float
+    worst_case_m: float
+    syncline_m: float
+    ratio: Unbounded
+    bound_m: float
+    gap: float
     reason: str
-    causes: tuple[str, ...] = ()
-
-    def to_json(self) -> Json:
-        found = self.worst_case
-        return {
-            "tau_s": found.tau_s,
-            "worst_case_m": found.value_m,
-            "syncline_m": found.syncline_m,
-            "ratio": finite(found.ratio),
-            "bound_m": found.bound_m,
-            "gap": found.gap,
-            "reason": self.reason,
-            "causes": list(self.causes),
-        }
+    causes: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class SimulationResult:
-    """Everything `simulate` found."""
+class SimulatedSyncline(Record):
+    """The Syncline that is simulated, and the tau it was asked about."""
 
-    monte_carlo: MonteCarlo
-    grid: tuple[ComparisonRow, ...]
-    tau_crit_s: float
     sensor_error_m: float
     sync_rate_mps: float
-    trajectory: str | None = None
-
-    def to_json(self) -> Json:
-        """Schema `syncline-design/simulation/v1`."""
-        return {
-            "schema": SCHEMA,
-            "monte_carlo": self.monte_carlo.to_json(),
-            "syncline": {
-                "sensor_error_m": self.sensor_error_m,
-                "sync_rate_mps": self.sync_rate_mps,
-                "tau_s": self.monte_carlo.worst_case.tau_s,
-                "tau_crit_s": finite(self.tau_crit_s),
-            },
-            "trajectory": self.trajectory,
-            "grid": [row.to_json() for row in self.grid],
-            "versions": versions(),
-        }
+    tau_s: float
+    tau_crit_s: Unbounded
 
 
-def worst_case_json(found: WorstCase) -> Json:
-    """The `worst_case` part: value, ratio, bound, and how much is certified."""
-    return {
-        "tau_s": found.tau_s,
-        "value_m": found.value_m,
-        "syncline_m": found.syncline_m,
-        "ratio_to_syncline": finite(found.ratio),
-        "bound_m": found.bound_m,
-        "certificate": {
-            "gap": found.gap,
-            "triangle_m": found.triangle_m,
-            "envelope": {
-                "shift_s": found.tau_s,
-                "tilt_rad": found.tilt_rad,
-                "sensors": "one sigma",
-            },
-            "text": f"{envelope_words(found)}, nothing exceeds the bound; what was found is "
-            f"{100 * found.gap:.2g} % below it",
-        },
-    }
+@dataclass(frozen=True, slots=True)
+class SpecName(Record):
+    """The spec that a simulated system comes from."""
+
+    name: str
+    file: str
 
 
-def envelope_words(found: WorstCase) -> str:
-    """Where the bound holds."""
-    tilt = f"{math.degrees(found.tilt_rad):.3g} deg"
-    return (
-        f"With every sensor at one sigma, relative time shifts up to {found.tau_s:.4g} s (and what "
-        f"known effects add), tilt up to {tilt}, and known effects at what they are charged"
+@dataclass(frozen=True, slots=True)
+class SpecContent(Record):
+    """The files whose content entered a simulation."""
+
+    spec_sha256: str
+    catalogs_sha256: str
+    files: tuple[FileRead, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Simulation(Record):
+    """Everything `simulate` found, schema `syncline-design/simulation/v1`.
+
+    spec, provenance: missing where a system was simulated that comes from no spec.
+    """
+
+    schema: str
+    monte_carlo: MonteCarlo
+    syncline: SimulatedSyncline
+    trajectory: str | None
+    grid: tuple[ComparisonRow, ...]
+    versions: Mapping[str, str]
+    spec: SpecName | None = optional()
+    provenance: SpecContent | None = optional()
+
+
+def worst_case(
+    tau_s: float,
+    value_m: float,
+    bound_m: float,
+    triangle_m: float,
+    syncline_m: float,
+    tilt_rad: float,
+) -> WorstCase:
+    """A worst case with its ratio (1 where both are 0) and its certificate."""
+    of_nothing = 1.0 if value_m == 0.0 else math.inf
+    ratio = value_m / syncline_m if syncline_m > 0.0 else of_nothing
+    gap = 1.0 - value_m / bound_m if bound_m > 0.0 else 0.0
+    text = (
+        f"With every sensor at one sigma, relative time shifts up to {tau_s:.4g} s (and what known "
+        f"effects add), tilt up to {math.degrees(tilt_rad):.3g} deg, and known effects at what "
+        f"they are charged, nothing exceeds the bound; what was found is {100 * gap:.2g} % below it"
     )
+    certificate = Certificate(gap, triangle_m, Bounded(tau_s, tilt_rad, "one sigma"), text)
+    return WorstCase(tau_s, value_m, syncline_m, ratio, bound_m, certificate)
 
 
-def finite(value: float) -> float | None:
-    """The value, or None where JSON has no number for it."""
-    return value if math.isfinite(value) else None
+def histogram(found: Values | Binned) -> Histogram:
+    """The density over equal bins from 0 to the largest error."""
+    edges, density = found.histogram(HISTOGRAM_BINS)
+    return Histogram(tuple(_floats(edges)), tuple(_floats(density)))
+
+
+def _floats(values: Array) -> Iterable[float]:
+    return (float(value) for value in values)
 
 
 def versions() -> dict[str, str]:
@@ -199,16 +224,3 @@ def versions() -> dict[str, str]:
         "numpy": np.__version__,
         "python": platform.python_version(),
     }
-
-
-def histogram(found: Values | Binned, bins: int = 60) -> Histogram:
-    """The density over equal bins from 0 to the largest error."""
-    return _histogram(*found.histogram(bins))
-
-
-def _histogram(edges: Array, density: Array) -> Histogram:
-    return Histogram(tuple(_floats(edges)), tuple(_floats(density)))
-
-
-def _floats(values: Array) -> Iterable[float]:
-    return (float(value) for value in values)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -15,11 +15,16 @@ from syncline_design.simulation.ensemble import ensemble_of
 from syncline_design.simulation.excursions import excursions, follows_a_file
 from syncline_design.simulation.intervals import proportion_interval, quantile_ranks
 from syncline_design.simulation.results import (
+    SCHEMA,
+    Ensemble,
     MonteCarlo,
     ProportionEstimate,
     QuantileEstimate,
-    SimulationResult,
+    SimulatedSyncline,
+    Simulation,
+    WorstCase,
     histogram,
+    versions,
 )
 from syncline_design.simulation.sampling import JOB, error_distribution
 from syncline_design.simulation.settings import (
@@ -27,7 +32,7 @@ from syncline_design.simulation.settings import (
     SimulationSettings,
     demand_simulable,
 )
-from syncline_design.simulation.worst_case import WorstCase, worst_cases
+from syncline_design.simulation.worst_case import worst_cases
 
 DEFAULT_SETTINGS = SimulationSettings()
 DEFAULT_CAP = 4_000_000
@@ -37,7 +42,15 @@ CROSS_CHECK_GAP = 1e-3  # where a cross-check stops looking: so near, relatively
 CROSS_CHECK_ITERATIONS = 30
 
 
-def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> MonteCarlo:
+@dataclass(frozen=True, slots=True)
+class CrossCheck:
+    """A Monte Carlo with the errors that it counted, so that `decide` need not draw them again."""
+
+    monte_carlo: MonteCarlo
+    errors: Values | Binned = field(repr=False, compare=False)
+
+
+def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> CrossCheck:
     """Quantiles, P(|error| <= limit) and the worst case at the system's own tau.
 
     Raises SimulationError for a system or settings that cannot be simulated.
@@ -50,35 +63,40 @@ def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS)
         iterations=CROSS_CHECK_ITERATIONS,
         enough_gap=CROSS_CHECK_GAP,
     )
-    found = _monte_carlo(settings, error_distribution(system, settings), worst)
+    errors = error_distribution(system, settings)
     drawn = ensemble_of(
         system, settings.envelope, follows_a_file(settings), excursions(system, settings)
     )
-    return replace(found, ensemble=drawn)
+    return CrossCheck(_monte_carlo(settings, errors, worst, drawn), errors)
 
 
-def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> SimulationResult:
+def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> Simulation:
     """Monte Carlo and the worst case against the Syncline over the grid of tau."""
     from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
 
-    found = cross_check(system, settings)
+    found = cross_check(system, settings).monte_carlo
     figures = budget(system)
     grid = settings.tau_grid_s or DEFAULT_GRID_S
     trajectory = None
     if settings.envelope == "trajectory":
         trajectory = str(settings.trajectory or DEFAULT_MANOEUVRE)
-    return SimulationResult(
+    return Simulation(
+        schema=SCHEMA,
         monte_carlo=found,
-        grid=comparison(system, grid, settings.seed),
-        tau_crit_s=figures.tau_crit_s,
-        sensor_error_m=figures.sensor_error_m,
-        sync_rate_mps=figures.sync_rate_mps,
+        syncline=SimulatedSyncline(
+            figures.sensor_error_m,
+            figures.sync_rate_mps,
+            found.worst_case.tau_s,
+            figures.tau_crit_s,
+        ),
         trajectory=trajectory,
+        grid=comparison(system, grid, settings.seed),
+        versions=versions(),
     )
 
 
 def _monte_carlo(
-    settings: SimulationSettings, found: Values | Binned, worst: WorstCase
+    settings: SimulationSettings, found: Values | Binned, worst: WorstCase, drawn: Ensemble
 ) -> MonteCarlo:
     estimates = quantile_estimates(found, settings.quantiles, settings.confidence)
     within = None
@@ -90,12 +108,14 @@ def _monte_carlo(
         samples=settings.samples,
         seed=settings.seed,
         envelope=settings.envelope,
+        estimator="plain",
+        effective_samples=settings.samples,
         confidence=settings.confidence,
-        quantiles=estimates,
-        within_target=within,
+        ensemble=drawn,
+        quantiles={repr(q): one for q, one in zip(settings.quantiles, estimates, strict=True)},
+        probability_within_target=within,
         worst_case=worst,
         histogram=histogram(found),
-        distribution=found,
     )
 
 
@@ -106,9 +126,9 @@ def quantile_estimates(
     ranks = [quantile_ranks(quantile, found.count, confidence) for quantile in quantiles]
     values = iter(found.order_statistics([rank for ends in ranks for rank in ends]))
     estimates = []
-    for quantile in quantiles:
+    for _ in quantiles:
         low, value, high = next(values), next(values), next(values)
-        estimates.append(QuantileEstimate(quantile, value, low, high))
+        estimates.append(QuantileEstimate(value, low, high))
     return tuple(estimates)
 
 
@@ -138,7 +158,7 @@ def decide(
     quantile: float,
     limit_m: float,
     cap_samples: int = DEFAULT_CAP,
-    first: MonteCarlo | None = None,
+    first: CrossCheck | None = None,
 ) -> Decision:
     """Whether the quantile of |error| is at most limit_m, sampling on while it is undecided.
 
@@ -175,20 +195,21 @@ def decide(
 
 
 def _counted(
-    first: MonteCarlo | None, settings: SimulationSettings, limit_m: float
+    first: CrossCheck | None, settings: SimulationSettings, limit_m: float
 ) -> tuple[distribution.Counts, int, int]:
     """(counts, how many within the limit, how many) of the samples of a first run, if any fits."""
     counts = distribution.no_counts()
-    if first is None or not isinstance(first.distribution, Values):
+    if first is None or not isinstance(first.errors, Values):
         return counts, 0, 0
-    if (first.samples, first.seed, first.envelope) != (
+    drawn = first.monte_carlo
+    if (drawn.samples, drawn.seed, drawn.envelope) != (
         settings.samples,
         settings.seed,
         settings.envelope,
     ):
         return counts, 0, 0
-    distribution.add_counts(counts, first.distribution.errors_m)
-    return counts, first.distribution.within(limit_m), first.samples
+    distribution.add_counts(counts, first.errors.errors_m)
+    return counts, first.errors.within(limit_m), drawn.samples
 
 
 def _status(low: float, high: float, quantile: float) -> Status:

@@ -23,6 +23,7 @@ from syncline_design.model.system import Stage, System
 from syncline_design.simulation import kernel, known_effects
 from syncline_design.simulation.bounds import references
 from syncline_design.simulation.draws import generator, lever_arms
+from syncline_design.simulation.results import WorstCase, worst_case
 from syncline_design.simulation.surroundings import Moment, lean
 
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
@@ -41,37 +42,6 @@ class Block:
     name: str
     kind: Kind
     rows: slice
-
-
-@dataclass(frozen=True, slots=True)
-class WorstCase:
-    """The largest error found at relative shifts of at most tau_s.
-
-    value_m: |e| of the best directions found; bound_m: nothing in the envelope that `bounds`
-    states gives more; triangle_m: the terms' sum, lever arms included; syncline_m: the Syncline at
-    tau_s plus systematic terms; tilt_rad: largest tilt searched and bounded.
-    gap: 1 - value / bound.  Stochastic effects do not act in the search; the bound holds them at
-    what the budget charges.
-    """
-
-    tau_s: float
-    value_m: float
-    bound_m: float
-    triangle_m: float
-    syncline_m: float
-    tilt_rad: float = 0.0
-
-    @property
-    def ratio(self) -> float:
-        """value / Syncline; 1 where both are 0."""
-        if self.syncline_m == 0.0:
-            return 1.0 if self.value_m == 0.0 else math.inf
-        return self.value_m / self.syncline_m
-
-    @property
-    def gap(self) -> float:
-        """How far, relatively, the bound is above what was found."""
-        return 1.0 - self.value_m / self.bound_m if self.bound_m > 0.0 else 0.0
 
 
 _SYSTEM = -1  # the stage number of blocks that all stages share
@@ -134,7 +104,8 @@ def worst_cases(
     """The worst case at each tau (n,) [s], all ascents of all taus at once.
 
     A tau is done when its best ascent is within `enough_gap` of the bound, or when all have
-    settled.
+    settled.  Stochastic effects do not act in the search; the bound holds them at what the budget
+    charges.
     """
     taus = np.asarray(taus_s, dtype=np.float64)
     figures = [references(system, float(tau)) for tau in taus]
@@ -144,7 +115,7 @@ def worst_cases(
     value = search.ascend(search.starting_points(seed), enough, settled, iterations)
     best = value.reshape(-1, starts).max(axis=1)
     return tuple(
-        WorstCase(float(tau), float(found), *reference, system.horizon.tilt_rad)
+        worst_case(float(tau), float(found), *reference, system.horizon.tilt_rad)
         for tau, found, reference in zip(taus, best, figures, strict=True)
     )
 

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from syncline_design.machine.input_files import (
     FileContent,
+    FileRead,
     FilesRead,
     UnsuitableError,
     noting,
     read_plain,
 )
-from syncline_design.machine.records import Record
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.files import (
     BUILTIN_PACKAGE,
@@ -51,17 +51,6 @@ class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the p
 
 def _place_and_text(problem: Problem) -> tuple[str, int, int, str]:
     return problem.file, problem.line, problem.column, str(problem)
-
-
-@dataclass(frozen=True, slots=True)
-class FileRead(Record):
-    """A file besides spec and shipped catalogs whose content entered a result.
-
-    file: its name from the spec's folder.
-    """
-
-    file: str
-    sha256: str
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from syncline_design.model.budget import differs
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
+from syncline_design.simulation.ensemble import outside_words
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.spec.load import Case
 from syncline_design.verdict.tree import Assumption, Caution
@@ -164,11 +165,11 @@ def _simulation(verified: Verified) -> Iterator[Caution]:
     if verified.monte_carlo is None:
         yield Caution("no-monte-carlo", f"no Monte Carlo cross-check: {verified.trouble}")
         return
-    ensemble = verified.monte_carlo.ensemble
-    if ensemble is not None and ensemble.outside:
+    outside = verified.monte_carlo.ensemble.outside
+    if outside:
         yield Caution(
             "trajectory-outside",
-            f"{ensemble.outside_text()}; beyond, their figures do not hold and the simulated "
+            f"{outside_words(outside)}; beyond, their figures do not hold and the simulated "
             "errors may exceed them",
         )
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from syncline_design.choice.chosen_system import system_of
-from syncline_design.machine.records import json_of
 from syncline_design.model.system import System
-from syncline_design.simulation import SimulationError, SimulationResult, simulate
+from syncline_design.simulation import Simulation, SimulationError, simulate
+from syncline_design.simulation.results import SpecContent, SpecName
 from syncline_design.spec.known_effects import effect_entries
 from syncline_design.spec.load import Case
 from syncline_design.verdict.acceptance import refuse_trajectory, simulation_settings
@@ -19,19 +18,8 @@ from syncline_design.verdict.verify import picked_design
 class SimulatedSpec:
     """The system of a spec (its best design when something is open) and its simulation."""
 
-    case: Case
     system: System
-    result: SimulationResult
-
-    def to_json(self) -> dict[str, Any]:
-        """The simulation's JSON with the spec it belongs to."""
-        spec = {"name": self.case.spec.name, "file": str(self.case.path)}
-        provenance = {
-            "spec_sha256": self.case.spec_sha256,
-            "catalogs_sha256": self.case.catalogs_sha256,
-            "files": json_of(self.case.files),
-        }
-        return {**self.result.to_json(), "spec": spec, "provenance": provenance}
+    result: Simulation
 
 
 def simulate_spec(
@@ -43,8 +31,11 @@ def simulate_spec(
     if samples is not None:
         settings = replace(settings, samples=samples)
     try:
-        return SimulatedSpec(case, system, simulate(system, settings))
+        found = simulate(system, settings)
     except SimulationError as error:
         if case.spec.monte_carlo.trajectory is not None:
             refuse_trajectory(case, str(error))
         raise
+    content = SpecContent(case.spec_sha256, case.catalogs_sha256, case.files)
+    named = replace(found, spec=SpecName(case.spec.name, str(case.path)), provenance=content)
+    return SimulatedSpec(system, named)

@@ -19,7 +19,7 @@ from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_for
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
-from syncline_design.simulation import Decision, MonteCarlo, SimulationError, cross_check, decide
+from syncline_design.simulation import CrossCheck, Decision, SimulationError, cross_check, decide
 from syncline_design.spec.known_effects import effect_entries
 from syncline_design.spec.load import BadInput, Case, Problem, load
 from syncline_design.spec.references import names_candidates
@@ -304,12 +304,13 @@ def verify(case: Case, problem: DesignProblem, design: Design, settings: CheckSe
     exact = recheck(case, selection_of(problem, design), known.extra_tau_s, known.systematic)
     found, trouble = _monte_carlo(case, system, settings)
     results = tuple(_results(case, system, exact, found, settings))
-    return Verified(design, system, figures, exact, found, results, trouble)
+    simulated = None if found is None else found.monte_carlo
+    return Verified(design, system, figures, exact, simulated, results, trouble)
 
 
 def _monte_carlo(
     case: Case, system: System, settings: CheckSettings
-) -> tuple[MonteCarlo | None, str]:
+) -> tuple[CrossCheck | None, str]:
     """The cross-check, or why there is none; a trajectory that cannot be used is bad input."""
     if not settings.monte_carlo:
         return None, "left out on request"
@@ -328,7 +329,7 @@ def _results(
     case: Case,
     system: System,
     exact: Recheck,
-    found: MonteCarlo | None,
+    found: CrossCheck | None,
     settings: CheckSettings,
 ) -> Iterator[RequirementResult]:
     rechecked = {one.id: one for one in exact.requirements}
@@ -360,7 +361,7 @@ def _simulated(
     case: Case,
     requirement: Requirement,
     system: System,
-    found: MonteCarlo | None,
+    found: CrossCheck | None,
     settings: CheckSettings,
 ) -> RequirementResult:
     """A Monte Carlo requirement: sampled on until its interval leaves the limit."""
