@@ -47,8 +47,10 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 @guarded
 def schema(
     name: Annotated[
-        Literal["spec", "catalog", "study", "difference"],
-        typer.Argument(help="A kind of file (spec, catalog, study) or of result (difference)."),
+        Literal["spec", "catalog", "study", "difference", "simulation"],
+        typer.Argument(
+            help="A kind of file (spec, catalog, study) or of result (difference, simulation)."
+        ),
     ],
 ) -> int:
     """Print the JSON Schema of a kind of file, for editors, or of a kind of result."""
