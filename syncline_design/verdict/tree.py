@@ -10,9 +10,10 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName, TermKind
-from syncline_design.spec.load import FileRead
+from syncline_design.simulation import MonteCarlo
 
 SCHEMA = "syncline-design/verdict/v1"
 Status = Literal["pass", "fail", "indeterminate"]
@@ -283,7 +284,7 @@ class Verdict(Record):
     requirements: tuple[RequirementResult, ...] = ()
     design: Mapping[str, Any] | None = None
     syncline: SynclineFigures | None = None
-    monte_carlo: Mapping[str, Any] | None = None
+    monte_carlo: MonteCarlo | None = None
     warnings: tuple[Caution, ...] = ()
     provenance: Provenance
     infeasibility: Mapping[str, Any] | None = optional()

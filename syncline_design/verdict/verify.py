@@ -422,14 +422,13 @@ def _verdict(
 ) -> Verdict:
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
-    found = verified.monte_carlo
     return Verdict(
         verdict=verified.word,
         **frame(case, problem, settings.seed),
         requirements=verified.requirements,
         design=design_json(case, problem, verified.design, verified.figures),
         syncline=syncline_figures(verified, case.spec.sync_model),
-        monte_carlo=None if found is None else found.to_json(),
+        monte_carlo=verified.monte_carlo,
         warnings=cautions(case, verified, assumed),
         figures=error_figures(verified),
         assumptions=assumed,
