@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
+from syncline_design.spec.case import usable_primitives
 from syncline_design.spec.catalog import (
     Catalog,
     ClockEntry,
@@ -19,7 +20,6 @@ from syncline_design.spec.catalog import (
     read_error,
 )
 from syncline_design.spec.load import load_builtin
-from syncline_design.spec.resolve import usable_primitives
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import parse
 

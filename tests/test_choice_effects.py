@@ -19,7 +19,8 @@ from random_problems import random_problem
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.front import front
 from syncline_design.choice.table import Design, Option, Problem
-from syncline_design.spec.load import Case, load_text
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load_text
 from syncline_design.verdict.optimise import Optimisation, OptimizeSettings, optimize
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 

@@ -19,7 +19,8 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import with_limits
 from syncline_design.choice.variations import with_methods
 from syncline_design.choice.written import rounded
-from syncline_design.spec.load import Case, load, load_text
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load, load_text
 
 ROOT = Path(__file__).parent.parent
 

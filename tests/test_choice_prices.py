@@ -29,7 +29,8 @@ from syncline_design.choice.variations import (
     with_platform_figure,
 )
 from syncline_design.model.quantity import Dimension
-from syncline_design.spec.load import Case, load, load_text
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load, load_text
 from syncline_design.verdict.recheck import recheck
 from test_choice_explain import spec
 from test_front import one_stage, option

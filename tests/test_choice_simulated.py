@@ -19,7 +19,8 @@ from scipy.stats import chi
 from syncline_design.choice.table import Design
 from syncline_design.choice.tolerance import ToleranceVerdict, tolerance_verdict
 from syncline_design.report.optimisations import render_optimize
-from syncline_design.spec.load import Case, load_text
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load_text
 from syncline_design.verdict import acceptance, verify
 from syncline_design.verdict import optimise as optimisation
 from syncline_design.verdict.acceptance import Simulations

@@ -21,8 +21,9 @@ from typing import Any
 
 import pytest
 
+from syncline_design.spec.case import Case
 from syncline_design.spec.edit import yaml_text
-from syncline_design.spec.load import BadInput, Case, load, load_text
+from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.spec.yaml_text import Problem, read
 
 CORPUS = Path(__file__).parent / "corpus"

@@ -17,7 +17,8 @@ from scipy.stats import norm, t
 from syncline_design.effects import registry
 from syncline_design.effects.record import Basis, StageRows
 from syncline_design.model.horizon import Horizon
-from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation import SimulationSettings
 from syncline_design.simulation.chain import ConstantTwist, no_noise, stage_error

@@ -27,7 +27,8 @@ from syncline_design.choice.ranked import iter_best
 from syncline_design.diagnosis.scene import scene
 from syncline_design.logs.log import Log, StageLog
 from syncline_design.model.budget import budget
-from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import Constant, Empirical, Normal, TimingError, Uniform
 from syncline_design.simulation import SimulationSettings
 from syncline_design.simulation.sampling import sample_errors

@@ -21,8 +21,9 @@ from syncline_design.choice.problem import (
 from syncline_design.choice.table import Design, Option, Problem, with_limits
 from syncline_design.model import timing
 from syncline_design.model.budget import budget
+from syncline_design.spec.case import Case
 from syncline_design.spec.exact import norm, square_root, tau_bound
-from syncline_design.spec.load import Case, load, load_text
+from syncline_design.spec.load import load, load_text
 
 SPECS = sorted((Path(__file__).parent.parent / "specs").glob("*.yaml"))
 

@@ -16,7 +16,8 @@ from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.front import front
 from syncline_design.choice.problem import build_problem, selection_of, sole_design
 from syncline_design.choice.ranked import iter_best
-from syncline_design.spec.load import Case, load, load_text
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load, load_text
 from syncline_design.spec.selection import ClockSelection, Selection
 from syncline_design.verdict.recheck import IMPLIED_SYNC, NotADesign, recheck
 

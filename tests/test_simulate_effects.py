@@ -21,7 +21,8 @@ from syncline_design.effects import registry
 from syncline_design.effects.acting import contributions
 from syncline_design.effects.record import Array
 from syncline_design.model.horizon import Horizon
-from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation import SimulationSettings, cross_check, sample_errors
 from syncline_design.simulation.sampling import JOB

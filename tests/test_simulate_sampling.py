@@ -15,7 +15,8 @@ import pytest
 from scipy import stats
 
 from syncline_design.effects import registry
-from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
 from syncline_design.simulation import (
     SimulationError,

@@ -14,7 +14,8 @@ from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from syncline_design.machine.input_files import FileContent
-from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
 from syncline_design.report import numbers
 from syncline_design.report.on_simulation import on_simulation

@@ -12,7 +12,8 @@ import pytest
 from scipy.optimize import minimize
 
 from syncline_design.model.budget import budget
-from syncline_design.model.system import EffectEntry, Platform, Sensor, Stage, System
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation import comparison, worst_cases
 from syncline_design.simulation.bounds import references

@@ -14,7 +14,8 @@ from syncline_design.choice.presentation import slack_table
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Problem
-from syncline_design.spec.load import Case, load_text
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load_text
 
 Option = dict[str, Any]
 Tables = list[list[Option]]

@@ -12,8 +12,8 @@ import pytest
 from pydantic import ValidationError
 
 from syncline_design.model.quantity import UNITS, Dimension, Quantity
-from syncline_design.spec.load import BadInput, Case, load, load_text
-from syncline_design.spec.resolve import candidate_sensors, platform_of, sensor_id, timestamping_of
+from syncline_design.spec.case import IN_PLACE, Case
+from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.spec.spec import (
     EffectChoice,
     InlineTimestamping,
@@ -95,29 +95,29 @@ def test_defaults_are_those_of_the_interface() -> None:
 
 def test_a_platform_may_be_named_overridden_or_given() -> None:
     named = loaded(HEAD + STAGE)
-    platform = platform_of(named.spec.stages[0].platform, named.catalog)
+    platform = named.stages[0].platform.entry
     assert (platform.v_max, platform.distance) == (21.0, 100.0)
     text = STAGE.replace(
         "platform: uav_fixed_wing", "platform: {use: uav_fixed_wing, distance: 60 m}"
     )
     over = loaded(HEAD + text)
-    changed = platform_of(over.spec.stages[0].platform, over.catalog)
+    changed = over.stages[0].platform.entry
     assert (changed.v_max, changed.distance) == (21.0, 60.0)
     own = "{v_max: 1 m/s, omega_max: 20 deg/s, distance: 6 m, baseline: 0.8 m}"
     given = loaded(HEAD + STAGE.replace("platform: uav_fixed_wing", f"platform: {own}"))
-    entry = platform_of(given.spec.stages[0].platform, given.catalog)
+    entry = given.stages[0].platform.entry
     assert entry.omega_max == pytest.approx(math.radians(20), rel=1e-15)
 
 
 def test_candidates_follow_the_spec_and_queries_the_catalog() -> None:
     spec = loaded(HEAD + STAGE)
-    stage = spec.spec.stages[0]
-    ids = [i for i, _ in candidate_sensors(spec.spec, stage, "position", spec.catalog)]
-    assert ids == ["ublox_f9p_pvt", "ublox_f9p_rtk"]
-    ids = [i for i, _ in candidate_sensors(spec.spec, stage, "attitude", spec.catalog)]
+    position, attitude, _ = spec.stages[0].roles
+    assert [one.id for one in position.sensors] == ["ublox_f9p_pvt", "ublox_f9p_rtk"]
     wanted = [i for i, s in spec.catalog.sensors.items() if s.modality == "attitude"]
-    assert ids == wanted
-    assert len(ids) >= 3
+    assert [one.id for one in attitude.sensors] == wanted
+    assert len(wanted) >= 3
+    assert all(one.entry is spec.catalog.sensors[one.id] for one in attitude.sensors)
+    assert all(one.origin == spec.origins["sensors", one.id] for one in attitude.sensors)
 
 
 def test_a_query_matches_every_key_given() -> None:
@@ -126,8 +126,9 @@ def test_a_query_matches_every_key_given() -> None:
         "ranging: {candidates: {type: lidar, max_cost: 20000 EUR}}",
     )
     spec = loaded(text)
-    found = candidate_sensors(spec.spec, spec.spec.stages[0], "ranging", spec.catalog)
-    assert found
+    ranging = spec.stages[0].role("ranging")
+    assert ranging is not None
+    assert ranging.sensors
     wanted = {
         identity
         for identity, sensor in spec.catalog.sensors.items()
@@ -136,21 +137,16 @@ def test_a_query_matches_every_key_given() -> None:
         and sensor.cost is not None
         and sensor.cost <= 20000
     }
-    assert {identity for identity, _ in found} == wanted
+    assert {one.id for one in ranging.sensors} == wanted
 
 
 def test_timestamping_is_the_roles_else_the_stages_else_the_specs() -> None:
     text = HEAD + STAGE.replace("    attitude:", "    timestamping: gpio\n    attitude:")
     spec = loaded(text)
-    stage = spec.spec.stages[0]
-    assert stage.ranging is not None
-    assert stage.attitude is not None
-    methods = timestamping_of(spec.spec, stage, stage.ranging, spec.catalog)
-    assert not isinstance(methods, InlineTimestamping)
-    assert [i for i, _ in methods] == ["hardware"]
-    methods = timestamping_of(spec.spec, stage, stage.attitude, spec.catalog)
-    assert not isinstance(methods, InlineTimestamping)
-    assert [i for i, _ in methods] == ["gpio"]
+    methods = {role.role: [one.id for one in role.methods] for role in spec.stages[0].roles}
+    assert methods["ranging"] == ["hardware"]
+    assert methods["attitude"] == ["gpio"]
+    assert all(role.inline is None for role in spec.stages[0].roles)
 
 
 def test_a_role_may_give_its_error_in_place() -> None:
@@ -158,11 +154,12 @@ def test_a_role_may_give_its_error_in_place() -> None:
         "timestamping: hardware}",
         "timestamping: {error: {distribution: constant, value: -3 ms}, timeline: utc}}",
     )
-    role = loaded(text).spec.stages[0].ranging
+    role = loaded(text).stages[0].role("ranging")
     assert role is not None
-    assert isinstance(role.timestamping, InlineTimestamping)
-    assert role.timestamping.timeline == "utc"
-    assert role.timestamping.error.value == -0.003  # type: ignore[union-attr]
+    assert role.methods == ()
+    assert isinstance(role.inline, InlineTimestamping)
+    assert role.inline.timeline == "utc"
+    assert role.inline.error.value == -0.003  # type: ignore[union-attr]
 
 
 def test_a_sensor_may_be_given_in_place_and_named() -> None:
@@ -171,11 +168,10 @@ def test_a_sensor_may_be_given_in_place_and_named() -> None:
         text = STAGE.replace("sensor: riegl_vux1uav", f"sensor: {inline % name}")
         role_error = complaint(HEAD + text)  # the objective is cost, and something is open
         assert f"sensor {shown} has no cost" in role_error
-        spec = loaded(HEAD + text + "objective: error\n").spec
-        stage = spec.stages[0]
-        assert stage.ranging is not None
-        assert not isinstance(stage.ranging.sensor, str | None)
-        assert sensor_id(stage.ranging.sensor, stage, "ranging") == shown
+        ranging = loaded(HEAD + text + "objective: error\n").stages[0].role("ranging")
+        assert ranging is not None
+        (sensor,) = ranging.sensors
+        assert (sensor.id, sensor.origin) == (shown, IN_PLACE)
 
 
 def test_figures_are_due_only_where_something_needs_them() -> None:

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from syncline_design.machine.result_files import OutputError, write_file
+from syncline_design.spec.case import Case, usable_primitives
 from syncline_design.spec.edit import PinnedRole, pinned_spec_text, with_effects_text, write_spec
-from syncline_design.spec.load import BadInput, Case, load, load_text
-from syncline_design.spec.resolve import candidate_sensors, timestamping_of, usable_primitives
-from syncline_design.spec.spec import ROLE_NAMES, EffectChoice, InlineTimestamping
+from syncline_design.spec.load import BadInput, load, load_text
+from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import parse
 
 SPECS = Path(__file__).parent.parent / "specs"
@@ -29,23 +29,18 @@ EFFECT = EffectChoice(
 def first_options(spec: Case) -> list[PinnedRole]:
     """The first usable option of every role."""
     pins = []
-    for index, stage in enumerate(spec.spec.stages):
-        for name in ROLE_NAMES:
-            role = stage.role(name)
-            sensors = candidate_sensors(spec.spec, stage, name, spec.catalog)
-            if role is None or not sensors:
-                continue
-            methods = timestamping_of(spec.spec, stage, role, spec.catalog)
-            if isinstance(methods, InlineTimestamping):
-                pins.append(PinnedRole(index, name, sensors[0][0]))
+    for stage in spec.stages:
+        for role in stage.roles:
+            if role.inline is not None:
+                pins.append(PinnedRole(stage.index, role.role, role.sensors[0].id))
                 continue
             identity, primitive, method = next(
-                (i, p, m)
-                for i, sensor in sensors
-                for m, entry in methods
-                for p in usable_primitives(sensor, entry, role.primitive)
+                (sensor.id, p, method.id)
+                for sensor in role.sensors
+                for method in role.methods
+                for p in usable_primitives(sensor.entry, method.entry, role.choice.primitive)
             )
-            pins.append(PinnedRole(index, name, identity, primitive, method))
+            pins.append(PinnedRole(stage.index, role.role, identity, primitive, method))
     return pins
 
 

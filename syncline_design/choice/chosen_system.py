@@ -7,16 +7,9 @@ from dataclasses import replace
 
 from syncline_design.choice.table import Design, Option, Problem
 from syncline_design.model import timing
-from syncline_design.model.system import (
-    ROLES,
-    UTC,
-    EffectEntry,
-    Platform,
-    RoleName,
-    Sensor,
-    Stage,
-    System,
-)
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import ROLES, UTC, Platform, RoleName, Sensor, Stage, System
+from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
     ClockEntry,
     ConstantError,
@@ -25,9 +18,6 @@ from syncline_design.spec.catalog import (
     TimestampError,
     UniformError,
 )
-from syncline_design.spec.load import Case
-from syncline_design.spec.resolve import candidate_sensors, platform_of
-from syncline_design.spec.spec import InlineTimestamping, StageChoice
 
 Vector = tuple[float, float, float]
 
@@ -41,15 +31,14 @@ def system_of(
         for table, place in zip(problem.roles, design.options, strict=True)
     }
     stages = tuple(
-        _stage(case, index, {role: chosen.get((index, role)) for role in ROLES})
-        for index in range(len(case.spec.stages))
+        _stage(stage, {role: chosen.get((stage.index, role)) for role in ROLES})
+        for stage in case.stages
     )
     offsets = []
     for vehicle, place in zip(problem.vehicles, design.clocks, strict=True):
-        identity = vehicle.clocks[place].id
-        if identity is not None:
-            error = clock_error(case.catalog.clocks[identity])
-            offsets.append((host_timeline(vehicle.name), error))
+        clock = case.clock(vehicle.name, vehicle.clocks[place].id)
+        if clock is not None:
+            offsets.append((host_timeline(vehicle.name), clock_error(clock)))
     factor = float(case.spec.coverage_factor)
     return System(stages, factor, tuple(offsets), effects, case.spec.horizon.horizon())
 
@@ -86,17 +75,18 @@ def clock_error(entry: ClockEntry) -> timing.TimingError:
     return replace(offset, drifted_s=abs(float(entry.drift)) * float(entry.holdover))
 
 
-def _stage(case: Case, index: int, chosen: dict[RoleName, Option | None]) -> Stage:
-    choice = case.spec.stages[index]
-    entry = platform_of(choice.platform, case.catalog)
+def _stage(stage: StageCase, chosen: dict[RoleName, Option | None]) -> Stage:
+    choice, entry = stage.choice, stage.platform.entry
     platform = Platform(
         float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline)
     )
     sensors = {
-        role: _sensor(case, choice, role, option) if option is not None else None
-        for role, option in chosen.items()
+        name: None
+        if option is None or (role := stage.role(name)) is None
+        else _sensor(choice.vehicle_name, role, option)
+        for name, option in chosen.items()
     }
-    transponder = choice.position.lever_arm if index > 0 and choice.position else None
+    transponder = choice.position.lever_arm if stage.index > 0 and choice.position else None
     return Stage(
         name=choice.name,
         vehicle=choice.vehicle_name,
@@ -112,24 +102,18 @@ def _vector(arm: Sequence[float] | None) -> Vector | None:
     return None if arm is None else (float(arm[0]), float(arm[1]), float(arm[2]))
 
 
-def _sensor(case: Case, stage: StageChoice, role: RoleName, option: Option) -> Sensor:
-    choice = stage.role(role)
-    assert choice is not None
-    candidates = dict(candidate_sensors(case.spec, stage, role, case.catalog))
-    entry = candidates[option.sensor]
-    own = choice.timestamping
-    error = (
-        own.error
-        if isinstance(own, InlineTimestamping)
-        else case.catalog.timestamping[option.method].error
-    )
+def _sensor(vehicle: str, role: RoleCase, option: Option) -> Sensor:
+    entry = role.sensor(option.sensor)
+    stamping = role.inline or role.method(option.method)
+    assert entry is not None
+    assert stamping is not None
     return Sensor(
         id=option.sensor,
-        role=role,
-        sigma=_sigma(entry, role),
-        timing=timing_error(error),
-        timeline=UTC if option.timeline == "utc" else host_timeline(stage.vehicle_name),
-        lever_arm_m=_vector(choice.lever_arm),
+        role=role.role,
+        sigma=_sigma(entry, role.role),
+        timing=timing_error(stamping.error),
+        timeline=UTC if option.timeline == "utc" else host_timeline(vehicle),
+        lever_arm_m=_vector(role.choice.lever_arm),
         type=entry.type,
     )
 

@@ -18,9 +18,10 @@ from syncline_design.choice.table import Design, Problem, is_empty
 from syncline_design.effects import registry
 from syncline_design.effects.acting import known_of
 from syncline_design.model.budget import Budget, budget
-from syncline_design.model.system import EffectEntry, RoleName, Sensor, System
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.system import RoleName, Sensor, System
+from syncline_design.spec.case import Case
 from syncline_design.spec.known_effects import demand_budget, effect_entries
-from syncline_design.spec.load import Case
 
 Key = tuple[str, RoleName, str]  # stage, role, sensor
 Term = tuple[str, str, float]  # name, stage, value [m]

@@ -17,7 +17,7 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import Problem, RoleTable, VehicleTable
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import in_force
-from syncline_design.spec.load import Case
+from syncline_design.spec.case import Case
 
 Found = TypeVar("Found")
 

@@ -17,9 +17,8 @@ from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build, with_methods
 from syncline_design.choice.written import in_unit_of, money, plain
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
-from syncline_design.spec.load import Case
-from syncline_design.spec.resolve import candidate_sensors, timestamping_of, usable_primitives
-from syncline_design.spec.spec import InlineTimestamping, Requirement
+from syncline_design.spec.case import Case, usable_primitives
+from syncline_design.spec.spec import Requirement
 
 FixKind = Literal[
     "accuracy", "sync", "cost", "mass", "power", "monte_carlo", "platform", "timestamping"
@@ -125,17 +124,9 @@ def _moves(case: Case, problem: Problem, part: Part, value: Fraction) -> Iterato
     for requirement in case.spec.requirements:
         if requirement.kind != part.kind or (part.kind == SIMULATED and requirement.id != part.id):
             continue
-        before = _limit(case, requirement)
+        before = case.limit(requirement)
         if before < value:
             yield requirement, float(before), _rounded_up(case, requirement, value)
-
-
-def _limit(case: Case, requirement: Requirement) -> Fraction:
-    """A requirement's limit in SI or the spec's currency."""
-    limit = requirement.limit
-    if requirement.kind == "cost" and isinstance(limit, Quantity):
-        return case.spec.in_currency(limit)
-    return limit.exact if isinstance(limit, Quantity) else Fraction(limit)
 
 
 def _rounded_up(case: Case, requirement: Requirement, value: Fraction) -> Quantity:
@@ -197,23 +188,19 @@ def method_fixes(case: Case, build: Build, problem: Problem) -> Iterator[Fix]:
     for table in problem.roles:
         if table.options:
             continue
-        stage = case.spec.stages[table.stage]
-        choice = stage.role(table.role)
-        assert choice is not None
-        now = timestamping_of(case.spec, stage, choice, case.catalog)
-        if isinstance(now, InlineTimestamping):
+        role = case.stages[table.stage].role(table.role)
+        if role is None or role.inline is not None:
             continue
-        have = tuple(name for name, _ in now)
-        sensors = candidate_sensors(case.spec, stage, table.role, case.catalog)
+        have = tuple(one.id for one in role.methods)
         found: list[tuple[float, str]] = []
         for name, method in case.catalog.timestamping.items():
             if name in have or not any(
-                usable_primitives(s, method, choice.primitive) for _, s in sensors
+                usable_primitives(one.entry, method, role.choice.primitive) for one in role.sensors
             ):
                 continue
             best = solve(build(with_methods(case, table.stage, table.role, (*have, name))))
             if best is not None:
                 found.append((float(best.cost or 0), name))
         for _, name in sorted(found)[:MOST_METHODS]:
-            text = f"let {table.role} of {stage.name} be stamped by {name}"
-            yield Fix("timestamping", None, None, None, text, stage=stage.name)
+            text = f"let {table.role} of {table.stage_name} be stamped by {name}"
+            yield Fix("timestamping", None, None, None, text, stage=table.stage_name)

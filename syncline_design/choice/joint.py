@@ -11,7 +11,7 @@ from syncline_design.choice.outcome import NoVerdict
 from syncline_design.choice.parts import Part, is_feasible, least, lifted, moved, parts_of
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build
-from syncline_design.spec.load import Case
+from syncline_design.spec.case import Case
 
 MOST = 3
 

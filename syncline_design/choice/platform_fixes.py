@@ -27,7 +27,7 @@ from syncline_design.choice.variations import (
 )
 from syncline_design.choice.written import DIGITS, in_unit_of
 from syncline_design.model.quantity import Dimension, Quantity
-from syncline_design.spec.load import Case
+from syncline_design.spec.case import Case
 
 LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
 LARGEST_SHARE = 10.0  # nor a distance raised above this multiple

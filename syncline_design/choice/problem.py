@@ -40,27 +40,18 @@ from syncline_design.choice.table import (
 )
 from syncline_design.machine.deadline import unhurried
 from syncline_design.model.quantity import Quantity
-from syncline_design.model.system import ROLES, RoleName
+from syncline_design.model.system import RoleName
+from syncline_design.spec.case import Candidate, Case, RoleCase, StageCase, usable_primitives
 from syncline_design.spec.catalog import (
     ClockEntry,
     InfrastructureEntry,
-    PlatformEntry,
     SensorEntry,
     TimestampingEntry,
 )
 from syncline_design.spec.exact import fraction_of, norm, tau_bound
 from syncline_design.spec.gnss import Barred, barred_clock, barred_method, barred_sensor
-from syncline_design.spec.load import Case
-from syncline_design.spec.resolve import (
-    Methods,
-    candidate_sensors,
-    clocks_of,
-    platform_of,
-    timestamping_of,
-    usable_primitives,
-)
 from syncline_design.spec.selection import ClockSelection, RoleSelection, Selection
-from syncline_design.spec.spec import InlineTimestamping, Role, RoleChoice, StageChoice
+from syncline_design.spec.spec import InlineTimestamping
 
 __all__ = [
     "NO_CLOCK",
@@ -120,16 +111,15 @@ def build_problem(
     they add where it hangs on the sensor (its tau in place of extra_tau_s).
     """
     spec = case.spec
-    motions = [_motion(case, stage) for stage in spec.stages]
+    motions = [_motion(stage) for stage in case.stages]
     limits = _limits(case)
     vehicles = list(dict.fromkeys(stage.vehicle_name for stage in spec.stages))
     tables = tuple(
         _role_table(
-            case, index, role, motions[index], limits.sync, vehicles, extra_tau_s, by_sensor
+            case, stage, role, motions[stage.index], limits.sync, vehicles, extra_tau_s, by_sensor
         )
-        for index, stage in enumerate(spec.stages)
-        for role in ROLES
-        if not _is_empty(stage.role(role))
+        for stage in case.stages
+        for role in stage.roles
     )
     vehicle_tables = tuple(_vehicle(case, name) for name in vehicles)
     rate = sum((motion.rate for motion in motions), Fraction(0))
@@ -195,13 +185,8 @@ class _Motion:
         return self.speed + self.turning
 
 
-def _is_empty(choice: RoleChoice | None) -> bool:
-    return choice is None or choice.is_empty
-
-
-def _motion(case: Case, stage: StageChoice) -> _Motion:
-    platform: PlatformEntry = platform_of(stage.platform, case.catalog)
-    ranges = not _is_empty(stage.ranging)
+def _motion(stage: StageCase) -> _Motion:
+    platform, ranges = stage.platform.entry, stage.role("ranging") is not None
     distance = fraction_of(platform.distance) if ranges else Fraction(0)
     speed = fraction_of(platform.v_max)
     return _Motion(speed, distance, distance * fraction_of(platform.omega_max), ranges)
@@ -209,13 +194,9 @@ def _motion(case: Case, stage: StageChoice) -> _Motion:
 
 def _limits(case: Case) -> Limits:
     """The tightest limit of each kind; without a sync requirement 1.0 is implied."""
-    spec = case.spec
     tightest: dict[str, tuple[Fraction, str]] = {}
-    for requirement in spec.requirements:
-        limit = requirement.limit
-        exact = fraction_of(limit)
-        if requirement.kind == "cost" and isinstance(limit, Quantity):
-            exact = spec.in_currency(limit)
+    for requirement in case.spec.requirements:
+        exact = case.limit(requirement)
         known = tightest.get(requirement.kind)
         if known is None or exact < known[0]:
             tightest[requirement.kind] = (exact, requirement.id)
@@ -238,17 +219,17 @@ def _sensor_error(sensor: SensorEntry, role: RoleName, motion: _Motion) -> Fract
 
 def _role_table(
     case: Case,
-    index: int,
-    role: Role,
+    stage: StageCase,
+    role: RoleCase,
     motion: _Motion,
     sync_limit: float,
     vehicles: list[str],
     extra_tau_s: Mapping[tuple[str, RoleName], float],
     by_sensor: BySensor,
 ) -> RoleTable:
-    stage = case.spec.stages[index]
-    usual = SensorEffects(extra_tau_s.get((stage.name, role), 0.0))
-    effects = _EffectsOf(stage.name, role, usual, by_sensor)
+    name = stage.choice.name
+    usual = SensorEffects(extra_tau_s.get((name, role.role), 0.0))
+    effects = _EffectsOf(name, role.role, usual, by_sensor)
     options: list[Option] = []
     excluded: list[Excluded] = []
     for one in unhurried(_candidates(case, stage, role, motion, effects)):
@@ -260,8 +241,8 @@ def _role_table(
         else:
             excluded.append(breaks_own_tau_crit(one, ratio))
     options.sort(key=lambda option: option.names)
-    vehicle = vehicles.index(stage.vehicle_name)
-    return RoleTable(index, stage.name, role, vehicle, tuple(options), tuple(excluded))
+    vehicle = vehicles.index(stage.choice.vehicle_name)
+    return RoleTable(stage.index, name, role.role, vehicle, tuple(options), tuple(excluded))
 
 
 @dataclass(frozen=True, slots=True)
@@ -278,58 +259,51 @@ class _EffectsOf:
 
 
 def _candidates(
-    case: Case, stage: StageChoice, role: Role, motion: _Motion, effects: _EffectsOf
+    case: Case, stage: StageCase, role: RoleCase, motion: _Motion, effects: _EffectsOf
 ) -> Iterator[Option | Excluded]:
     """Every (sensor, primitive, method) that the spec lets a role take, or why it cannot."""
-    spec, catalog = case.spec, case.catalog
-    choice = stage.role(role)
-    assert choice is not None
-    methods = timestamping_of(spec, stage, choice, catalog)
-    for name, sensor in candidate_sensors(spec, stage, role, catalog):
-        figures = _Figures(case, role, motion, effects.of(name), name, sensor)
-        if isinstance(methods, InlineTimestamping):
-            found: Iterator[Option | Excluded] = _given_in_place(figures, choice, methods)
+    for sensor in role.sensors:
+        figures = _Figures(case, role, motion, effects.of(sensor.id), sensor.id, sensor.entry)
+        if role.inline is not None:
+            found = _given_in_place(figures, role.inline)
         else:
-            found = _stamped(figures, stage, choice, methods)
-        if (barred := barred_sensor(spec, stage, name, sensor)) is not None:
-            yield _impossible(name, "", "", barred, found)
+            found = _stamped(figures, stage)
+        if (barred := barred_sensor(case, stage.choice, sensor)) is not None:
+            yield _impossible(sensor.id, "", "", barred, found)
         else:
             yield from found
 
 
-def _given_in_place(
-    figures: _Figures, choice: RoleChoice, stamping: InlineTimestamping
-) -> Iterator[Option | Excluded]:
+def _given_in_place(figures: _Figures, stamping: InlineTimestamping) -> Iterator[Option | Excluded]:
     """A sensor whose timestamp error the spec gives; a primitive that is pinned has to be its."""
-    name, offered = figures.name, figures.sensor.serves
-    if choice.primitive is not None and choice.primitive not in offered:
+    name, offered, pinned = figures.name, figures.sensor.serves, figures.role.choice.primitive
+    if pinned is not None and pinned not in offered:
         offers = ", ".join(offered)
-        reason = f"{choice.primitive} is asked for; {name} has {offers}"
-        yield Excluded(name, "", INLINE, reason, figure=offers, limit=choice.primitive)
+        reason = f"{pinned} is asked for; {name} has {offers}"
+        yield Excluded(name, "", INLINE, reason, figure=offers, limit=pinned)
         return
     tau = tau_bound(stamping.error, figures.case.spec.coverage_factor)
-    yield figures.option(choice.primitive or INLINE, INLINE, tau, stamping.timeline, None)
+    yield figures.option(pinned or INLINE, INLINE, tau, stamping.timeline, None)
 
 
-def _stamped(
-    figures: _Figures, stage: StageChoice, choice: RoleChoice, methods: Methods
-) -> Iterator[Option | Excluded]:
+def _stamped(figures: _Figures, stage: StageCase) -> Iterator[Option | Excluded]:
     """Every way of stamping one sensor, or why it is none."""
-    spec, catalog = figures.case.spec, figures.case.catalog
+    case, pinned = figures.case, figures.role.choice.primitive
     name, sensor = figures.name, figures.sensor
-    for method_id, method in methods:
-        primitives = usable_primitives(sensor, method, choice.primitive)
-        tau = tau_bound(method.error, spec.coverage_factor)
-        barred = barred_method(spec, stage, method_id, method, catalog)
+    for method in figures.role.methods:
+        entry = method.entry
+        primitives = usable_primitives(sensor, entry, pinned)
+        tau = tau_bound(entry.error, case.spec.coverage_factor)
+        barred = barred_method(case, stage.choice, method)
         for primitive in primitives:
-            option = figures.option(primitive, method_id, tau, method.timeline, method)
+            option = figures.option(primitive, method.id, tau, entry.timeline, entry)
             one = (option,)
-            yield option if barred is None else _impossible(name, primitive, method_id, barred, one)
+            yield option if barred is None else _impossible(name, primitive, method.id, barred, one)
         if not primitives:
-            served = ", ".join(method.primitives)
-            offers = choice.primitive or ", ".join(sensor.serves)
-            reason = f"{method_id} serves {served}; {name} has {offers}"
-            yield Excluded(name, "", method_id, reason, figure=served, limit=offers)
+            served = ", ".join(entry.primitives)
+            offers = pinned or ", ".join(sensor.serves)
+            reason = f"{method.id} serves {served}; {name} has {offers}"
+            yield Excluded(name, "", method.id, reason, figure=served, limit=offers)
 
 
 def _impossible(
@@ -356,7 +330,7 @@ class _Figures:
     """A sensor in a role, before it is known how it is stamped."""
 
     case: Case
-    role: RoleName
+    role: RoleCase
     motion: _Motion
     effects: SensorEffects
     name: str
@@ -371,9 +345,10 @@ class _Figures:
         entry: TimestampingEntry | None,
     ) -> Option:
         """The option with one way of stamping."""
-        enters = self.motion.ranges or self.role == "position"
-        error = _sensor_error(self.sensor, self.role, self.motion) if enters else Fraction(0)
-        rate = self.motion.speed if self.role == "position" else self.motion.rate
+        role = self.role.role
+        enters = self.motion.ranges or role == "position"
+        error = _sensor_error(self.sensor, role, self.motion) if enters else Fraction(0)
+        rate = self.motion.speed if role == "position" else self.motion.rate
         matters = enters and rate > 0
         crit = float(error / rate) if matters else math.inf
         tau = tau + Fraction(self.effects.tau_s)
@@ -433,19 +408,15 @@ def _pairs(tables: tuple[RoleTable, ...], motions: list[_Motion]) -> tuple[Pair,
 
 
 def _vehicle(case: Case, name: str) -> VehicleTable:
-    spec = case.spec
-    stages = [i for i, stage in enumerate(spec.stages) if stage.vehicle_name == name]
-    entries = next(
-        (c for i in stages if (c := clocks_of(spec.stages[i], case.catalog))),
-        (),
-    )
-    if not entries:
+    stages = [i for i, stage in enumerate(case.spec.stages) if stage.vehicle_name == name]
+    offered = case.clocks(name)
+    if not offered:
         return VehicleTable(name, tuple(stages), (NO_CLOCK,))
     clocks: list[ClockOption] = []
     excluded: list[ExcludedClock] = []
-    for identity, entry in entries:
-        clock = _clock(case, identity, entry)
-        barred = barred_clock(spec, name, identity, entry, case.catalog)
+    for one in offered:
+        clock = _clock(case, one)
+        barred = barred_clock(case, name, one)
         if barred is None:
             clocks.append(clock)
         else:
@@ -454,12 +425,13 @@ def _vehicle(case: Case, name: str) -> VehicleTable:
     return VehicleTable(name, tuple(stages), tuple(clocks), tuple(excluded))
 
 
-def _clock(case: Case, identity: str, entry: ClockEntry) -> ClockOption:
+def _clock(case: Case, clock: Candidate[ClockEntry]) -> ClockOption:
+    entry = clock.entry
     offset = tau_bound(entry.offset, case.spec.coverage_factor)
     if entry.drift is not None and entry.holdover is not None:
         offset += abs(fraction_of(entry.drift)) * fraction_of(entry.holdover)
     requires = tuple(sorted(entry.requires.items()))
-    return ClockOption(identity, float(offset), _resources(case, entry), requires, offset)
+    return ClockOption(clock.id, float(offset), _resources(case, entry), requires, offset)
 
 
 def _required(tables: Sequence[RoleTable], vehicles: Sequence[VehicleTable]) -> set[str]:
@@ -473,6 +445,6 @@ def _required(tables: Sequence[RoleTable], vehicles: Sequence[VehicleTable]) -> 
 
 def _infrastructure(case: Case, required: set[str]) -> Iterator[Infrastructure]:
     """Shared hardware that a design may buy: what is only on the shelf has no influence."""
-    for identity, entry in case.catalog.infrastructure.items():
+    for identity, one in case.hardware.items():
         if identity in required:
-            yield Infrastructure(identity, int(entry.channels), _resources(case, entry))
+            yield Infrastructure(identity, int(one.entry.channels), _resources(case, one.entry))

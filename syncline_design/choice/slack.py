@@ -30,7 +30,7 @@ from syncline_design.choice.variations import (
     with_platform_figure,
 )
 from syncline_design.machine.deadline import in_force
-from syncline_design.spec.load import Case
+from syncline_design.spec.case import Case
 
 # Values tried, over the term's own: from a nudge that only settles ties to a million times.
 GROWTHS = (1.0 + 1e-9, 1.0001, 1.01, 1.05, *(1.3**k for k in range(1, 53)), 1e6)

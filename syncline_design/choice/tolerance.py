@@ -24,7 +24,7 @@ from syncline_design.choice.slack import payload
 from syncline_design.choice.table import RESOURCES, Design, Problem
 from syncline_design.choice.variations import Build, Figure, quantity, sigma_figures, with_figure
 from syncline_design.model.quantity import format_like
-from syncline_design.spec.load import Case
+from syncline_design.spec.case import Case
 from syncline_design.spec.selection import RoleSelection
 
 Word = Literal["always", "sometimes", "never"]

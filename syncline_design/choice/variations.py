@@ -10,10 +10,9 @@ from typing import Any, Literal
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.spec.case import IN_PLACE, Case
 from syncline_design.spec.catalog import SensorEntry
-from syncline_design.spec.load import Case
-from syncline_design.spec.resolve import candidate_sensors, platform_of
-from syncline_design.spec.spec import MethodChoice, Role, StageChoice
+from syncline_design.spec.spec import MethodChoice, Role
 
 Build = Callable[[Case], Problem]
 PlatformFigure = Literal["v_max", "distance", "omega_max"]
@@ -53,8 +52,7 @@ def with_platform_figure(case: Case, stage: int, figure: PlatformFigure, value: 
 
 def platform_figure(case: Case, stage: int, figure: PlatformFigure) -> float:
     """One figure of a stage's platform [SI], as written."""
-    entry = platform_of(case.spec.stages[stage].platform, case.catalog)
-    value: float = getattr(entry, figure)
+    value: float = getattr(case.stages[stage].platform.entry, figure)
     return value
 
 
@@ -94,20 +92,15 @@ class Figure:
 def sigma_figures(case: Case) -> Iterator[Figure]:
     """Every datasheet figure of every sensor that the spec may use, once."""
     seen: set[tuple[str, str, int | None]] = set()
-    for index, stage in enumerate(case.spec.stages):
-        for role in ("position", "attitude", "ranging"):
-            own = _own_sensor(stage, role)
-            for name, entry in candidate_sensors(case.spec, stage, role, case.catalog):
-                for figure in _figures(name, entry, (index, role) if own else None):
+    for stage in case.stages:
+        for role in stage.roles:
+            for one in role.sensors:
+                place = (stage.index, role.role) if one.origin == IN_PLACE else None
+                for figure in _figures(one.id, one.entry, place):
                     key = (figure.sensor, figure.figure, figure.axis)
                     if key not in seen:
                         seen.add(key)
                         yield figure
-
-
-def _own_sensor(stage: StageChoice, role: Role) -> bool:
-    choice = stage.role(role)
-    return choice is not None and isinstance(choice.sensor, SensorEntry)
 
 
 def _figures(name: str, entry: SensorEntry, place: tuple[int, Role] | None) -> Iterator[Figure]:

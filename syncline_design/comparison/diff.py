@@ -14,16 +14,10 @@ from typing import Any
 
 from syncline_design.comparison.difference import Cause, Difference, changes, difference
 from syncline_design.comparison.verdict_file import read_verdict, text_of
+from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
-from syncline_design.spec.load import (
-    BadInput,
-    Case,
-    catalogs_of,
-    load_document,
-    without_simulated,
-)
-from syncline_design.spec.resolve import platform_of
+from syncline_design.spec.load import BadInput, catalogs_of, load_document, without_simulated
 from syncline_design.spec.yaml_text import Document, KeyPath, parse
 from syncline_design.verdict.tree import EXIT_CODES
 from syncline_design.verdict.verify import CheckSettings, check_loaded
@@ -90,10 +84,10 @@ def _expanded(side: Side) -> Any:
     assert side.document is not None
     assert side.case is not None
     stages = []
-    for stage, chosen in zip(side.document.data["stages"], side.case.spec.stages, strict=True):
-        entry = platform_of(chosen.platform, side.case.catalog)
+    for stage, chosen in zip(side.document.data["stages"], side.case.stages, strict=True):
+        entry = chosen.platform.entry
         figures = {key: _figure(getattr(entry, key)) for key in PLATFORM_KEYS}
-        stages.append({**stage, "platform": {"use": chosen.platform.use or "", **figures}})
+        stages.append({**stage, "platform": {"use": chosen.choice.platform.use or "", **figures}})
     return {**side.document.data, "stages": tuple(stages)}
 
 

@@ -9,9 +9,10 @@ from typing import Any
 from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis import Diagnosis
 from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects_text
 from syncline_design.spec.known_effects import NoBudget
-from syncline_design.spec.load import Case, load_text
+from syncline_design.spec.load import load_text
 from syncline_design.verdict.optimise import pinned_text
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verified import frame

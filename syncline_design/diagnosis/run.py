@@ -29,7 +29,8 @@ from syncline_design.diagnosis.search import Search, SearchResult, start_search
 from syncline_design.diagnosis.settings import DiagnosisSettings, Progress, silent
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.logs.log import Log
-from syncline_design.spec.load import Case, load
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load
 
 MOST_ROWS = 20_000  # of a longer log, windows spread over it are worked on
 REMAINDER_SHARE = 0.2  # of the false-alarm rate: for the test of what remains

@@ -13,8 +13,9 @@ from syncline_design.effects import registry
 from syncline_design.logs.log import Log
 from syncline_design.logs.reading import read_log
 from syncline_design.model.system import System
+from syncline_design.spec.case import Case
 from syncline_design.spec.known_effects import effect_entries
-from syncline_design.spec.load import BadInput, Case
+from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import KeyPath, Problem
 
 

@@ -17,9 +17,10 @@ from syncline_design.effects.record import (
     StageRows,
     Values,
 )
+from syncline_design.model.known import EffectEntry
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
-from syncline_design.model.system import EffectEntry, RoleName, SimulationError, Stage, System
+from syncline_design.model.system import RoleName, SimulationError, Stage, System
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
+from syncline_design.model.known import EffectEntry
 from syncline_design.model.timing import NO_ERROR, TimingError
 
 RoleName = Literal["position", "attitude", "ranging"]
@@ -71,16 +72,6 @@ class Stage:
     def sensors(self) -> tuple[Sensor, ...]:
         """Sensors the stage has, in the order position, attitude, ranging."""
         return tuple(s for s in (self.position, self.attitude, self.ranging) if s is not None)
-
-
-@dataclass(frozen=True, slots=True)
-class EffectEntry:
-    """A known systematic effect of a system: its name, where it acts, its parameters in SI."""
-
-    effect: str
-    sensor: str
-    stage: str
-    parameters: tuple[tuple[str, float | str], ...]
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,8 @@ import yaml
 
 from syncline_design.machine.result_files import write_file
 from syncline_design.model.quantity import Quantity
-from syncline_design.spec.load import Case, load_text
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load_text
 from syncline_design.spec.spec import EffectChoice, Role
 from syncline_design.spec.yaml_text import KeyPath, parse, plain_scalar
 

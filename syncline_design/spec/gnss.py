@@ -13,7 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
-from syncline_design.spec.catalog import Catalog, ClockEntry, SensorEntry, TimestampingEntry
+from syncline_design.spec.case import Candidate, Case
+from syncline_design.spec.catalog import ClockEntry, SensorEntry, TimestampingEntry
 from syncline_design.spec.spec import Spec, StageChoice
 
 GENERIC = ("gnss", "gps", "satnav")  # inside a word too: dgps, GnssCompass
@@ -72,33 +73,32 @@ def is_receiver(kind: str) -> bool:
     )
 
 
-def barred_sensor(spec: Spec, stage: StageChoice, name: str, sensor: SensorEntry) -> Barred | None:
+def barred_sensor(case: Case, stage: StageChoice, sensor: Candidate[SensorEntry]) -> Barred | None:
     """Why a sensor cannot work on a stage; None where it can."""
-    needs = "gnss" in sensor.needs or is_receiver(sensor.type)
-    if not needs or has_gnss(spec, stage):
+    needs = "gnss" in sensor.entry.needs or is_receiver(sensor.entry.type)
+    if not needs or has_gnss(case.spec, stage):
         return None
     hint = "write gnss: yes in the stage where its antenna is above the water"
-    reason = f"{name} needs GNSS; {stage.name} has none{_why(spec, stage)}; {hint}"
+    reason = f"{sensor.id} needs GNSS; {stage.name} has none{_why(case.spec, stage)}; {hint}"
     return Barred("gnss", reason, "needs: gnss", "gnss: no")
 
 
 def barred_method(
-    spec: Spec, stage: StageChoice, name: str, method: TimestampingEntry, catalog: Catalog
+    case: Case, stage: StageChoice, method: Candidate[TimestampingEntry]
 ) -> Barred | None:
     """Why a timestamping method cannot work on a stage; None where it can."""
-    if not _needs_gnss(method, catalog) or has_gnss_time(spec, stage):
+    if not _needs_gnss(case, method.entry) or has_gnss_time(case.spec, stage):
         return None
-    return _without_time(stage.name, name, _why(spec, stage))
+    return _without_time(stage.name, method.id, _why(case.spec, stage))
 
 
-def barred_clock(
-    spec: Spec, vehicle: str, name: str, clock: ClockEntry, catalog: Catalog
-) -> Barred | None:
+def barred_clock(case: Case, vehicle: str, clock: Candidate[ClockEntry]) -> Barred | None:
     """Why a clock cannot be disciplined so on a vehicle; None where it can."""
+    spec = case.spec
     stages = [stage for stage in spec.stages if stage.vehicle_name == vehicle]
-    if not _needs_gnss(clock, catalog) or any(has_gnss_time(spec, stage) for stage in stages):
+    if not _needs_gnss(case, clock.entry) or any(has_gnss_time(spec, stage) for stage in stages):
         return None
-    return _without_time(vehicle, name, _why(spec, stages[0]))
+    return _without_time(vehicle, clock.id, _why(spec, stages[0]))
 
 
 def _without_time(where: str, name: str, why: str) -> Barred:
@@ -118,7 +118,7 @@ def _why(spec: Spec, stage: StageChoice) -> str:
     return " (a later stage has none unless it says so)" if stage != spec.stages[0] else ""
 
 
-def _needs_gnss(entry: TimestampingEntry | ClockEntry, catalog: Catalog) -> bool:
+def _needs_gnss(case: Case, entry: TimestampingEntry | ClockEntry) -> bool:
     """Whether an entry, or shared hardware that it requires, needs GNSS."""
-    hardware = (catalog.infrastructure[name] for name in entry.requires)
+    hardware = (case.hardware[name].entry for name in entry.requires)
     return "gnss" in entry.needs or any("gnss" in one.needs for one in hardware)

@@ -7,8 +7,9 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from syncline_design.model.estimates import figure
-from syncline_design.model.system import EffectEntry
-from syncline_design.spec.load import BadInput, Case
+from syncline_design.model.known import EffectEntry
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import BadInput
 from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import KeyPath, Problem, show_path
 

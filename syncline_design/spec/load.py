@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from syncline_design.machine.input_files import (
     noting,
     read_plain,
 )
+from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.files import (
     BUILTIN_PACKAGE,
@@ -53,43 +54,13 @@ def _place_and_text(problem: Problem) -> tuple[str, int, int, str]:
     return problem.file, problem.line, problem.column, str(problem)
 
 
-@dataclass(frozen=True)
-class Case:
-    """A spec that can be worked with: its catalogs merged, every reference found.
-
-    positions: key path, as in ("requirements", 0, "limit"), to (line, column).
-    origins: (section, id) of a catalog entry to the file:line:column that defines it.
-    """
-
-    spec: Spec
-    catalog: Catalog
-    path: Path
-    positions: dict[KeyPath, Position] = field(repr=False)
-    spec_sha256: str
-    catalogs_sha256: str
-    text: str = field(repr=False)
-    origins: dict[tuple[str, str], str] = field(repr=False)
-    builtin: bool = True
-    files: tuple[FileRead, ...] = ()  # read besides
-    trajectory: FileContent | None = None
-
-    def place(self, path: KeyPath) -> str:
-        """`file:line:column` of a key path, or of the nearest thing around it."""
-        for length in range(len(path), -1, -1):
-            if path[:length] in self.positions:
-                line, column = self.positions[path[:length]]
-                return f"{self.path}:{line}:{column}"
-        return str(self.path)
-
-
 def load(path: str | Path, builtin: bool = True) -> Case:
     """Read a spec and its catalogs; BadInput names everything that is wrong with them.
 
     builtin: whether the shipped catalogs are drawn in too.
     """
     with noting() as found:
-        case = _loaded(read(path), Path(path), builtin)
-    return replace(case, files=_beside(case, found))
+        return _loaded(read(path), Path(path), builtin, found)
 
 
 def load_text(text: str, path: str | Path, builtin: bool = True) -> Case:
@@ -135,28 +106,36 @@ def _stop_at(problems: list[Problem]) -> None:
         raise BadInput(tuple(problems))
 
 
-def _loaded(document: Document, path: Path, builtin: bool) -> Case:
+def _loaded(document: Document, path: Path, builtin: bool, found: FilesRead | None = None) -> Case:
     if document.data is None:
         raise BadInput(document.problems)
-    return _complete(document, path, catalogs_of(document, path, builtin), builtin)
+    return _complete(document, path, catalogs_of(document, path, builtin), builtin, found)
 
 
-def _complete(document: Document, path: Path, collection: Collection, builtin: bool) -> Case:
+def _complete(
+    document: Document,
+    path: Path,
+    collection: Collection,
+    builtin: bool,
+    found: FilesRead | None = None,
+) -> Case:
+    """The case, or every problem of the file; found: what was read since the spec was asked for."""
     filled = fill_empirical(document, path.parent, path.parent, collection)
     spec, problems = validate(Spec, document, filled)
     problems = [*document.problems, *problems, *collection.problems]
     problems += unknown_ids(document, collection)
     if spec is None:
         raise BadInput(tuple(problems))
-    found, trajectory = _named_files(document, spec, path.parent)
-    _stop_at(problems + found)
-    catalog = collection.catalog()
-    _stop_at(misfits(document, spec, catalog) + currency_problems(document, spec, catalog))
-    _stop_at(missing_figures(document, spec, catalog))
-    return Case(
-        spec, catalog, path, document.positions, document.sha256, collection.sha256(),
-        document.text, collection.origins, builtin, trajectory=trajectory,
+    named, trajectory = _named_files(document, spec, path.parent)
+    _stop_at(problems + named)
+    case = Case(
+        spec, collection.catalog(), path, document.positions, document.sha256,
+        collection.sha256(), document.text, collection.origins, builtin,
+        () if found is None else _beside(path, found), trajectory,
     )  # fmt: skip
+    _stop_at(misfits(document, case) + currency_problems(document, case))
+    _stop_at(missing_figures(document, case))
+    return case
 
 
 def _named_files(
@@ -195,11 +174,11 @@ def _recorded_trajectory(
         return problem_at(document, at, f"cannot read the file: {reason.lower()}")
 
 
-def _beside(case: Case, found: FilesRead) -> tuple[FileRead, ...]:
+def _beside(spec: Path, found: FilesRead) -> tuple[FileRead, ...]:
     """What a spec was read with: its own catalogs, files of delays, trajectory."""
-    folder = case.path.parent.resolve()
+    folder = spec.parent.resolve()
     own = {Path(path).resolve(): digest for path, digest in found.contents.items()}
-    own.pop(case.path.resolve(), None)
+    own.pop(spec.resolve(), None)
     return tuple(
         FileRead(path.relative_to(folder).as_posix(), digest)
         for path, digest in sorted(own.items())

@@ -7,26 +7,10 @@ from itertools import islice
 from typing import Any
 
 from syncline_design.model.quantity import Quantity
-from syncline_design.spec.catalog import Catalog, SensorEntry
+from syncline_design.spec.case import Case, RoleCase, usable_primitives
 from syncline_design.spec.fields import MAX_SUGGESTIONS, did_you_mean
 from syncline_design.spec.files import Collection, problem_at
-from syncline_design.spec.resolve import (
-    candidate_sensors,
-    clocks_of,
-    infrastructure_of,
-    timestamping_of,
-    usable_primitives,
-)
-from syncline_design.spec.spec import (
-    ROLE_NAMES,
-    InlineTimestamping,
-    MethodChoice,
-    Query,
-    Role,
-    RoleChoice,
-    Spec,
-    StageChoice,
-)
+from syncline_design.spec.spec import ROLE_NAMES, Query, Spec
 from syncline_design.spec.yaml_text import Document, KeyPath, Problem
 
 _WORDS = {
@@ -110,69 +94,60 @@ def _choice_ids(section: str, choice: Any, path: KeyPath) -> Iterator[tuple[str,
             yield section, (*path, "candidates", index), identity
 
 
-def misfits(document: Document, spec: Spec, catalog: Catalog) -> list[Problem]:
+def misfits(document: Document, case: Case) -> list[Problem]:
     """Where valid ids do not fit together."""
     problems: list[Problem] = []
-    for index, stage in enumerate(spec.stages):
-        for name in ROLE_NAMES:
-            role = stage.role(name)
-            if role is not None and not role.is_empty:
-                at: KeyPath = ("stages", index, name)
-                problems += _role_misfits(document, at, spec, stage, name, role, catalog)
-    problems += _vehicle_misfits(document, spec)
-    problems += _effect_misfits(document, spec)
+    for stage in case.stages:
+        for role in stage.roles:
+            problems += _role_misfits(document, ("stages", stage.index, role.role), role)
+    problems += _vehicle_misfits(document, case.spec)
+    problems += _effect_misfits(document, case.spec)
     return problems
 
 
-def _role_misfits(
-    document: Document, at: KeyPath, spec: Spec, stage: StageChoice, name: Role,
-    role: RoleChoice, catalog: Catalog,
-) -> Iterator[Problem]:  # fmt: skip
-    sensors = candidate_sensors(spec, stage, name, catalog)
-    if not sensors:
+def _role_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Problem]:
+    name, pinned = role.role, role.choice.primitive
+    if not role.sensors:
         message = "no sensor of the catalogs matches this query"
         yield problem_at(document, (*at, "candidates"), message, f"at least one {name} sensor")
         return
-    for position, (identity, sensor) in enumerate(sensors):
-        if sensor.modality != name:
-            path = (*at, "sensor") if role.sensor is not None else (*at, "candidates", position)
-            message = f"{identity} is a sensor of modality {sensor.modality}"
-            yield problem_at(document, path, message, name, sensor.modality)
-    if role.primitive is not None and not any(role.primitive in s.serves for _, s in sensors):
-        offered = sorted({p for _, s in sensors for p in s.serves})
-        message = f"no such primitive on {_named(sensors)}"
-        wanted = " or ".join(offered)
-        yield problem_at(document, (*at, "primitive"), message, wanted, role.primitive)
+    for position, one in enumerate(role.sensors):
+        if one.entry.modality != name:
+            named = role.choice.sensor is not None
+            path = (*at, "sensor") if named else (*at, "candidates", position)
+            message = f"{one.id} is a sensor of modality {one.entry.modality}"
+            yield problem_at(document, path, message, name, one.entry.modality)
+    if pinned is not None and not any(pinned in one.entry.serves for one in role.sensors):
+        message = f"no such primitive on {_named(role)}"
+        yield problem_at(document, (*at, "primitive"), message, " or ".join(_offered(role)), pinned)
         return
-    yield from _method_misfits(document, at, spec, stage, role, sensors, catalog)
+    if role.inline is None:
+        yield from _method_misfits(document, at, role)
 
 
-def _method_misfits(
-    document: Document, at: KeyPath, spec: Spec, stage: StageChoice, role: RoleChoice,
-    sensors: tuple[tuple[str, SensorEntry], ...], catalog: Catalog,
-) -> Iterator[Problem]:  # fmt: skip
-    methods = timestamping_of(spec, stage, role, catalog)
-    if isinstance(methods, InlineTimestamping):
-        return
-    if not methods:
+def _method_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Problem]:
+    if not role.methods:
         wanted = (
             "a method id, {candidates: [...]}, or {error: {...}} here, in the stage or the spec"
         )
         yield problem_at(document, at, "no timestamping is given for this role", wanted)
-    if not isinstance(role.timestamping, str):
+    if not isinstance(role.choice.timestamping, str):
         return  # open: what does not fit is left out of the choice, with the reason kept
-    identity, method = methods[0]
-    if not any(usable_primitives(s, method, role.primitive) for _, s in sensors):
-        offered = sorted({p for _, s in sensors for p in s.serves})
-        has = role.primitive or ", ".join(offered)
-        message = f"{identity} cannot stamp {_named(sensors)}"
-        wanted = f"a method for {has}"
-        found = f"{identity}, which serves {', '.join(method.primitives)}"
+    method, pinned = role.methods[0], role.choice.primitive
+    if not any(usable_primitives(one.entry, method.entry, pinned) for one in role.sensors):
+        message = f"{method.id} cannot stamp {_named(role)}"
+        wanted = f"a method for {pinned or ', '.join(_offered(role))}"
+        found = f"{method.id}, which serves {', '.join(method.entry.primitives)}"
         yield problem_at(document, (*at, "timestamping"), message, wanted, found)
 
 
-def _named(sensors: tuple[tuple[str, SensorEntry], ...]) -> str:
-    return sensors[0][0] if len(sensors) == 1 else "any of the candidates"
+def _offered(role: RoleCase) -> list[str]:
+    """Primitives of any candidate."""
+    return sorted({primitive for one in role.sensors for primitive in one.entry.serves})
+
+
+def _named(role: RoleCase) -> str:
+    return role.sensors[0].id if len(role.sensors) == 1 else "any of the candidates"
 
 
 def _vehicle_misfits(document: Document, spec: Spec) -> Iterator[Problem]:
@@ -211,49 +186,44 @@ def _effect_misfits(document: Document, spec: Spec) -> Iterator[Problem]:
 Part = tuple[KeyPath, str, Any]  # where the spec names it, what it is, the entry
 
 
-def parts_in_use(spec: Spec, catalog: Catalog) -> Iterator[Part]:
+def parts_in_use(case: Case) -> Iterator[Part]:
     """Every entry that a design of this spec may buy, once, with where the spec names it."""
     seen: set[str] = set()
-    for path, label, entry in _parts(spec, catalog):
+    for path, label, entry in _parts(case):
         if label not in seen:
             seen.add(label)
             yield path, label, entry
 
 
-def _parts(spec: Spec, catalog: Catalog) -> Iterator[Part]:
-    for index, stage in enumerate(spec.stages):
-        for name in ROLE_NAMES:
-            role = stage.role(name)
-            if role is not None and not role.is_empty:
-                yield from _role_parts(spec, stage, name, role, ("stages", index, name), catalog)
-        for identity, clock in clocks_of(stage, catalog):
-            at: KeyPath = ("stages", index, "clock")
-            yield at, f"clock {identity}", clock
-            yield from _hardware(at, clock.requires, catalog)
+def _parts(case: Case) -> Iterator[Part]:
+    for stage in case.stages:
+        for role in stage.roles:
+            yield from _role_parts(case, ("stages", stage.index, role.role), role)
+        at: KeyPath = ("stages", stage.index, "clock")
+        for clock in stage.clocks:
+            yield at, f"clock {clock.id}", clock.entry
+            yield from _hardware(case, at, clock.entry.requires)
 
 
-def _role_parts(
-    spec: Spec, stage: StageChoice, name: Role, role: RoleChoice, at: KeyPath, catalog: Catalog
-) -> Iterator[Part]:
-    sensors = candidate_sensors(spec, stage, name, catalog)
-    for identity, sensor in sensors:
-        yield at, f"sensor {identity}", sensor
-    methods = timestamping_of(spec, stage, role, catalog)
-    for identity, method in () if isinstance(methods, InlineTimestamping) else methods:
-        if any(usable_primitives(s, method, role.primitive) for _, s in sensors):
-            yield at, f"timestamping method {identity}", method
-            yield from _hardware(at, method.requires, catalog)
+def _role_parts(case: Case, at: KeyPath, role: RoleCase) -> Iterator[Part]:
+    for one in role.sensors:
+        yield at, f"sensor {one.id}", one.entry
+    for method in role.methods:
+        pinned = role.choice.primitive
+        if any(usable_primitives(one.entry, method.entry, pinned) for one in role.sensors):
+            yield at, f"timestamping method {method.id}", method.entry
+            yield from _hardware(case, at, method.entry.requires)
 
 
-def _hardware(at: KeyPath, requires: dict[str, int], catalog: Catalog) -> Iterator[Part]:
-    for identity, entry in infrastructure_of(requires, catalog):
-        yield at, f"shared hardware {identity}", entry
+def _hardware(case: Case, at: KeyPath, requires: Iterable[str]) -> Iterator[Part]:
+    for identity in requires:
+        yield at, f"shared hardware {identity}", case.hardware[identity].entry
 
 
-def currency_problems(document: Document, spec: Spec, catalog: Catalog) -> list[Problem]:
+def currency_problems(document: Document, case: Case) -> list[Problem]:
     """Amounts in a currency that the spec gives no rate for."""
-    problems = []
-    for path, what, amount in _amounts(spec, catalog):
+    spec, problems = case.spec, []
+    for path, what, amount in _amounts(case):
         if not spec.can_convert(amount):
             code = amount.currency
             hint = f"add exchange_rates: {{{code}: RATE {spec.currency}}}"
@@ -263,88 +233,68 @@ def currency_problems(document: Document, spec: Spec, catalog: Catalog) -> list[
     return problems
 
 
-def _amounts(spec: Spec, catalog: Catalog) -> Iterable[tuple[KeyPath, str, Quantity]]:
-    for index, requirement in enumerate(spec.requirements):
+def _amounts(case: Case) -> Iterable[tuple[KeyPath, str, Quantity]]:
+    for index, requirement in enumerate(case.spec.requirements):
         if requirement.kind == "cost" and isinstance(requirement.limit, Quantity):
             yield ("requirements", index, "limit"), "a limit", requirement.limit
-    for index, stage in enumerate(spec.stages):
-        for name in ROLE_NAMES:
-            role = stage.role(name)
-            query = role.candidates if role is not None else None
+    for stage in case.stages:
+        for role in stage.roles:
+            query = role.choice.candidates
             if isinstance(query, Query) and query.max_cost is not None:
-                at: KeyPath = ("stages", index, name, "candidates", "max_cost")
+                at: KeyPath = ("stages", stage.index, role.role, "candidates", "max_cost")
                 yield at, "a limit", query.max_cost
-    for path, label, entry in parts_in_use(spec, catalog):
+    for path, label, entry in parts_in_use(case):
         if entry.cost is not None:
             yield path, f"the cost of {label} is", entry.cost
 
 
-def names_candidates(spec: Spec) -> bool:
+def names_candidates(case: Case) -> bool:
     """Whether a spec lists what to choose from, however much of it can be used.
 
     A list with one method or clock means the same as its bare id; sensors say which they mean.
     """
     return any(
-        (stage.clock is not None and len(stage.clock.candidates) > 1)
-        or any(
-            (role := stage.role(name)) is not None
-            and (role.candidates is not None or _lists_methods(spec, stage, role))
-            for name in ROLE_NAMES
-        )
-        for stage in spec.stages
+        len(stage.clocks) > 1
+        or any(one.choice.candidates is not None or len(one.methods) > 1 for one in stage.roles)
+        for stage in case.stages
     )
 
 
-def _lists_methods(spec: Spec, stage: StageChoice, role: RoleChoice) -> bool:
-    """Whether the timestamping in force for a role names several methods."""
-    choice = role.timestamping or stage.timestamping or spec.timestamping
-    return not role.is_empty and isinstance(choice, MethodChoice) and len(choice.candidates) > 1
-
-
-def is_open(spec: Spec, catalog: Catalog) -> bool:
+def is_open(case: Case) -> bool:
     """Whether anything is left to choose."""
-    for stage in spec.stages:
-        if len(clocks_of(stage, catalog)) > 1:
-            return True
-        for name in ROLE_NAMES:
-            role = stage.role(name)
-            if (
-                role is not None
-                and not role.is_empty
-                and _has_options(spec, stage, name, role, catalog)
-            ):
-                return True
-    return False
+    return any(
+        len(stage.clocks) > 1 or any(_has_options(role) for role in stage.roles)
+        for stage in case.stages
+    )
 
 
-def _has_options(
-    spec: Spec, stage: StageChoice, name: Role, role: RoleChoice, catalog: Catalog
-) -> bool:
-    sensors = candidate_sensors(spec, stage, name, catalog)
-    if len(sensors) > 1:
+def _has_options(role: RoleCase) -> bool:
+    if len(role.sensors) > 1:
         return True
-    methods = timestamping_of(spec, stage, role, catalog)
-    if isinstance(methods, InlineTimestamping):
-        return False
-    pairs = (usable_primitives(s, m, role.primitive) for _, s in sensors for _, m in methods)
+    pairs = (
+        usable_primitives(one.entry, method.entry, role.choice.primitive)
+        for one in role.sensors
+        for method in role.methods
+    )
     return sum(len(primitives) for primitives in pairs) > 1
 
 
-def missing_figures(document: Document, spec: Spec, catalog: Catalog) -> list[Problem]:
+def missing_figures(document: Document, case: Case) -> list[Problem]:
     """Costs, masses and powers that a requirement or the objective needs and a catalog lacks."""
+    spec = case.spec
     needed: dict[str, str] = {
         r.kind: f"requirement {r.id}"
         for r in spec.requirements
         if r.kind in ("cost", "mass", "power")
     }
-    if spec.objective != "error" and is_open(spec, catalog):
+    if spec.objective != "error" and is_open(case):
         needed.setdefault(spec.objective, f"objective: {spec.objective}")
     return [
         problem_at(
             document, path, f"{label} has no {figure}", f"a {figure}, needed by {reason}",
             hint="give the entry one, or drop it from the candidates",
         )
-        for path, label, entry in parts_in_use(spec, catalog)
+        for path, label, entry in parts_in_use(case)
         for figure, reason in sorted(needed.items())
         if getattr(entry, figure) is None
     ]  # fmt: skip

@@ -15,8 +15,9 @@ from typing import Any
 
 from syncline_design import __version__
 from syncline_design.machine.input_files import ReplacedInputError, noting
+from syncline_design.spec.case import Case
 from syncline_design.spec.keys import plain
-from syncline_design.spec.load import BadInput, Case, without_simulated
+from syncline_design.spec.load import BadInput, without_simulated
 from syncline_design.spec.yaml_text import Problem
 from syncline_design.studies.inputs import inputs_of
 from syncline_design.studies.loading import Base, Study

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design.machine.input_files import note_read
+from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import MOST_PATH, Collection, fill_empirical, problem_at
 from syncline_design.spec.keys import CATALOG, KeyPathError, label, plain, put, resolve, value_at
-from syncline_design.spec.load import BadInput, Case, catalogs_of, load_document
+from syncline_design.spec.load import BadInput, catalogs_of, load_document
 from syncline_design.spec.references import unknown_ids
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate

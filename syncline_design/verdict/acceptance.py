@@ -31,8 +31,9 @@ from syncline_design.model.timing import (
 )
 from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.simulation.run import DEFAULT_CAP
+from syncline_design.spec.case import Case
 from syncline_design.spec.known_effects import effect_entries
-from syncline_design.spec.load import BadInput, Case, Problem
+from syncline_design.spec.load import BadInput, Problem
 from syncline_design.spec.spec import Requirement
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor

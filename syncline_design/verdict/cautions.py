@@ -10,8 +10,8 @@ from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
 from syncline_design.simulation.ensemble import outside_words
+from syncline_design.spec.case import Case
 from syncline_design.spec.gnss import has_gnss
-from syncline_design.spec.load import Case
 from syncline_design.verdict.tree import Assumption, Caution
 from syncline_design.verdict.verified import Verified
 

@@ -9,7 +9,7 @@ from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem, ResourceName
 from syncline_design.machine.deadline import Pieces
-from syncline_design.spec.load import Case
+from syncline_design.spec.case import Case
 from syncline_design.spec.references import parts_in_use
 from syncline_design.verdict.design_data import design_json
 from syncline_design.verdict.open_choice import Picked
@@ -136,7 +136,7 @@ def left_out(case: Case, problem: Problem, resource: ResourceName) -> list[str]:
         usable |= {f"sensor {option.sensor}", f"timestamping method {option.method}"}
     return [
         label
-        for _, label, entry in parts_in_use(case.spec, case.catalog)
+        for _, label, entry in parts_in_use(case)
         if label in usable and getattr(entry, resource) is None
     ]
 

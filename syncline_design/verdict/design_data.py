@@ -11,9 +11,8 @@ from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_op
 from syncline_design.choice.table import Design, Option, Problem
 from syncline_design.model.budget import Budget, SensorRow
 from syncline_design.model.quantity import Quantity
+from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import Entry
-from syncline_design.spec.load import Case
-from syncline_design.spec.resolve import candidate_sensors, platform_of
 from syncline_design.verdict.tree import Assumption, Source, finite
 
 Json = dict[str, Any]
@@ -46,35 +45,33 @@ def design_json(case: Case, problem: Problem, design: Design, figures: Budget) -
         "clocks": _clocks(case, problem, design),
         "stages": [
             {
-                "name": stage.name,
-                "vehicle": stage.vehicle_name,
-                "platform": stage.platform.use or stage.platform.name or stage.name,
-                "roles": dict(_roles(case, problem, design, index, rows)),
+                "name": stage.choice.name,
+                "vehicle": stage.choice.vehicle_name,
+                "platform": stage.platform.id,
+                "roles": dict(_roles(stage, problem, design, rows)),
             }
-            for index, stage in enumerate(case.spec.stages)
+            for stage in case.stages
         ],
     }
 
 
 def _roles(
-    case: Case,
+    stage: StageCase,
     problem: Problem,
     design: Design,
-    stage: int,
     rows: Mapping[tuple[str, Any], SensorRow],
 ) -> Iterator[tuple[str, Json]]:
     for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
-        if table.stage == stage:
-            row = rows[table.stage_name, table.role]
-            yield table.role, _role(case, stage, table.role, option, row)
+        role = stage.role(table.role)
+        if table.stage == stage.index and role is not None:
+            yield table.role, _role(role, option, rows[table.stage_name, table.role])
 
 
-def _role(case: Case, stage: int, role: Any, option: Option, row: SensorRow) -> Json:
-    sensors = dict(candidate_sensors(case.spec, case.spec.stages[stage], role, case.catalog))
-    method = case.catalog.timestamping.get(option.method)
+def _role(role: RoleCase, option: Option, row: SensorRow) -> Json:
+    sensor, method = role.sensor(option.sensor), role.method(option.method)
     return {
         "sensor": option.sensor,
-        "name": sensors[option.sensor].name or option.sensor,
+        "name": (sensor.name if sensor is not None else "") or option.sensor,
         "primitive": option.primitive,
         "timestamping": option.method,
         "timestamping_name": method.name if method is not None else "given in the spec",
@@ -97,7 +94,7 @@ def _shared(case: Case, problem: Problem, sums: Evaluation) -> list[Json]:
         found.append(
             {
                 "id": item.id,
-                "name": case.catalog.infrastructure[item.id].name or item.id,
+                "name": case.hardware[item.id].entry.name or item.id,
                 "vehicle": problem.vehicles[units.vehicle].name,
                 "count": units.count,
                 "cost": None if cost is None else float(cost * units.count),
@@ -111,35 +108,35 @@ def _clocks(case: Case, problem: Problem, design: Design) -> list[Json]:
         {
             "vehicle": vehicle.name,
             "id": clock.id,
-            "name": case.catalog.clocks[clock.id].name or clock.id,
+            "name": entry.name or clock.id,
             "offset_bound_s": clock.offset_bound_s,
             "cost": number(clock.resources.cost),
         }
         for vehicle, clock in zip(problem.vehicles, chosen_clocks(problem, design), strict=True)
-        if clock.id is not None
+        if (entry := case.clock(vehicle.name, clock.id)) is not None
     ]
 
 
 def used_entries(case: Case, problem: Problem, design: Design) -> list[UsedEntry]:
     """Every catalog entry a design rests on, each once: platforms, sensors, methods, hardware."""
-    spec, catalog = case.spec, case.catalog
-    found: dict[tuple[str, str], Entry] = {}
-    for stage in spec.stages:
-        name = stage.platform.use or stage.platform.name or stage.name
-        found["platforms", name] = platform_of(stage.platform, catalog)
+    found: dict[tuple[str, str], Entry | None] = {
+        ("platforms", stage.platform.id): stage.platform.entry for stage in case.stages
+    }
     for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
-        stage = spec.stages[table.stage]
-        sensors = dict(candidate_sensors(spec, stage, table.role, catalog))
-        found["sensors", option.sensor] = sensors[option.sensor]
-        if option.method in catalog.timestamping:
-            found["timestamping", option.method] = catalog.timestamping[option.method]
+        role = case.stages[table.stage].role(table.role)
+        assert role is not None
+        found["sensors", option.sensor] = role.sensor(option.sensor)
+        found["timestamping", option.method] = role.method(option.method)
     for units in evaluate(problem, design).units:
         identity = problem.infrastructure[units.infrastructure].id
-        found["infrastructure", identity] = catalog.infrastructure[identity]
-    for clock in chosen_clocks(problem, design):
-        if clock.id is not None:
-            found["clocks", clock.id] = catalog.clocks[clock.id]
-    return [UsedEntry(section, identity, entry) for (section, identity), entry in found.items()]
+        found["infrastructure", identity] = case.hardware[identity].entry
+    for vehicle, clock in zip(problem.vehicles, chosen_clocks(problem, design), strict=True):
+        found["clocks", clock.id or ""] = case.clock(vehicle.name, clock.id)
+    return [
+        UsedEntry(section, identity, entry)
+        for (section, identity), entry in found.items()
+        if entry is not None
+    ]
 
 
 def assumptions(entries: list[UsedEntry]) -> tuple[Assumption, ...]:

@@ -26,11 +26,9 @@ from syncline_design.choice.tolerance import (
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_force, within
 from syncline_design.machine.records import json_of
+from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned_spec_text
-from syncline_design.spec.load import Case
-from syncline_design.spec.resolve import timestamping_of
 from syncline_design.spec.selection import RoleSelection
-from syncline_design.spec.spec import InlineTimestamping
 from syncline_design.spec.yaml_text import printable
 from syncline_design.verdict.acceptance import MOST_SIMULATED, Simulations
 from syncline_design.verdict.choice_data import (
@@ -379,7 +377,7 @@ def pinned_text(case: Case, problem: Problem, design: Design) -> str:
     """The spec with a design pinned, for `--write-design`."""
     selected = selection_of(problem, design)
     index = {stage.name: i for i, stage in enumerate(case.spec.stages)}
-    roles = [_pinned(case, index[one.stage], one) for one in selected.roles]
+    roles = [_pinned(case.stages[index[one.stage]], one) for one in selected.roles]
     clocks = {
         i: identity
         for i, stage in enumerate(case.spec.stages)
@@ -388,12 +386,10 @@ def pinned_text(case: Case, problem: Problem, design: Design) -> str:
     return pinned_spec_text(case, roles, clocks)
 
 
-def _pinned(case: Case, index: int, one: RoleSelection) -> PinnedRole:
+def _pinned(stage: StageCase, one: RoleSelection) -> PinnedRole:
     """What to write for one role; an error given in place stays, with its primitive if it has."""
-    stage = case.spec.stages[index]
-    choice = stage.role(one.role)
-    assert choice is not None
-    stamping = timestamping_of(case.spec, stage, choice, case.catalog)
-    if isinstance(stamping, InlineTimestamping):
-        return PinnedRole(index, one.role, one.sensor)
-    return PinnedRole(index, one.role, one.sensor, one.primitive, one.method)
+    role = stage.role(one.role)
+    assert role is not None
+    if role.inline is not None:
+        return PinnedRole(stage.index, one.role, one.sensor)
+    return PinnedRole(stage.index, one.role, one.sensor, one.primitive, one.method)

@@ -19,10 +19,8 @@ from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from typing import Any, Literal
 
-from syncline_design.spec.load import Case
-from syncline_design.spec.resolve import candidate_sensors, platform_of, timestamping_of
+from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.selection import Role, RoleSelection, Selection
-from syncline_design.spec.spec import InlineTimestamping, StageChoice
 from syncline_design.verdict.recheck_facts import impossible
 
 DIGITS = 60
@@ -113,8 +111,7 @@ def _recheck(
     systematic: Sequence[tuple[str, str, float]],
 ) -> Recheck:
     chosen = _all_chosen(case, selection, extra)
-    stages = case.spec.stages
-    moves = {stage.name: _moves(case, stage, chosen) for stage in stages}
+    moves = {stage.choice.name: _moves(stage, chosen) for stage in case.stages}
     rate = sum((v + turning for v, turning, _ in moves.values()), Decimal(0))
     meets = list(_meetings(case, selection, chosen, moves))
     tau_sys = max((bound for bound, _ in meets), default=Decimal(0))
@@ -164,46 +161,40 @@ def _all_chosen(
 ) -> dict[tuple[str, Role], _Chosen]:
     """Entries of every role that the spec fills, in its order."""
     out: dict[tuple[str, Role], _Chosen] = {}
-    for stage in case.spec.stages:
-        for role in ("position", "attitude", "ranging"):
-            choice = stage.role(role)
-            if choice is None or choice.is_empty:
-                continue
-            picked = selection.role(stage.name, role)
+    for stage in case.stages:
+        for role in stage.roles:
+            name = stage.choice.name
+            picked = selection.role(name, role.role)
             if picked is None:
-                raise NotADesign(f"nothing is chosen for {role} of {stage.name}")
-            out[stage.name, role] = _chosen(case, stage, picked, extra)
+                raise NotADesign(f"nothing is chosen for {role.role} of {name}")
+            out[name, role.role] = _chosen(case, stage, role, picked, extra)
     return out
 
 
 def _chosen(
     case: Case,
-    stage: StageChoice,
+    stage: StageCase,
+    role: RoleCase,
     picked: RoleSelection,
     extra: Mapping[tuple[str, Role], float],
 ) -> _Chosen:
-    spec, catalog = case.spec, case.catalog
-    choice = stage.role(picked.role)
-    assert choice is not None
-    sensor = dict(candidate_sensors(spec, stage, picked.role, catalog)).get(picked.sensor)
-    if sensor is None or choice.primitive not in (None, picked.primitive):
-        raise NotADesign(f"{picked.sensor} by {picked.primitive} is not open to {stage.name}")
-    stamping = timestamping_of(spec, stage, choice, catalog)
+    name, pinned = stage.choice.name, role.choice.primitive
+    sensor = role.sensor(picked.sensor)
+    if sensor is None or pinned not in (None, picked.primitive):
+        raise NotADesign(f"{picked.sensor} by {picked.primitive} is not open to {name}")
     method: Any = None
-    if isinstance(stamping, InlineTimestamping):
-        if choice.primitive is not None and choice.primitive not in (
-            "arrival",
-            *sensor.primitives,
-        ):
-            raise NotADesign(f"{picked.sensor} cannot be stamped by {choice.primitive}")
-        error, timeline = stamping.error, stamping.timeline
+    if role.inline is not None:
+        if pinned is not None and pinned not in ("arrival", *sensor.primitives):
+            raise NotADesign(f"{picked.sensor} cannot be stamped by {pinned}")
+        error, timeline = role.inline.error, role.inline.timeline
     else:
-        method = dict(stamping).get(picked.method)
+        method = role.method(picked.method)
         if method is None or not _serves(method.primitives, sensor.primitives, picked.primitive):
             raise NotADesign(f"{picked.method} cannot stamp {picked.sensor} by {picked.primitive}")
         error, timeline = method.error, method.timeline
-    tau = _bound(error, spec.coverage_factor) + Decimal(extra.get((stage.name, picked.role), 0.0))
-    host = stage.vehicle or stage.name
+    tau = _bound(error, case.spec.coverage_factor)
+    tau += Decimal(extra.get((name, picked.role), 0.0))
+    host = stage.choice.vehicle or name
     return _Chosen(
         picked, sensor, error, method, "utc" if timeline == "utc" else f"host {host}", tau
     )
@@ -241,9 +232,9 @@ _Moment = tuple[str, Decimal]  # timeline of a stamp, bound of its error against
 _TRUE_TIME: _Moment = ("utc", Decimal(0))
 
 
-def _moves(case: Case, stage: StageChoice, chosen: Mapping[tuple[str, Role], _Chosen]) -> Moves:
-    platform = platform_of(stage.platform, case.catalog)
-    if (stage.name, "ranging") not in chosen:
+def _moves(stage: StageCase, chosen: Mapping[tuple[str, Role], _Chosen]) -> Moves:
+    platform = stage.platform.entry
+    if (stage.choice.name, "ranging") not in chosen:
         return _decimal(platform.v_max), Decimal(0), Decimal(0)
     distance = _decimal(platform.distance)
     return _decimal(platform.v_max), distance * _decimal(platform.omega_max), distance
@@ -330,7 +321,7 @@ def _clock(case: Case, selection: Selection, vehicle: str) -> Any:
     picked = selection.clock(vehicle)
     if (picked is None) != (not offered) or (picked is not None and picked not in offered):
         raise NotADesign(f"{picked or 'no clock'} is not open to vehicle {vehicle}")
-    return None if picked is None else case.catalog.clocks[picked]
+    return case.clock(vehicle, picked)
 
 
 def _amount(
@@ -357,7 +348,7 @@ def _amount(
             for item, count in clock.requires.items():
                 channels[vehicle, item] = channels.get((vehicle, item), 0) + count
     for (_, item), count in channels.items():
-        entry = case.catalog.infrastructure[item]
+        entry = case.hardware[item].entry
         bought.append((entry, (count + entry.channels - 1) // entry.channels))
     amounts = [(getattr(entry, name), count) for entry, count in bought]
     if any(amount is None for amount, _ in amounts):

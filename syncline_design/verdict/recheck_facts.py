@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from syncline_design.spec.load import Case
+from syncline_design.spec.case import Case
 from syncline_design.spec.selection import Selection
 
 # Types of sensors that receive GNSS: parts of words, ends of words, the rest as whole words.
@@ -29,25 +29,24 @@ def impossible(case: Case, selection: Selection) -> list[str]:
 
 def _sensors_and_methods(case: Case, selection: Selection) -> Iterator[str]:
     received, timed = _received(case), _timed(case)
-    stages = {stage.name: stage for stage in case.spec.stages}
+    stages = {stage.choice.name: stage for stage in case.stages}
     for one in selection.roles:
-        choice = stages[one.stage].role(one.role)
-        given: Any = getattr(choice, "sensor", None)
-        sensor = given if hasattr(given, "modality") else case.catalog.sensors[one.sensor]
+        role: Any = stages[one.stage].role(one.role)
+        sensor, method = role.sensor(one.sensor), role.method(one.method)
         listens = _asks(sensor) or RECEIVER.search(sensor.type.casefold()) is not None
         if listens and one.stage not in received:
             yield f"{one.sensor} ({one.role} of {one.stage}) needs GNSS, {one.stage} has none"
-        if hasattr(getattr(choice, "timestamping", None), "error"):
+        if role.inline is not None:
             continue  # an error given in place names no method
-        follows = _asks_with_hardware(case, case.catalog.timestamping[one.method])
-        if follows and one.stage not in timed:
+        if _asks_with_hardware(case, method) and one.stage not in timed:
             yield f"{one.method} ({one.role} of {one.stage}) needs GNSS time, there is none"
 
 
 def _clocks(case: Case, selection: Selection) -> Iterator[str]:
     timed = _timed(case)
     for one in selection.clocks:
-        if one.id is None or not _asks_with_hardware(case, case.catalog.clocks[one.id]):
+        clock = case.clock(one.vehicle, one.id)
+        if clock is None or not _asks_with_hardware(case, clock):
             continue
         aboard = {s.name for s in case.spec.stages if (s.vehicle or s.name) == one.vehicle}
         if not aboard & timed:
@@ -79,5 +78,5 @@ def _asks(entry: Any) -> bool:
 
 
 def _asks_with_hardware(case: Case, entry: Any) -> bool:
-    hardware = case.catalog.infrastructure
-    return _asks(entry) or any(_asks(hardware[name]) for name in entry.requires)
+    hardware = (case.hardware[name].entry for name in entry.requires)
+    return _asks(entry) or any(_asks(one) for one in hardware)

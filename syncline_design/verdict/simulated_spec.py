@@ -8,8 +8,8 @@ from syncline_design.choice.chosen_system import system_of
 from syncline_design.model.system import System
 from syncline_design.simulation import Simulation, SimulationError, simulate
 from syncline_design.simulation.results import SpecContent, SpecName
+from syncline_design.spec.case import Case
 from syncline_design.spec.known_effects import effect_entries
-from syncline_design.spec.load import Case
 from syncline_design.verdict.acceptance import refuse_trajectory, simulation_settings
 from syncline_design.verdict.verify import picked_design
 

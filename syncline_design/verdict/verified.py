@@ -12,10 +12,9 @@ from syncline_design.model.budget import Budget, SyncModelName
 from syncline_design.model.system import System
 from syncline_design.simulation import MonteCarlo, SimulationError
 from syncline_design.simulation.certified import certified_worst_case_m
+from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.known_effects import describe
-from syncline_design.spec.load import BadInput, Case, Problem
-from syncline_design.spec.resolve import platform_of
-from syncline_design.spec.spec import StageChoice
+from syncline_design.spec.load import BadInput, Problem
 from syncline_design.verdict.recheck import Recheck
 from syncline_design.verdict.tree import (
     ErrorFigures,
@@ -141,19 +140,18 @@ def _spec_frame(case: Case, problem: DesignProblem | None) -> SpecFrame:
             if len(table.options) + len(table.excluded) > 1
         ),
         combinations=None if problem is None else str(problem.combinations),
-        stages=tuple(_stage_frame(case, stage) for stage in spec.stages),
+        stages=tuple(_stage_frame(stage) for stage in case.stages),
     )
 
 
-def _stage_frame(case: Case, stage: StageChoice) -> StageFrame:
-    platform = platform_of(stage.platform, case.catalog)
-    identity = stage.platform.use or stage.platform.name or stage.name
+def _stage_frame(stage: StageCase) -> StageFrame:
+    platform = stage.platform.entry
     return StageFrame(
-        stage.name,
-        stage.vehicle_name,
+        stage.choice.name,
+        stage.choice.vehicle_name,
         PlatformFigures(
-            identity,
-            platform.name or identity,
+            stage.platform.id,
+            platform.name or stage.platform.id,
             float(platform.v_max),
             float(platform.omega_max),
             float(platform.distance),

@@ -20,8 +20,9 @@ from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
 from syncline_design.simulation import CrossCheck, Decision, SimulationError, cross_check, decide
+from syncline_design.spec.case import Case
 from syncline_design.spec.known_effects import effect_entries
-from syncline_design.spec.load import BadInput, Case, Problem, load
+from syncline_design.spec.load import BadInput, Problem, load
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.spec import Requirement
 from syncline_design.verdict.acceptance import (
@@ -138,7 +139,7 @@ def _sole_verdict(
 
     everything, design = sole
     verified = verify(case, everything, design, settings)
-    if verified.word == "fails" and names_candidates(case.spec):
+    if verified.word == "fails" and names_candidates(case):
         return _infeasible(case, problem, settings, build)
     return _verdict(case, everything, verified, settings, excluded_json(problem))
 

@@ -1,0 +1,280 @@
+"""A case: a spec looked up in its catalogs, once.
+
+Who works with a spec takes what a stage, a role or a vehicle may use from here and asks no catalog
+again.  A what-if (`replace(case, spec=...)`, `replace(case, catalog=...)`) is a case of its own,
+looked up anew as it is made, so that what was found never lags behind what was asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from syncline_design.machine.input_files import FileContent, FileRead
+from syncline_design.model.known import EffectEntry
+from syncline_design.model.quantity import Quantity
+from syncline_design.spec.catalog import (
+    Catalog,
+    ClockEntry,
+    Entry,
+    InfrastructureEntry,
+    PlatformEntry,
+    Primitive,
+    SensorEntry,
+    TimestampingEntry,
+)
+from syncline_design.spec.spec import (
+    ROLE_NAMES,
+    InlineTimestamping,
+    PlatformChoice,
+    Query,
+    Requirement,
+    Role,
+    RoleChoice,
+    Spec,
+    StageChoice,
+)
+from syncline_design.spec.yaml_text import KeyPath, Position
+
+E = TypeVar("E", bound=Entry)
+Origins = Mapping[tuple[str, str], str]  # (section, id) to file:line:column
+IN_PLACE = "spec"  # origin of what the spec itself gives
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate(Generic[E]):
+    """An entry that a design may use; origin: `file:line:column` that defines it."""
+
+    id: str
+    entry: E
+    origin: str = IN_PLACE
+
+
+@dataclass(frozen=True, slots=True)
+class RoleCase:
+    """What may take one role, in the order of the spec (of the catalog for a query).
+
+    inline: a timestamp error given in place; there are no methods then.
+    """
+
+    role: Role
+    choice: RoleChoice
+    sensors: tuple[Candidate[SensorEntry], ...]
+    methods: tuple[Candidate[TimestampingEntry], ...]
+    inline: InlineTimestamping | None
+
+    def sensor(self, identity: str) -> SensorEntry | None:
+        """The candidate sensor of that id."""
+        return _named(self.sensors, identity)
+
+    def method(self, identity: str) -> TimestampingEntry | None:
+        """The candidate method of that id."""
+        return _named(self.methods, identity)
+
+
+@dataclass(frozen=True, slots=True)
+class StageCase:
+    """One stage with its platform, the roles that sensors take, and the clocks it offers."""
+
+    index: int
+    choice: StageChoice
+    platform: Candidate[PlatformEntry]
+    roles: tuple[RoleCase, ...]
+    clocks: tuple[Candidate[ClockEntry], ...]
+
+    def role(self, name: Role) -> RoleCase | None:
+        """One role; None where no sensor takes it."""
+        return next((one for one in self.roles if one.role == name), None)
+
+
+@dataclass(frozen=True, slots=True)
+class Case:
+    """A spec that can be worked with: its catalogs merged, every reference found.
+
+    positions: key path, as in ("requirements", 0, "limit"), to (line, column); origins: where each
+    catalog entry is defined; files: what was read besides.  Looked up as the case is made: stages,
+    hardware (shared, of all that may be used, in the order of the catalogs) and effects (known).
+    """
+
+    spec: Spec
+    catalog: Catalog
+    path: Path
+    positions: dict[KeyPath, Position] = field(repr=False)
+    spec_sha256: str
+    catalogs_sha256: str
+    text: str = field(repr=False)
+    origins: Origins = field(repr=False)
+    builtin: bool = True
+    files: tuple[FileRead, ...] = ()
+    trajectory: FileContent | None = None
+    stages: tuple[StageCase, ...] = field(init=False, repr=False)
+    hardware: Mapping[str, Candidate[InfrastructureEntry]] = field(init=False, repr=False)
+    effects: tuple[EffectEntry, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        stages = tuple(_stage(self, index) for index in range(len(self.spec.stages)))
+        object.__setattr__(self, "stages", stages)
+        object.__setattr__(self, "hardware", _hardware(self, stages))
+        object.__setattr__(self, "effects", _effects(self.spec))
+
+    def place(self, path: KeyPath) -> str:
+        """`file:line:column` of a key path, or of the nearest thing around it."""
+        for length in range(len(path), -1, -1):
+            if path[:length] in self.positions:
+                line, column = self.positions[path[:length]]
+                return f"{self.path}:{line}:{column}"
+        return str(self.path)
+
+    def limit(self, requirement: Requirement) -> Fraction:
+        """A requirement's limit exactly, in SI or in the spec's currency."""
+        limit = requirement.limit
+        if not isinstance(limit, Quantity):
+            return Fraction(limit)
+        return self.spec.in_currency(limit) if requirement.kind == "cost" else limit.exact
+
+    def clocks(self, vehicle: str) -> tuple[Candidate[ClockEntry], ...]:
+        """Clock disciplines that a vehicle's host may have; its stages agree on them."""
+        aboard = (one for one in self.stages if one.choice.vehicle_name == vehicle)
+        return next((one.clocks for one in aboard if one.clocks), ())
+
+    def clock(self, vehicle: str, identity: str | None) -> ClockEntry | None:
+        """A vehicle's clock of that id; None: its timelines are taken as common."""
+        return _named(self.clocks(vehicle), identity)
+
+
+def _named(candidates: tuple[Candidate[E], ...], identity: str | None) -> E | None:
+    return next((one.entry for one in candidates if one.id == identity), None)
+
+
+def _stage(case: Case, index: int) -> StageCase:
+    choice, catalog, origins = case.spec.stages[index], case.catalog, case.origins
+    named = choice.clock.candidates if choice.clock is not None else ()
+    return StageCase(
+        index,
+        choice,
+        _platform(choice, catalog, origins),
+        tuple(
+            _role(case, choice, name, role)
+            for name in ROLE_NAMES
+            if (role := choice.role(name)) is not None and not role.is_empty
+        ),
+        tuple(
+            Candidate(one, catalog.clocks[one], origins.get(("clocks", one), "")) for one in named
+        ),
+    )
+
+
+def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candidate[PlatformEntry]:
+    """The platform with the spec's keys put over the catalog's."""
+    choice: PlatformChoice = stage.platform
+    own = {
+        key: value
+        for key in ("name", "v_max", "omega_max", "distance", "baseline", "source")
+        if (value := getattr(choice, key)) is not None
+    }
+    if choice.use is None:
+        return Candidate(choice.name or stage.name, PlatformEntry.model_validate(own))
+    entry = catalog.platforms[choice.use].model_copy(update=own)
+    return Candidate(choice.use, entry, origins.get(("platforms", choice.use), ""))
+
+
+def _role(case: Case, stage: StageChoice, name: Role, choice: RoleChoice) -> RoleCase:
+    """Candidates of a role; timestamping is its own, else the stage's, else the spec's."""
+    stamping = choice.timestamping or stage.timestamping or case.spec.timestamping
+    inline = stamping if isinstance(stamping, InlineTimestamping) else None
+    methods: tuple[str, ...] = ()
+    if isinstance(stamping, str):
+        methods = (stamping,)
+    elif stamping is not None and not isinstance(stamping, InlineTimestamping):
+        methods = stamping.candidates
+    listed = case.catalog.timestamping
+    return RoleCase(
+        name,
+        choice,
+        _sensors(case, stage, name, choice),
+        tuple(
+            Candidate(one, listed[one], case.origins.get(("timestamping", one), ""))
+            for one in methods
+        ),
+        inline,
+    )
+
+
+def _sensors(
+    case: Case, stage: StageChoice, role: Role, choice: RoleChoice
+) -> tuple[Candidate[SensorEntry], ...]:
+    if isinstance(choice.sensor, SensorEntry):  # named by itself, or by stage and role
+        return (Candidate(choice.sensor.name or f"{stage.name}.{role}", choice.sensor),)
+    listed = case.catalog.sensors
+    named: tuple[str, ...]
+    if isinstance(choice.sensor, str):
+        named = (choice.sensor,)
+    elif isinstance(choice.candidates, Query):
+        query = choice.candidates
+        named = tuple(n for n, entry in listed.items() if matches(query, entry, role, case.spec))
+    else:
+        named = choice.candidates or ()
+    return tuple(
+        Candidate(one, listed[one], case.origins.get(("sensors", one), "")) for one in named
+    )
+
+
+def matches(query: Query, entry: SensorEntry, role: Role, spec: Spec) -> bool:
+    """Whether a sensor answers a query; it has to suit the role in any case."""
+    if entry.modality != role or query.modality not in (None, entry.modality):
+        return False
+    if query.type is not None and query.type != entry.type:
+        return False
+    if query.max_cost is None or entry.cost is None:
+        return query.max_cost is None
+    if not spec.can_convert(query.max_cost) or not spec.can_convert(entry.cost):
+        return True  # loading says that a rate is missing
+    return spec.in_currency(entry.cost) <= spec.in_currency(query.max_cost)
+
+
+def _hardware(
+    case: Case, stages: tuple[StageCase, ...]
+) -> Mapping[str, Candidate[InfrastructureEntry]]:
+    """Shared hardware that a candidate method or clock requires."""
+    methods = (one.entry for stage in stages for role in stage.roles for one in role.methods)
+    required = {name for method in methods for name in method.requires}
+    required |= {name for stage in stages for one in stage.clocks for name in one.entry.requires}
+    return {
+        name: Candidate(name, entry, case.origins.get(("infrastructure", name), ""))
+        for name, entry in case.catalog.infrastructure.items()
+        if name in required
+    }
+
+
+def _effects(spec: Spec) -> tuple[EffectEntry, ...]:
+    """Known effects where they act: unless it says so, in the only stage, or on the last target."""
+    first, last = spec.stages[0].name, spec.stages[-1].name
+    return tuple(
+        EffectEntry(
+            one.effect,
+            one.sensor,
+            one.stage or (last if one.sensor == "target" else first),
+            tuple(
+                (name, value if isinstance(value, str) else float(value))
+                for name, value in one.parameters.items()
+            ),
+        )
+        for one in spec.effects
+    )
+
+
+def usable_primitives(
+    sensor: SensorEntry, method: TimestampingEntry, pinned: Primitive | None = None
+) -> tuple[Primitive, ...]:
+    """Primitives by which a method can stamp a sensor, in the sensor's order; arrival last.
+
+    (sensor primitives + arrival) that the method serves.  With a pinned primitive only that one;
+    a method of arrival stamps any sensor, whatever signal it could send besides.
+    """
+    if pinned is None:
+        return tuple(p for p in sensor.serves if p in method.primitives)
+    served = pinned in method.primitives or "arrival" in method.primitives
+    return (pinned,) if pinned in sensor.serves and served else ()
