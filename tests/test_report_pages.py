@@ -12,7 +12,7 @@ import pytest
 
 import report_samples as samples
 from html_page import Page
-from syncline_design.paper.figures import Comparison
+from syncline_design.paper.figures import SimulatedPoint
 from syncline_design.paper.reproduce import reproduce
 from syncline_design.report import numbers
 from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
@@ -87,8 +87,10 @@ def test_reproduction_shows_printed_beside_computed() -> None:
 
 def test_reproduction_says_how_near_the_simulation_comes() -> None:
     result = samples.reproduction()
-    points = (Comparison(1e-3, 0.14, 0.14 / 0.965), Comparison(1e-2, 0.5, 0.5))
-    told = dataclasses.replace(result, comparisons={3: points})
+    points = (SimulatedPoint(1e-3, 0.14, 0.965), SimulatedPoint(1e-2, 0.5, 1.0))
+    figures = list(result.figures)
+    figures[2] = dataclasses.replace(figures[2], simulated=points)
+    told = dataclasses.replace(result, figures=tuple(figures))
     for text in (Page(html(on_paper(told))).text, console(on_paper(told)).replace(" %", "\u00a0%")):
         assert "96.5\u00a0% to 100\u00a0% of the Syncline" in text
 
@@ -96,7 +98,7 @@ def test_reproduction_says_how_near_the_simulation_comes() -> None:
 def test_a_failed_reproduction_says_so() -> None:
     result = samples.reproduction()
     wrong = dataclasses.replace(result.cells[0], status="differs", note="by much")
-    told = on_paper(dataclasses.replace(result, cells=(wrong, *result.cells[1:])))
+    told = on_paper(dataclasses.replace(result, cells=(wrong, *result.cells[1:]), ok=False))
     assert "Some printed figures differ" in Page(html(told)).text
     assert "\u2717 differs, by much" in console(told)
 

@@ -23,7 +23,6 @@ from syncline_design.paper.reproduce import (
     SCHEMA,
     Cell,
     Reproduction,
-    as_json,
     reproduce,
     tau_crit_cells,
 )
@@ -63,7 +62,7 @@ def with_sensor(catalog: Catalog, name: str, **figures: object) -> Catalog:
 
 
 def test_every_cell_of_the_paper_is_accounted_for(result: Reproduction) -> None:
-    assert len(tau_crit_cells(result)) == 46
+    assert len(tau_crit_cells(result.cells)) == 46
     assert len(result.cells) == 50  # and two system tau_crit, the survey roof, figure 1
     assert len(result.inputs) == 7 * 4 + 4 + 3 * 3 + 8 * 3
     assert result.ok
@@ -253,7 +252,7 @@ def test_text_says_the_counts_first_and_shows_every_cell(result: Reproduction) -
 
 
 def test_same_bytes_twice(catalog: Catalog, result: Reproduction) -> None:
-    assert json.dumps(as_json(reproduce(catalog))) == json.dumps(as_json(result))
+    assert json.dumps(reproduce(catalog).to_json()) == json.dumps(result.to_json())
 
 
 # Figures
@@ -312,7 +311,9 @@ def test_figures_use_the_papers_payloads(plotted: dict[int, Figure]) -> None:
 
 
 @pytest.mark.parametrize("number", [3, 7])
-def test_simulated_points_stay_near_the_syncline(result: Reproduction, number: int) -> None:
+def test_simulated_points_stay_near_the_syncline(
+    result: Reproduction, plotted: dict[int, Figure], number: int
+) -> None:
     """The paper finds no significant deviation.
 
     From above: lever arms of the baseline's length are in the simulation and not in the Syncline;
@@ -320,20 +321,21 @@ def test_simulated_points_stay_near_the_syncline(result: Reproduction, number: i
     (2 b omega per stage), and b sigma_Theta to the noise: the bound below.  From below: range noise
     is at a right angle to every bearing and attitude error, so terms cannot all line up.
     """
-    figure = next(f for f in result.figures if f.number == number)
-    system = figure.curves[0].system
+    (curve,) = plotted[number].curves
+    system = curve.system
     assert system is not None
     moving, noise = 0.0, 0.0
     for stage in system.stages:
         assert stage.attitude is not None
         moving += 2.0 * stage.platform.baseline_m * stage.platform.omega_max_radps
         noise += stage.platform.baseline_m * math.hypot(*stage.attitude.sigma)
-    points = result.comparisons[number]
+    points = next(f for f in result.figures if f.number == number).simulated
     assert len(points) == 13
-    for point in points:
+    for point, syncline_m in zip(points, curve.error_m([p.tau_s for p in points]), strict=True):
         lever = noise + moving * point.tau_s
-        assert 0.8 * point.syncline_m < point.worst_case_m < point.syncline_m + lever
-    assert len({round(point.ratio, 3) for point in points}) > 5
+        assert 0.8 * syncline_m < point.worst_case_m < syncline_m + lever
+        assert point.ratio_to_syncline == pytest.approx(point.worst_case_m / syncline_m)
+    assert len({round(point.ratio_to_syncline, 3) for point in points}) > 5
 
 
 def test_a_single_bearing_sigma_holds_for_both_axes(catalog: Catalog, result: Reproduction) -> None:

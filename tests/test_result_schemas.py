@@ -11,6 +11,7 @@ import jsonschema
 import pytest
 
 from syncline_design.machine.records import NotThisResultError, Record, read_as
+from syncline_design.paper.reproduce import Reproduction, reproduce
 from syncline_design.report.json_out import json_text
 from syncline_design.report.result_schemas import ResultName, result_schema
 from syncline_design.simulation import Simulation, SimulationSettings, simulate
@@ -36,7 +37,16 @@ def along_a_manoeuvre() -> Simulation:
     return simulate(fixed_wing(), settings)
 
 
+def reproduction() -> Reproduction:
+    return reproduce(seed=3)
+
+
+def reproduction_without_simulation() -> Reproduction:
+    return reproduce(simulate=False)
+
+
 REAL: Mapping[ResultName, tuple[Callable[[], Record], ...]] = {
+    "reproduction": (reproduction, reproduction_without_simulation),
     "simulation": (of_a_spec, with_few_samples, along_a_manoeuvre),
 }
 CASES = [(name, made) for name, all_made in REAL.items() for made in all_made]

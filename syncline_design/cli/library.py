@@ -47,9 +47,10 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 @guarded
 def schema(
     name: Annotated[
-        Literal["spec", "catalog", "study", "difference", "simulation"],
+        Literal["spec", "catalog", "study", "difference", "reproduction", "simulation"],
         typer.Argument(
-            help="A kind of file (spec, catalog, study) or of result (difference, simulation)."
+            help="A kind of file (spec, catalog, study) or of result (difference, reproduction, "
+            "simulation)."
         ),
     ],
 ) -> int:

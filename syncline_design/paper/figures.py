@@ -10,6 +10,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from syncline_design.machine.records import Record
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.model.horizon import Horizon
@@ -80,20 +81,51 @@ class Figure:
 
 
 @dataclass(frozen=True, slots=True)
-class Comparison:
-    """A simulated point of a figure: the worst case found at tau, beside the Syncline there."""
+class PlottedCurve(Record):
+    """One Syncline as numbers; error_m: at each tau of its figure."""
+
+    label: str
+    sensor_error_m: float
+    sync_rate_mps: float
+    tau_crit_s: float
+    error_m: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SimulatedPoint(Record):
+    """The worst case found at tau over the Syncline there.
+
+    The paper finds no significant deviation of the ratio from 1.
+    """
 
     tau_s: float
     worst_case_m: float
-    syncline_m: float
-
-    @property
-    def ratio(self) -> float:
-        """Worst case over Syncline; the paper finds no significant deviation from 1."""
-        return self.worst_case_m / self.syncline_m
+    ratio_to_syncline: float
 
 
-def compare(figure: Figure, points: int = 13, seed: int = 0) -> tuple[Comparison, ...]:
+@dataclass(frozen=True, slots=True)
+class PlottedFigure(Record):
+    """A figure of the paper as numbers; simulated: empty where there is no simulation beside it."""
+
+    number: int
+    title: str
+    note: str
+    tau_s: tuple[float, ...]
+    curves: tuple[PlottedCurve, ...]
+    simulated: tuple[SimulatedPoint, ...]
+
+
+def plotted(figure: Figure, simulated: tuple[SimulatedPoint, ...]) -> PlottedFigure:
+    """A figure with its curves over its own grid."""
+    grid = figure.tau_grid_s()
+    curves = tuple(
+        PlottedCurve(c.label, c.sensor_error_m, c.sync_rate_mps, c.tau_crit_s, c.error_m(grid))
+        for c in figure.curves
+    )
+    return PlottedFigure(figure.number, figure.title, figure.note, grid, curves, simulated)
+
+
+def compare(figure: Figure, points: int = 13, seed: int = 0) -> tuple[SimulatedPoint, ...]:
     """The simulated points of a figure: nonlinear chain, magnitudes bounded, directions free.
 
     Empty for a figure that the paper does not set beside a simulation.  Lever arms of the length
@@ -112,7 +144,7 @@ def compare(figure: Figure, points: int = 13, seed: int = 0) -> tuple[Comparison
     grid = figure.tau_grid_s(points)
     found = worst_cases(curve.system, np.array(grid), seed)
     return tuple(
-        Comparison(tau, float(worst.value_m), error)
+        SimulatedPoint(tau, worst.value_m, worst.value_m / error)
         for tau, worst, error in zip(grid, found, curve.error_m(grid), strict=True)
     )
 

@@ -7,24 +7,26 @@ come out at the documented value; anything else makes the reproduction fail.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Any, Final, Literal
 
 from syncline_design import __version__
+from syncline_design.machine.records import Record
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
-from syncline_design.paper.errata import ERRATA, Key
+from syncline_design.paper.errata import COMES_OUT_AT, ERRATA, Erratum, Key
 from syncline_design.paper.figures import (
     FIGURE_1_SENSOR_ERROR_M,
     SURVEY_PAYLOAD,
-    Comparison,
-    Figure,
+    PlottedFigure,
     compare,
     figures,
     platform_of,
+    plotted,
     sigma_axes,
     survey_system,
 )
@@ -32,21 +34,21 @@ from syncline_design.paper.printed import PRINTED
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.load import load_builtin
 
-SCHEMA = "syncline-design/reproduction/v1"
+SCHEMA: Final = "syncline-design/reproduction/v1"
 TAU_CRIT_TABLES = ("tau_crit_georeferencing", "tau_crit_survey")
 
 Status = Literal["agrees", "erratum", "differs"]
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class Cell(Record):
     """One printed figure and the same computed, both in `unit`."""
 
     table: str
     row: str
     column: str
-    printed_text: str
     printed: float
+    printed_text: str
     computed: float
     unit: str
     status: Status
@@ -54,27 +56,41 @@ class Cell:
 
 
 @dataclass(frozen=True, slots=True)
-class Reproduction:
-    """What came out.
+class Count(Record):
+    """How many figures are printed, agree, are documented errata, differ."""
 
-    cells: the paper's results; inputs: its platform and sensor figures against the catalog;
-    comparisons: figure number to its simulated points (figures 3 and 7).
+    printed: int
+    agrees: int
+    erratum: int
+    differs: int
+
+
+@dataclass(frozen=True, slots=True)
+class Counts(Record):
+    """The cells of the tau_crit tables, the figures in the text, the platforms and sensors."""
+
+    tau_crit: Count
+    text: Count
+    inputs: Count
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction(Record):
+    """What came out, schema `syncline-design/reproduction/v1`.
+
+    ok: whether every printed figure agrees or is a documented erratum; cells: the paper's results;
+    inputs: its platform and sensor figures against the catalog.
     """
 
+    schema: str
+    version: str
+    seed: int
+    ok: bool
+    counts: Counts
     cells: tuple[Cell, ...]
     inputs: tuple[Cell, ...]
-    figures: tuple[Figure, ...]
-    comparisons: Mapping[int, tuple[Comparison, ...]]
-    seed: int = 0
-
-    @property
-    def ok(self) -> bool:
-        """Whether every printed figure agrees or is a documented erratum."""
-        return all(cell.status != "differs" for cell in (*self.cells, *self.inputs))
-
-    def to_json(self) -> dict[str, Any]:
-        """The reproduction as plain data (schema syncline-design/reproduction/v1)."""
-        return as_json(self)
+    errata: tuple[Erratum, ...]
+    figures: tuple[PlottedFigure, ...]
 
 
 def reproduce(catalog: Catalog | None = None, simulate: bool = True, seed: int = 0) -> Reproduction:
@@ -94,10 +110,19 @@ def reproduce(catalog: Catalog | None = None, simulate: bool = True, seed: int =
         for table in ("platforms", "sensors")
         for row, column, printed in _entries(table)
     )
-    plotted = figures(catalog)
-    beside = [figure for figure in plotted if figure.simulated and simulate]
-    simulated = {figure.number: compare(figure, seed=seed) for figure in beside}
-    return Reproduction(cells, inputs, plotted, simulated, seed)
+    return Reproduction(
+        schema=SCHEMA,
+        version=__version__,
+        seed=seed,
+        ok=all(cell.status != "differs" for cell in (*cells, *inputs)),
+        counts=_counts(cells, inputs),
+        cells=cells,
+        inputs=inputs,
+        errata=ERRATA,
+        figures=tuple(
+            plotted(one, compare(one, seed=seed) if simulate else ()) for one in figures(catalog)
+        ),
+    )
 
 
 def _entries(table: str) -> Iterator[tuple[str, str, str]]:
@@ -183,7 +208,7 @@ def _cell(key: Key, text: str, computed_si: float, *, exact: bool = False) -> Ce
     distance = abs(computed - Fraction(number))
     agrees = distance == 0 if exact else distance < _last_digit(number)
     status, note = _agreement(key) if agrees else _explain(key, computed)
-    return Cell(*key, text, float(number), float(computed), unit, status, note)
+    return Cell(*key, float(number), text, float(computed), unit, status, note)
 
 
 def _agreement(key: Key) -> tuple[Status, str]:
@@ -197,77 +222,25 @@ def _agreement(key: Key) -> tuple[Status, str]:
 def _explain(key: Key, computed: Fraction) -> tuple[Status, str]:
     """A figure that does not agree: an erratum if it is documented and comes out as documented."""
     for erratum in ERRATA:
-        documented = dict(erratum.cells).get(key)
-        if documented is None:
+        if key not in erratum.cells:
             continue
+        documented = COMES_OUT_AT[key]
         if abs(computed - Fraction(documented)) <= _last_digit(documented) / 2:
             return "erratum", f"{erratum.id}: {erratum.reason}"
         return "differs", f"documented as {documented} (erratum {erratum.id})"
     return "differs", "neither agrees nor is a documented erratum"
 
 
-def tau_crit_cells(result: Reproduction) -> tuple[Cell, ...]:
+def tau_crit_cells(cells: Iterable[Cell]) -> tuple[Cell, ...]:
     """The cells of the paper's two tau_crit tables."""
-    return tuple(cell for cell in result.cells if cell.table in TAU_CRIT_TABLES)
+    return tuple(cell for cell in cells if cell.table in TAU_CRIT_TABLES)
 
 
-def as_json(result: Reproduction) -> dict[str, Any]:
-    """The reproduction as plain data (schema syncline-design/reproduction/v1)."""
-    return {
-        "schema": SCHEMA,
-        "version": __version__,
-        "seed": result.seed,
-        "ok": result.ok,
-        "counts": counts(result),
-        "cells": [_cell_json(cell) for cell in result.cells],
-        "inputs": [_cell_json(cell) for cell in result.inputs],
-        "errata": [
-            {"id": e.id, "where": e.where, "reason": e.reason, "cells": [k for k, _ in e.cells]}
-            for e in ERRATA
-        ],
-        "figures": [_figure_json(f, result.comparisons.get(f.number, ())) for f in result.figures],
-    }
+def _counts(cells: Iterable[Cell], inputs: Iterable[Cell]) -> Counts:
+    text = [cell for cell in cells if cell.table == "text"]
+    return Counts(_count(tau_crit_cells(cells)), _count(text), _count(inputs))
 
 
-def _cell_json(cell: Cell) -> dict[str, Any]:
-    names = ("table", "row", "column", "printed", "printed_text", "computed", "unit")
-    return {name: getattr(cell, name) for name in (*names, "status", "note")}
-
-
-def _figure_json(figure: Figure, simulated: tuple[Comparison, ...]) -> dict[str, Any]:
-    grid = figure.tau_grid_s()
-    return {
-        "number": figure.number,
-        "title": figure.title,
-        "note": figure.note,
-        "tau_s": list(grid),
-        "curves": [
-            {
-                "label": curve.label,
-                "sensor_error_m": curve.sensor_error_m,
-                "sync_rate_mps": curve.sync_rate_mps,
-                "tau_crit_s": curve.tau_crit_s,
-                "error_m": list(curve.error_m(grid)),
-            }
-            for curve in figure.curves
-        ],
-        "simulated": [
-            {"tau_s": p.tau_s, "worst_case_m": p.worst_case_m, "ratio_to_syncline": p.ratio}
-            for p in simulated
-        ],
-    }
-
-
-def counts(result: Reproduction) -> dict[str, dict[str, int]]:
-    """How many cells of each kind are printed, agree, are errata, differ."""
-    groups = {
-        "tau_crit": tau_crit_cells(result),
-        "text": tuple(cell for cell in result.cells if cell.table == "text"),
-        "inputs": result.inputs,
-    }
-    statuses: tuple[Status, ...] = ("agrees", "erratum", "differs")
-    return {
-        name: {"printed": len(cells)}
-        | {status: sum(cell.status == status for cell in cells) for status in statuses}
-        for name, cells in groups.items()
-    }
+def _count(cells: Iterable[Cell]) -> Count:
+    found = Counter(cell.status for cell in cells)
+    return Count(found.total(), found["agrees"], found["erratum"], found["differs"])

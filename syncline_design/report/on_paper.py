@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Final
 
-from syncline_design import __version__
-from syncline_design.paper.errata import ERRATA
-from syncline_design.paper.figures import Comparison, Figure
-from syncline_design.paper.reproduce import TAU_CRIT_TABLES, Reproduction, counts
+from syncline_design.paper.errata import Erratum
+from syncline_design.paper.figures import PlottedFigure, SimulatedPoint
+from syncline_design.paper.reproduce import TAU_CRIT_TABLES, Counts, Reproduction
 from syncline_design.paper.reproduce import Cell as Printed
 from syncline_design.report import numbers
 from syncline_design.report.document import (
@@ -45,11 +44,6 @@ _TITLES: Final = {
     "attitude": "Sensor noise, attitude",
     "ranging": "Sensor noise, ranging",
 }
-_COUNTED: Final = {
-    "tau_crit": "\u03c4_crit cells",
-    "text": "Figures in the text",
-    "inputs": "Platform and sensor figures",
-}
 # What the paper says of its own figures, paraphrased (arXiv:2209.01136v2, sections V and VI).
 _SAYS: Final = {
     1: "Accuracy approaches 10 per metre, the inverse of the sensors' 0.1 m; left of 1/\u03c4_crit "
@@ -76,23 +70,27 @@ def on_paper(result: Reproduction) -> Document:
         name="The Syncline model, reproduced",
         sentences=(f"{authors}: every table and figure computed from the catalog, beside what the "
                    "paper prints.",),
-        facts=tuple(_facts(result)),
+        facts=tuple(_facts(result.counts)),
         sections=(
             *section("tables", "Tables", _tables(result)),
             *section("figures", "Figures", _figures(result)),
-            *section("errata", "Errata of the paper", [_errata()], "Errata"),
+            *section("errata", "Errata of the paper", [_errata(result.errata)], "Errata"),
             *section("inputs", "Inputs", _inputs(result)),
         ),
         title=f"Reproduction of the Syncline paper: {word}",
     )  # fmt: skip
 
 
-def _facts(result: Reproduction) -> Iterable[tuple[str, str]]:
-    for key, count in counts(result).items():
-        text = f"{count['agrees']} of {count['printed']} agree"
-        text += f", {count['erratum']} documented errata" if count["erratum"] else ""
-        text += f", {count['differs']} differ" if count["differs"] else ""
-        yield _COUNTED[key], text
+def _facts(counts: Counts) -> Iterable[tuple[str, str]]:
+    for name, count in (
+        ("\u03c4_crit cells", counts.tau_crit),
+        ("Figures in the text", counts.text),
+        ("Platform and sensor figures", counts.inputs),
+    ):
+        text = f"{count.agrees} of {count.printed} agree"
+        text += f", {count.erratum} documented errata" if count.erratum else ""
+        text += f", {count.differs} differ" if count.differs else ""
+        yield name, text
 
 
 def _tables(result: Reproduction) -> list[Node]:
@@ -156,12 +154,12 @@ def _figures(result: Reproduction) -> list[Node]:
         "The paper's figures are not in its source; what it says of them stands beside the "
         "computed ones. The upright mark on a curve is its \u03c4_crit."
     )
-    articles = [_article(f, result.comparisons.get(f.number, ())) for f in result.figures]
+    articles = [_article(figure) for figure in result.figures]
     beside = tuple(
-        f"Figure {number}: {_simulated(points)} \u03c4 from {numbers.time(points[0].tau_s, 2)} to "
-        f"{numbers.time(points[-1].tau_s, 2)}."
-        for number, points in result.comparisons.items()
-        if points
+        f"Figure {figure.number}: {_simulated(points)} \u03c4 from "
+        f"{numbers.time(points[0].tau_s, 2)} to {numbers.time(points[-1].tau_s, 2)}."
+        for figure in result.figures
+        if (points := figure.simulated)
     )
     return [
         Text(words, reach="page"),
@@ -170,48 +168,47 @@ def _figures(result: Reproduction) -> list[Node]:
     ]
 
 
-def _article(figure: Figure, simulated: tuple[Comparison, ...]) -> Node:
+def _article(figure: PlottedFigure) -> Node:
     said: list[Node] = []
     if figure.number in _SAYS:
         said.append(Text((strong("The paper says:"), " ", _SAYS[figure.number])))
-    if simulated:
-        said.append(Text((strong("Here:"), " ", _simulated(simulated))))
+    if figure.simulated:
+        said.append(Text((strong("Here:"), " ", _simulated(figure.simulated))))
     if figure.note:
         said.append(Text(figure.note, quiet=True))
     title = f"Figure {figure.number}: {figure.title}"
-    chart = Chart(f"paper-{figure.number}", lambda: _drawn(figure, simulated, title), "")
+    chart = Chart(f"paper-{figure.number}", lambda: _drawn(figure, title), "")
     column = Group((*said, *show(_curves(figure))))
     return Group((Heading(title), Group((chart, column), "split")), "article",
                  f"figure-{figure.number}", reach="page")  # fmt: skip
 
 
-def _simulated(points: tuple[Comparison, ...]) -> str:
-    ratios = [point.ratio for point in points]
+def _simulated(points: tuple[SimulatedPoint, ...]) -> str:
+    ratios = [point.ratio_to_syncline for point in points]
     ends = span(numbers.percent(min(ratios), 4), numbers.percent(max(ratios), 4))
     return f"{len(points)} simulated worst cases reach {ends} of the Syncline."
 
 
-def _drawn(figure: Figure, simulated: tuple[Comparison, ...], title: str) -> InlineFigure:
+def _drawn(figure: PlottedFigure, title: str) -> InlineFigure:
     """A single Syncline with roof, slope and both regions named, as in the paper's figure 1."""
     name, first = f"fig-paper-{figure.number}", figure.curves[0]
-    if len(figure.curves) == 1 and not simulated:
+    if len(figure.curves) == 1 and not figure.simulated:
         shape = SynclineCurve(
             first.sensor_error_m, first.sync_rate_mps, first.tau_crit_s, None, None, None
         )
         return syncline(shape, name, title)
-    beside = [(p.tau_s, p.worst_case_m) for p in simulated]
+    beside = [(p.tau_s, p.worst_case_m) for p in figure.simulated]
     return synclines(_labelled(figure), beside, name, title)
 
 
-def _labelled(figure: Figure) -> list[LabelledCurve]:
-    grid = figure.tau_grid_s()
+def _labelled(figure: PlottedFigure) -> list[LabelledCurve]:
     return [
-        LabelledCurve(c.label, c.sensor_error_m, c.tau_crit_s, grid, c.error_m(grid))
+        LabelledCurve(c.label, c.sensor_error_m, c.tau_crit_s, figure.tau_s, c.error_m)
         for c in figure.curves
     ]
 
 
-def _curves(figure: Figure) -> Table:
+def _curves(figure: PlottedFigure) -> Table:
     named = letters(_labelled(figure))
     rows = [
         (
@@ -226,8 +223,8 @@ def _curves(figure: Figure) -> Table:
     return table(f"Figure {figure.number}, computed", heads, rows)
 
 
-def _errata() -> Facts:
-    return Facts(tuple((f"{e.where} ({e.id})", e.reason) for e in ERRATA), "terms")
+def _errata(errata: tuple[Erratum, ...]) -> Facts:
+    return Facts(tuple((f"{e.where} ({e.id})", e.reason) for e in errata), "terms")
 
 
 def _inputs(result: Reproduction) -> list[Node]:
@@ -238,4 +235,4 @@ def _inputs(result: Reproduction) -> list[Node]:
         nodes.append(Group(tuple(show(shown)), "fold", summary=shown.caption, reach="page"))
     disputed = [cell for cell in result.inputs if cell.status != "agrees"]
     nodes += show(_list("Inputs that are not as printed", disputed), reach="text")
-    return [*nodes, Text(f"Computed by syncline-design {__version__}.", quiet=True)]
+    return [*nodes, Text(f"Computed by syncline-design {result.version}.", quiet=True)]

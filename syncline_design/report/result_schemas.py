@@ -7,12 +7,14 @@ from typing import Any, Final, Literal, get_args
 
 from syncline_design.comparison import difference
 from syncline_design.machine.records import Record, schema_of
+from syncline_design.paper import reproduce
 from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
 
-ResultName = Literal["difference", "simulation"]
+ResultName = Literal["difference", "reproduction", "simulation"]
 _RESULTS: Final[Mapping[ResultName, tuple[type[Record], str]]] = {
     "difference": (difference.Difference, difference.SCHEMA),
+    "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),
 }
 RESULT_NAMES: Final[tuple[ResultName, ...]] = get_args(ResultName)
