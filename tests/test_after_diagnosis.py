@@ -8,16 +8,16 @@ import re
 import shutil
 import subprocess
 import sys
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
+from diagnosis_samples import diagnosis
 from syncline_design.comparison.meaning import DesignMeaning, format_duration, meaning
-from syncline_design.diagnosis import Diagnosis
 from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
+from syncline_design.report.diagnosis_summary import meaning_text
 from syncline_design.report.pages import render_diagnosis
 from syncline_design.spec.load import load_text
 from syncline_design.spec.spec import EffectChoice
@@ -44,28 +44,18 @@ monte_carlo: {samples: 40000}
 ).replace("      primitive: pps, timestamping", "      primitive: pps\n      timestamping")
 
 
-@dataclass
-class Found:
-    """A diagnosis of which only the findings matter here."""
-
-    entries: tuple[EffectChoice, ...]
-
-    def effects_entries(self) -> tuple[EffectChoice, ...]:
-        return self.entries
-
-
 def of(effect: str, parameters: dict[str, float], horizon: str = "") -> DesignMeaning:
     text = SPEC.replace("HORIZON", f"horizon: {horizon}\n" if horizon else "")
     entry = EffectChoice(
         effect=effect, sensor="position", stage="uav", parameters=parameters, source="diagnose"
     )
-    found = meaning(load_text(text, ROOT / "specs" / "x.yaml"), cast(Diagnosis, Found((entry,))))
+    found = meaning(load_text(text, ROOT / "specs" / "x.yaml"), (entry,))
     assert found is not None
-    return found
+    return found.design
 
 
 def added(found: DesignMeaning) -> dict[str, float]:
-    rows = {one.key: one for one in found.figures}
+    rows = {one.figure: one for one in found.figures}
     return {key: (one.after_m or 0.0) - (one.before_m or 0.0) for key, one in rows.items()}
 
 
@@ -94,7 +84,7 @@ def test_a_latency_by_both_models_and_simulated(latency_s: float) -> None:
     change = added(found)
     assert change["syncline_m"] == pytest.approx((V + D * W) * latency_s, rel=1e-6)
     assert change["per_sensor_m"] == pytest.approx(V * latency_s, rel=1e-6)
-    rows = {one.key: one for one in found.figures}
+    rows = {one.figure: one for one in found.figures}
     for value, truth in (
         (rows["simulated_95_m"].before_m, simulated_quantile(0.0)),
         (rows["simulated_95_m"].after_m, simulated_quantile(latency_s)),
@@ -106,7 +96,7 @@ def test_a_latency_by_both_models_and_simulated(latency_s: float) -> None:
     assert high is not None
     assert low < (rows["simulated_95_m"].after_m or 0.0) < high
     assert (change["syncline_m"] / V / latency_s) > 4.0
-    assert any("per-sensor model each sensor's own" in line for line in found.lines)
+    assert any("per-sensor model each sensor's own" in line for line in found.text)
 
 
 @pytest.mark.parametrize(
@@ -125,8 +115,9 @@ def test_a_drift_is_charged_for_the_stated_horizon(
     change = added(found)
     assert change["per_sensor_m"] == pytest.approx(V * 59e-6 * seconds, rel=1e-6)
     assert change["syncline_m"] == pytest.approx((V + D * W) * 59e-6 * seconds, rel=1e-6)
-    assert words in found.text()
-    assert found.to_json()["horizon"]["duration_s"] == seconds
+    assert words in found.horizon.text
+    assert words in meaning_text(found)
+    assert found.horizon.duration_s == seconds
 
 
 @pytest.mark.parametrize(
@@ -142,15 +133,15 @@ def test_a_finding_in_a_spec_reads_as_it_was_found(
     effect: str, parameters: dict[str, float], words: str
 ) -> None:
     """The sentence of `check` about a known effect has the figures of `diagnose`'s sentence."""
-    from syncline_design.diagnosis.findings import Figure, Finding
+    from syncline_design.diagnosis.findings import estimate, finding
     from syncline_design.effects import registry
     from syncline_design.model.known import EffectEntry
     from syncline_design.spec.known_effects import describe
 
     sensor = registry()[effect].sensors[0]
     units = {p.name: p.unit for p in registry()[effect].parameters}
-    figures = {name: Figure(value, None, units[name]) for name, value in parameters.items()}
-    found = Finding(registry()[effect], sensor, "uav", figures, (), (), 1.0, None)
+    figures = {name: estimate(value, None, units[name]) for name, value in parameters.items()}
+    found = finding(registry()[effect], sensor, "uav", figures, "clear", 1.0)
     said = describe(EffectEntry(effect, sensor, "uav", tuple(parameters.items())))
     assert words in said
     assert said[0].upper() + said[1:] == found.sentence
@@ -158,7 +149,7 @@ def test_a_finding_in_a_spec_reads_as_it_was_found(
 
 def test_page_and_markdown_show_all_three_beside_each_other() -> None:
     found = of("latency", {"latency_s": 0.045})
-    data = {"verdict": "explained", "design": found.to_json()}
+    data = diagnosis(design=found)
     for text in (render_diagnosis(data), render_diagnosis_markdown(data)):
         rows = re.sub(r"<[^>]+>|\\", " ", text).replace("\u00a0", " ")
         for one in found.figures:
@@ -205,10 +196,10 @@ def test_the_spec_is_never_written_over_what_the_command_reads(tmp_path: Path) -
 def test_tails_that_no_budget_can_hold_are_said_and_not_charged() -> None:
     """1.5 degrees of freedom have no standard deviation: no figure, no verdict, the reason."""
     found = of("heavy_tails", {"degrees_of_freedom": 1.5, "outlier_rate": 0.0})
-    assert found.after["verdict"] == "indeterminate"
-    assert "with them, it could not be decided" in found.lines[0]
-    assert "no standard deviation" in found.lines[1]
+    assert found.after.verdict == "indeterminate"
+    assert "with them, it could not be decided" in found.text[0]
+    assert "no standard deviation" in found.text[1]
     assert [one.after_m for one in found.figures] == [None, None, None]
-    assert found.before["verdict"] == "meets"
+    assert found.before.verdict == "meets"
     json.dumps(found.to_json(), allow_nan=False)
-    assert "Horizon: 1 h" in found.text()
+    assert "Horizon: 1 h" in meaning_text(found)

@@ -16,14 +16,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose, summary_text
+from syncline_design.comparison.meaning import with_design
+from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 from syncline_design.diagnosis.checks import Check, log_checks
 from syncline_design.diagnosis.covariance import inverse_3x3
-from syncline_design.diagnosis.gap import Fit, Gap, closed_share
+from syncline_design.diagnosis.gap import closed_share
+from syncline_design.diagnosis.result import Fit, Gap, HeldOut
 from syncline_design.diagnosis.scene import scene
-from syncline_design.diagnosis.summary import gap_text
 from syncline_design.diagnosis.system import measured
 from syncline_design.report.diagnoses import render_diagnose
+from syncline_design.report.diagnosis_summary import gap_text, summary_text
 from syncline_design.spec.load import BadInput, load
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario
 
@@ -202,7 +204,7 @@ def test_no_unsound_log_agrees_or_is_explained(
     said = document["checks"][0]["message"]
     assert text.index(said) < text.index("1. ")
     for kind in ("html", "markdown"):
-        page = render_diagnose(kind, document)
+        page = render_diagnose(kind, with_design(found, None))
         assert "contradicts itself" in page
         assert page.index(said[6:18]) < page.index("older than")
 
@@ -242,8 +244,8 @@ def test_noise_alone_closes_no_gap(tmp_path: Path) -> None:
     """Nothing is held out when only the noise's size is fitted."""
     louder = hidden("noise_understated", "position", factor=3.0)
     found = asked(written(run_of("car_stops", louder), tmp_path), max_effects=2)
-    assert {f.effect.name for f in found.findings} <= {"noise_understated", "heavy_tails"}
-    assert found.gap is not None
+    assert {f.effect for f in found.findings} <= {"noise_understated", "heavy_tails"}
+    assert found.gap.held_out is not None
     assert found.gap.closed_fraction is None
     assert "of the gap is closed" not in summary_text(found)
     assert "times what the spec expects" in summary_text(found)
@@ -283,9 +285,10 @@ def test_a_share_of_next_to_nothing_is_not_given(
     rms_m: tuple[float, ...], nll: tuple[float, ...], share: float | None
 ) -> None:
     before, after, floor = (Fit(r, 1.0, n, 0.95) for r, n in zip(rms_m, nll, strict=True))
-    closed = closed_share(before, after, floor)
+    scores = HeldOut(before, after, floor, floor)
+    closed = closed_share(scores)
     assert closed == (None if share is None else pytest.approx(share))
-    text = gap_text(Gap(before, after, floor, closed, 0.0, None, 0.05, floor))
+    text = gap_text(Gap(expected_rms_m=0.05, closed_fraction=closed), scores)
     assert ("too little for a share" in text) == (share is None)
     assert ("% of the gap is closed" in text) == (share is not None and share > 0.0)
 

@@ -6,23 +6,24 @@ Truth and Cramer-Rao bounds are the hidden world's own.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 from scipy.stats import chi2
 
+from diagnosis_samples import LATENCY
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.diagnosis.candidates import candidates, directed_parts, signatures
 from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.findings import AliasFigure
 from syncline_design.diagnosis.fitting import data_of, fit
 from syncline_design.diagnosis.identify import competed
+from syncline_design.diagnosis.result import Rival
 from syncline_design.diagnosis.scene import scene
-from syncline_design.diagnosis.summary import lookalike_lines
 from syncline_design.diagnosis.system import measured
 from syncline_design.diagnosis.trials import with_effect
+from syncline_design.report.diagnosis_summary import lookalike_lines
 from syncline_design.report.on_diagnosis import finding_words
 from syncline_design.spec.load import load
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario
@@ -165,9 +166,9 @@ def test_a_better_name_of_another_signature_takes_the_place(
 
 def test_words_follow_the_sign_of_the_comparison() -> None:
     """What fits better is never said to fit worse, on the console or on the page."""
-    better = AliasFigure("packetised_timestamps", "attitude", "rig", 0.97, -157.4, possible=False)
-    as_well = AliasFigure("latency", "attitude", "rig", 0.6, -0.8)
-    worse = AliasFigure("filter_lag", "position", "rig", 0.999, 31.6)
+    better = Rival("packetised_timestamps", "attitude", "rig", 0.97, -157.4, possible=False)
+    as_well = Rival("latency", "attitude", "rig", 0.6, -0.8)
+    worse = Rival("filter_lag", "position", "rig", 0.999, 31.6)
     lines = lookalike_lines((better, as_well, worse))
     assert lines == [
         "   looks alike, fits worse: filter_lag (position) by 31.6 nat",
@@ -175,8 +176,7 @@ def test_words_follow_the_sign_of_the_comparison() -> None:
         " by 157 nat",
         "   fits as well in its place: latency (attitude)",
     ]
-    entry = {"effect": "latency", "lookalikes": [asdict(a) for a in (better, as_well, worse)]}
-    page = finding_words(entry)
-    assert "-157" not in page["lookalikes"]
-    assert "31.6 nat worse" in page["lookalikes"]
-    assert "157 nat better, but only with impossible values" in page["lookalikes"]
+    said = finding_words(replace(LATENCY, lookalikes=(better, as_well, worse))).lookalikes
+    assert "-157" not in said
+    assert "31.6 nat worse" in said
+    assert "157 nat better, but only with impossible values" in said

@@ -7,7 +7,7 @@ the integral of a constant speed along the heading, rates are central difference
 from __future__ import annotations
 
 import re
-from dataclasses import asdict
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,15 +16,17 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose, summary_text
+from diagnosis_samples import LATENCY, diagnosis
+from syncline_design.comparison.meaning import with_design
+from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 from syncline_design.diagnosis.checks import Check, log_checks
-from syncline_design.diagnosis.findings import AliasFigure
+from syncline_design.diagnosis.result import Rival
 from syncline_design.diagnosis.scene import scene
-from syncline_design.diagnosis.summary import lookalike_lines
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
 from syncline_design.model.estimates import figure
 from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
+from syncline_design.report.diagnosis_summary import lookalike_lines, summary_text
 from syncline_design.report.on_diagnosis import finding_words
 from syncline_design.spec.load import load
 
@@ -124,7 +126,7 @@ def asked(columns: dict[str, Array], folder: Path, only: tuple[str, ...]) -> Dia
 def test_the_noise_of_a_heading_is_no_hard_iron(seed: int, tmp_path: Path) -> None:
     """A heading that varies by 0.2 deg, logged with 0.1 deg, errs with itself: by its noise."""
     found = asked(straight(seed, 800, 0.25, 2.0), tmp_path, ("heading_hard_iron", "range_bias"))
-    assert [f.effect.name for f in found.findings] == []
+    assert [f.effect for f in found.findings] == []
     assert "heading_hard_iron (attitude)" in found.unseen
 
 
@@ -180,10 +182,10 @@ def test_at_best_is_what_the_effects_reach(tmp_path: Path) -> None:
     velocity = raw_error(columns, 1.0) - raw_error(columns)
     error = raw_error(columns)
     best_s = -float(np.sum(velocity * error) / np.sum(velocity**2))
-    others = found.to_json()["findings"][0]
-    assert {a["refitted"] for a in others["excluded"]} == {False}
-    assert all(a["refitted"] for a in others["aliases"] + others["lookalikes"])
-    assert "with the noise kept" in finding_words(others)["excluded"]
+    (others,) = found.findings
+    assert {a.refitted for a in others.excluded} == {False}
+    assert all(a.refitted for a in others.aliases + others.lookalikes)
+    assert "with the noise kept" in finding_words(others).excluded
     held_out = found.to_json()["gap"]["held_out"]
     assert held_out["fitted"]["rms_m"] == pytest.approx(rms_m(raw_error(columns, best_s)), rel=2e-3)
     assert held_out["after"]["rms_m"] >= 0.999 * held_out["fitted"]["rms_m"]
@@ -197,7 +199,7 @@ def test_more_noise_has_no_better_best(tmp_path: Path) -> None:
     for axis in ("north", "east", "down"):
         columns[f"position_{axis}_m"] = columns[f"position_{axis}_m"] + draw.normal(0, 0.08, 600)
     found = asked(columns, tmp_path, ("noise_understated", "range_bias"))
-    assert [f.effect.name for f in found.findings] == ["noise_understated"]
+    assert [f.effect for f in found.findings] == ["noise_understated"]
     held_out = found.to_json()["gap"]["held_out"]
     for part in ("before", "after", "fitted"):
         assert held_out[part]["rms_m"] == pytest.approx(rms_m(raw_error(columns)), rel=1e-3)
@@ -215,7 +217,7 @@ def test_what_contradicts_itself_need_not_leave_anything(tmp_path: Path) -> None
     assert not data["sound"]
     assert not data["findings"]
     assert data["remaining"]["beyond_noise"] is False
-    text, page = summary_text(found), render_diagnosis_markdown(data)
+    text, page = summary_text(found), render_diagnosis_markdown(with_design(found, None))
     assert "Where it remains" not in text
     assert "still there" not in page
     assert "contradict" in text
@@ -224,14 +226,14 @@ def test_what_contradicts_itself_need_not_leave_anything(tmp_path: Path) -> None
 
 def test_other_signatures_do_not_look_alike() -> None:
     """The console's words for two that fit worse: one along the named signature, one across it."""
-    along = AliasFigure("filter_lag", "position", "boat", 0.999, 31.6)
-    across = AliasFigure("flexure", "ranging", "boat", 0.0019, 7.2)
+    along = Rival("filter_lag", "position", "boat", 0.999, 31.6)
+    across = Rival("flexure", "ranging", "boat", 0.0019, 7.2)
     assert lookalike_lines((along, across)) == [
         "   looks alike, fits worse: filter_lag (position) by 31.6 nat",
         "   of another signature, fits worse in its place: flexure (ranging) by 7.2 nat",
     ]
-    entry = {"effect": "latency", "sensor": "position", "lookalikes": [asdict(along)]}
-    assert "filter lag" in render_diagnosis_markdown({"findings": [entry]})
+    found = diagnosis(findings=(replace(LATENCY, lookalikes=(along,), excluded=()),))
+    assert "filter lag" in render_diagnosis_markdown(found)
 
 
 @pytest.mark.parametrize("offset_degps", [-2.0, 3.0])

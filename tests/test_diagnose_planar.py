@@ -112,7 +112,7 @@ def tracked(folder: Path, draw: Draw, seed: int, axes: tuple[str, ...]) -> tuple
 
 
 def names(found: Diagnosis) -> list[str]:
-    return [f.effect.name for f in found.findings]
+    return [f.effect for f in found.findings]
 
 
 def oracle_freedom(draw: Draw) -> float:
@@ -146,7 +146,7 @@ def test_tails_of_plane_logs_are_those_of_their_noise(
     else:
         spec, log = tracked(tmp_path, draw, 5, ONE_AXIS)
     found = diagnose(spec, [log])
-    tails = [f for f in found.findings if f.effect.name == "heavy_tails"]
+    tails = [f for f in found.findings if f.effect == "heavy_tails"]
     assert len(tails) == 1
     fitted = float(tails[0].parameters["degrees_of_freedom"].value)
     assert fitted == pytest.approx(oracle_freedom(draw), rel=0.45)
@@ -163,7 +163,7 @@ def test_no_effect_is_named_twice(most: int, tmp_path: Path) -> None:
     header = ",".join(table.dtype.names or ())
     np.savetxt(log, table, delimiter=",", header=header, comments="", fmt="%.9g")
     found = diagnose(spec, [log], DiagnosisSettings(max_effects=most))
-    labels = Counter((f.effect.name, f.sensor, f.stage) for f in found.findings)
+    labels = Counter((f.effect, f.sensor, f.stage) for f in found.findings)
     assert max(labels.values()) == 1
     assert len(labels) == min(most, 3), labels
 
@@ -198,7 +198,7 @@ def test_what_a_plane_log_does_not_show_has_no_figure(tmp_path: Path) -> None:
     found = diagnose(*(p if k == 0 else [p] for k, p in enumerate(write(tmp_path, columns, False))),
                      settings)  # fmt: skip
     (finding,) = found.findings
-    assert finding.effect.name == "lever_arm"
+    assert finding.effect == "lever_arm"
     data = found.to_json()
     shown = data["findings"][0]["parameters"]
     assert shown["x_m"]["value"] == pytest.approx(arm_x, abs=0.01)

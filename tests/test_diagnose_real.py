@@ -86,7 +86,7 @@ def spec_file(folder: Path, sigma: str, lever: str) -> Path:
 
 
 def names(found: Diagnosis) -> list[tuple[str, str]]:
-    return [(f.effect.name, f.sensor) for f in found.findings]
+    return [(f.effect, f.sensor) for f in found.findings]
 
 
 @vehicle
@@ -95,11 +95,11 @@ def test_the_vehicles_lever_arm_is_found(tmp_path: Path) -> None:
     spec = spec_file(tmp_path, "[0.012 m, 0.013 m, 0.055 m]", "[0 m, 0 m, 0 m]")
     found = diagnose(spec, vehicle_log(tmp_path, only_fixed=True))
     assert ("lever_arm", "position") in names(found)
-    lever = next(f for f in found.findings if f.effect.name == "lever_arm")
+    lever = next(f for f in found.findings if f.effect == "lever_arm")
     values = [float(lever.parameters[f"{axis}_m"].value) for axis in "xyz"]
     assert values == pytest.approx(LEVER_ARM_M, abs=0.02)
-    assert found.gap is not None
-    assert found.gap.after.rms_m < 0.2 * found.gap.before.rms_m
+    assert found.gap.held_out is not None
+    assert found.gap.held_out.after.rms_m < 0.2 * found.gap.held_out.before.rms_m
 
 
 @vehicle
@@ -152,9 +152,9 @@ def test_forgotten_leap_seconds_are_found(tmp_path: Path) -> None:
     spec = spec_file(tmp_path, "[0.02 m, 0.02 m, 0.03 m]", "[-0.07 m, 0 m, 0 m]")
     found = diagnose(spec, camera_log(tmp_path, LEAP_SECONDS))
     assert ("integer_second_slip", "position") in names(found)
-    slip = next(f for f in found.findings if f.effect.name == "integer_second_slip")
+    slip = next(f for f in found.findings if f.effect == "integer_second_slip")
     rest = sum(
-        float(f.parameters["latency_s"].value) for f in found.findings if f.effect.name == "latency"
+        float(f.parameters["latency_s"].value) for f in found.findings if f.effect == "latency"
     )
     assert float(slip.parameters["seconds"].value) + rest == pytest.approx(
         LEAP_SECONDS + DELAY_S, abs=0.1

@@ -74,10 +74,11 @@ def diagnose(
     max_effects: Annotated[int, typer.Option(min=0, max=20, help="Effects named at most.")] = 4,
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
-    from syncline_design.comparison.meaning import as_measured, meaning
-    from syncline_design.diagnosis import DiagnosisSettings, summary_text
+    from syncline_design.comparison.meaning import as_measured, meaning, with_design
+    from syncline_design.diagnosis import DiagnosisSettings
     from syncline_design.diagnosis import diagnose as diagnose_log
     from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
+    from syncline_design.report.diagnosis_summary import meaning_text, summary_text
     from syncline_design.report.text import visible
     from syncline_design.spec.load import load
 
@@ -88,12 +89,11 @@ def diagnose(
     )
     with _progress(quiet) as progress:
         found = diagnose_log(as_measured(case), log or (), settings, progress)
-        means = meaning(case, found, seed)
-    data = found.to_json()
+        means = meaning(case, found.effects_entries(), seed)
+    whole = with_design(found, None if means is None else means.design)
     text = f"{visible(case.spec.name)} ({visible(spec)})\n\n{summary_text(found)}"
     if means is not None:
-        data["design"] = means.to_json()
-        text += f"\nWhat it means for the design:\n{means.text()}"
+        text += f"\nWhat it means for the design:\n{meaning_text(means.design)}"
     if write_spec is not None and means is not None:
         from syncline_design.spec.edit import write_spec as write_checked
 
@@ -101,7 +101,7 @@ def diagnose(
         say(f"spec with the findings written to {write_spec}")
     elif write_spec is not None:
         say("nothing was found: no spec written")
-    emit(text, targets, lambda name: render_diagnose(name, data), quiet=quiet)
+    emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
     return found.exit_code
 
 

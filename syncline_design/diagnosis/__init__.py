@@ -5,6 +5,5 @@ from __future__ import annotations
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import diagnose
 from syncline_design.diagnosis.settings import DiagnosisSettings
-from syncline_design.diagnosis.summary import summary_text
 
-__all__ = ["Diagnosis", "DiagnosisSettings", "diagnose", "summary_text"]
+__all__ = ["Diagnosis", "DiagnosisSettings", "diagnose"]

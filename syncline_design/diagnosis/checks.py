@@ -8,19 +8,17 @@ the platform in the spec.  Rules in docs/diagnosis.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from syncline_design.diagnosis.agreement import WORDS, disagreement, windows_of
+from syncline_design.diagnosis.result import Check, Severity
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import StageLog
 from syncline_design.model.estimates import figure
 from syncline_design.model.system import Stage
 
-Severity = Literal["contradiction", "caution"]
 USUAL, RARE = 0.95, 0.99  # quantiles that decide on a contradiction and on a caution
 BEYOND = {"speed": 1.25, "turn_rate": 1.25, "range": 2.0}  # times the limit: a contradiction
 NEAR = {"speed": 1.1, "turn_rate": 1.1, "range": 1.5}  # times the limit: a caution
@@ -29,25 +27,6 @@ NOISE = 2.0 * np.sqrt(2.0)  # standard deviations of the difference of two readi
 TOLERANCE = {"velocity": 0.05, "rate": 0.08}
 NAMES = {"speed": ("speed", "v_max"), "turn_rate": ("turn rate", "omega_max"),
          "range": ("range", "distance")}  # fmt: skip
-
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """One thing that is wrong with a log before anything is named.
-
-    code: speed, turn_rate, range, velocity_columns or rate_columns.  value, limit: a quantile
-    against the platform's figure (SI), or the factor between columns and its 1; share: of rows
-    beyond the limit.
-    """
-
-    code: str
-    stage: str
-    severity: Severity
-    message: str
-    value: float
-    limit: float
-    unit: str
-    share: float
 
 
 def log_checks(view: Scene) -> tuple[Check, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from syncline_design.diagnosis.fitting import Data, Model, Opened
 from syncline_design.diagnosis.gross import Gross
 from syncline_design.diagnosis.identify import Alias, Comparison
 from syncline_design.diagnosis.noise import NoiseLevel, precision
+from syncline_design.diagnosis.result import Estimate, Finding, Rival
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.tails import tails_in
@@ -19,81 +20,47 @@ from syncline_design.effects.record import Effect
 from syncline_design.model.estimates import figure
 
 Label = tuple[str, str, int]
+Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
 NOT_SEEN = "(not seen)"
 
 
-@dataclass(frozen=True, slots=True)
-class Figure:
-    """One parameter: its value and standard uncertainty in SI; a convention is a word.
-
-    seen: whether the log says anything of it; a lever arm has no seen down part in a planar log.
-    """
-
-    value: float | str
-    standard_uncertainty: float | None
-    unit: str
-    seen: bool = True
+def estimate(
+    value: float | str, spread: float | None = None, unit: str = "", seen: bool = True
+) -> Estimate:
+    """A parameter with the text that every output prints."""
+    text = value if isinstance(value, str) else figure(value, spread, unit) if seen else NOT_SEEN
+    return Estimate(value, spread, unit, seen, text)
 
 
-def figure_text(shown: Figure) -> str:
-    """A parameter as every output prints it."""
-    if isinstance(shown.value, str):
-        return shown.value
-    if not shown.seen:
-        return NOT_SEEN
-    return figure(shown.value, shown.standard_uncertainty, shown.unit)
-
-
-@dataclass(frozen=True, slots=True)
-class AliasFigure:
-    """Another effect beside the named one; nats_worse counts the freedom of both.
-
-    possible: whether it fits with values that the effect can have.  refitted: with noise fitted
-    anew, as the evidence is; otherwise to first order with the named effect's noise.
-    """
-
-    effect: str
-    sensor: str
-    stage: str
-    cosine: float
-    nats_worse: float
-    possible: bool = True
-    refitted: bool = True
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One missing effect."""
-
-    effect: Effect
-    sensor: str
-    stage: str
-    parameters: Mapping[str, Figure]
-    aliases: tuple[AliasFigure, ...]
-    excluded: tuple[AliasFigure, ...]
-    gain_nat: float
-    log10_p: float | None
-    gross: bool = False
-    lookalikes: tuple[AliasFigure, ...] = ()
-
-    @property
-    def sentence(self) -> str:
-        """What is wrong, with figures."""
-        shown = {name: figure_text(f) for name, f in self.parameters.items()}
-        text = self.effect.sentence.format(sensor=WORDS[self.sensor], **shown)
-        return text[0].upper() + text[1:]
-
-    @property
-    def evidence(self) -> str:
-        """How sure this is, in words."""
-        if self.gross:
-            return f"undoing it makes the usual error {math.exp(self.gain_nat):.0f} times smaller"
-        chance = "less than 1e-300"
-        if self.log10_p is not None and self.log10_p > -300:
-            chance = f"1e{math.floor(self.log10_p)}"
-        return f"saves {self.gain_nat:.1f} nat; noise alone does that with a chance of {chance}"
+def finding(
+    effect: Effect,
+    sensor: str,
+    stage: str,
+    parameters: Mapping[str, Estimate],
+    evidence: str,
+    gain_nat: float,
+    log10_p: float | None = None,
+    rivals: Rivals = ((), (), ()),
+) -> Finding:
+    """A missing effect in words; rivals: aliases, lookalikes, excluded."""
+    shown = {name: one.text for name, one in parameters.items()}
+    text = effect.sentence.format(sensor=WORDS[sensor], **shown)
+    return Finding(
+        effect.name,
+        sensor,
+        stage,
+        parameters,
+        *rivals,
+        sentence=text[0].upper() + text[1:],
+        evidence=evidence,
+        gain_nat=gain_nat,
+        log10_p=log10_p,
+        confused_with=effect.confused_with,
+        separated_by=effect.separated_by,
+        source=effect.source,
+    )
 
 
 def findings(final: Settled, gross: Sequence[Gross]) -> tuple[Finding, ...]:
@@ -114,49 +81,47 @@ def _deterministic(final: Settled, index: int) -> Finding:
     model = final.model
     one = model.acting[index]
     at = sum(len(a.effect.slopes()) for a in model.acting[:index])
-    figures: dict[str, Figure] = {}
+    found: dict[str, Estimate] = {}
     for p in one.effect.parameters:
         spread, seen = None, True
         if p in one.effect.slopes():
             seen = bool(model.covariance[at, at] > 0.0)
             spread = float(np.sqrt(model.covariance[at, at])) if seen else math.inf
             at += 1
-        figures[p.name] = Figure(float(one.values[p.name]), spread, p.unit, seen)
-    return _finding(final, one.effect, one.label, figures)
+        found[p.name] = estimate(float(one.values[p.name]), spread, p.unit, seen)
+    return _finding(final, one.effect, one.label, found)
 
 
 def _finding(
-    final: Settled, effect: Effect, label: Label, figures: Mapping[str, Figure]
+    final: Settled, effect: Effect, label: Label, found: Mapping[str, Estimate]
 ) -> Finding:
     view, evidence = final.data.view, final.evidence[label]
     compared = final.classes.get(label, Comparison())
-    return Finding(
-        effect,
-        label[1],
-        view.system.stages[label[2]].name,
-        figures,
-        tuple(_alias(view, a) for a in compared.aliases),
-        tuple(_alias(view, a) for a in compared.excluded[:MOST_EXCLUDED]),
-        evidence.gain,
-        evidence.log_p / math.log(10.0) if math.isfinite(evidence.log_p) else None,
-        lookalikes=tuple(_alias(view, a) for a in compared.lookalikes),
-    )
+    log10_p = evidence.log_p / math.log(10.0) if math.isfinite(evidence.log_p) else None
+    chance = "less than 1e-300"
+    if log10_p is not None and log10_p > -300:
+        chance = f"1e{math.floor(log10_p)}"
+    words = f"saves {evidence.gain:.1f} nat; noise alone does that with a chance of {chance}"
+    lists = (compared.aliases, compared.lookalikes, compared.excluded[:MOST_EXCLUDED])
+    aliases, lookalikes, excluded = (tuple(_rival(view, a) for a in own) for own in lists)
+    where = view.system.stages[label[2]].name
+    rivals = (aliases, lookalikes, excluded)
+    return finding(effect, label[1], where, found, words, evidence.gain, log10_p, rivals)
 
 
-def _alias(view: Scene, alias: Alias) -> AliasFigure:
+def _rival(view: Scene, alias: Alias) -> Rival:
     name, sensor, stage = alias.candidate.label
     where = view.system.stages[stage].name
-    return AliasFigure(
-        name, sensor, where, alias.cosine, alias.loss, alias.possible, alias.refitted
-    )
+    return Rival(name, sensor, where, alias.cosine, alias.loss, alias.possible, alias.refitted)
 
 
 def _gross(view: Scene, fault: Gross) -> Finding:
     effect, label = fault.acting.effect, fault.acting.label
-    figures = {p.name: Figure(fault.acting.values[p.name], None, p.unit) for p in effect.parameters}
+    found = {p.name: estimate(fault.acting.values[p.name], unit=p.unit) for p in effect.parameters}
     stage = view.system.stages[label[2]].name
     gain = math.log(fault.falls_by)
-    return Finding(effect, label[1], stage, figures, (), (), gain, None, gross=True)
+    words = f"undoing it makes the usual error {math.exp(gain):.0f} times smaller"
+    return finding(effect, label[1], stage, found, words, gain)
 
 
 def _stochastic(final: Settled, opened: Opened) -> Finding:
@@ -188,7 +153,7 @@ def _stochastic(final: Settled, opened: Opened) -> Finding:
         figures = {"factor": (value, value * _log_spread(data, model, ("factor", index, 0)))}
     else:
         figures = _wander(data, model, sensor, opened.what)
-    shown = {name: Figure(v, s, units[name]) for name, (v, s) in figures.items()}
+    shown = {name: estimate(v, s, units[name]) for name, (v, s) in figures.items()}
     return _finding(final, effect, label, shown)
 
 

@@ -20,6 +20,7 @@ from syncline_design.diagnosis.noise import (
     spec_bounds,
 )
 from syncline_design.diagnosis.regimes import covariates
+from syncline_design.diagnosis.result import Fit, Gap, HeldOut, Saved
 from syncline_design.effects.record import Array
 
 BLOCKS = 5
@@ -27,49 +28,10 @@ PURGE_S = 5.0  # left out on both sides of a held-out block
 PURGE_SHARE = 0.1  # of a block, at most
 REGIME_SHARE = 0.3  # fastest share of the rows, held out as a regime
 LEAST_GAP = 1e-9  # nat per sample
-LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
 LEAST_TRAINING = 30  # rows
 NORMAL_95 = 1.959963984540054
 
 Index = NDArray[np.int64]
-
-
-@dataclass(frozen=True, slots=True)
-class Fit:
-    """How well a model predicts rows: 3-D RMS, chi-square and NLL per component, 95 % coverage."""
-
-    rms_m: float
-    reduced_chi2: float
-    nll_per_sample: float
-    coverage_95: float
-
-
-@dataclass(frozen=True, slots=True)
-class Gap:
-    """Before, after and floor on held-out rows.
-
-    fitted: at best, the same effects fitted to all rows, the held-out ones too.  floor: that, or
-    what the spec's own noise would give, whichever is lower, in RMS and in NLL: down to where
-    closed_fraction counts, which no model need reach.  expected_rms_m: what the spec's noise gives.
-    closed_fraction: (before - after) / (before - floor), in NLL or in RMS, whichever is less; None
-    where nothing was held out (findings that only change the noise), and where there was no gap to
-    speak of (`slight`: 2 % of the RMS at most, which is what an effect of a fifth of it makes).
-    difference: NLL per sample saved, with its standard error over the blocks, None of one block.
-    """
-
-    before: Fit
-    after: Fit
-    floor: Fit
-    closed_fraction: float | None
-    difference: float
-    difference_error: float | None
-    expected_rms_m: float
-    fitted: Fit
-
-    @property
-    def slight(self) -> bool:
-        """Whether what could be closed is next to nothing."""
-        return _slight(self.before, self.floor)
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,14 +102,14 @@ def regime_fold(data: Data) -> tuple[str, Folds]:
     return f"{name} above {limit:.3g} {unit}", Folds(((training, held),))
 
 
-def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> Gap | None:
+def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> Gap:
     """Evaluate a model on held-out rows, its parameters fitted on the other rows.
 
     Around the fitted parameters the error is linear, so a fit to part of the rows is one step.
     extra: columns (n, 3, p) of an effect that was not chosen, as a placebo.
     """
     if not folds.pairs:
-        return None
+        return Gap()
     columns = np.nan_to_num(slopes(data.view, model.acting))
     held_out = columns.shape[2] > 0
     if extra is not None:
@@ -172,28 +134,29 @@ def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> G
         nll_per_sample=min(fitted.nll_per_sample, expected.nll_per_sample),
     )
     spread = float(np.std(saved, ddof=1) / np.sqrt(len(saved))) if len(saved) > 1 else None
-    closed = closed_share(before, after, floor) if held_out else None
-    gained = before.nll_per_sample - after.nll_per_sample
-    return Gap(before, after, floor, closed, gained, spread, expected.rms_m, fitted)
+    scores = HeldOut(before, after, floor, fitted)
+    return Gap(
+        held_out=scores,
+        expected_rms_m=expected.rms_m,
+        closed_fraction=closed_share(scores) if held_out else None,
+        nll_saved_per_sample=Saved(before.nll_per_sample - after.nll_per_sample, spread),
+    )
 
 
-def closed_share(before: Fit, after: Fit, floor: Fit) -> float | None:
+def closed_share(scores: HeldOut) -> float | None:
     """Share of the gap that is closed, the lesser of NLL and RMS; 1 at most.
 
     Better by the likelihood alone may be a larger noise, better by the RMS alone a lucky fit.
     """
+    before, after, floor = scores.before, scores.after, scores.floor
     shares = []
     if before.nll_per_sample - floor.nll_per_sample > LEAST_GAP:
         gained = before.nll_per_sample - after.nll_per_sample
         shares.append(gained / (before.nll_per_sample - floor.nll_per_sample))
-    if _slight(before, floor):
+    if scores.slight:
         return None
     shares.append((before.rms_m - after.rms_m) / (before.rms_m - floor.rms_m))
     return min(1.0, *shares)
-
-
-def _slight(before: Fit, floor: Fit) -> bool:
-    return before.rms_m - floor.rms_m <= LEAST_SHARE * before.rms_m
 
 
 def _step(known: Precision, columns: Array, error: Array) -> Array:

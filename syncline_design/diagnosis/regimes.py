@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.fitting import inner, inverse_scaled
+from syncline_design.diagnosis.result import Regime
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
@@ -20,20 +21,6 @@ SMOOTH_S, LEAST_HALF = 3.0, 3
 STRONG = 4.0  # a cell's score that is worth showing
 AXES = ("north", "east", "down", "along", "across", "forward", "right", "body_down")
 WINDOWS = 40  # of time, for the first disagreement
-
-
-@dataclass(frozen=True, slots=True)
-class Cell:
-    """One cell of the map: mean error in the regime along an axis over its standard error."""
-
-    covariate: str
-    low: float
-    high: float
-    unit: str
-    axis: str
-    score: float
-    mean_m: float
-    rows: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,13 +83,13 @@ def axis_vectors(view: Scene) -> Array:
     return np.concatenate([ned, along[:, :, None], across[:, :, None], rows.rotation], axis=2)
 
 
-def where_map(view: Scene, error: Array, known: Precision) -> tuple[Cell, ...]:
+def where_map(view: Scene, error: Array, known: Precision) -> tuple[Regime, ...]:
     """All cells; the score takes the noise's correlation into account."""
     weighted = known.solve(np.nan_to_num(error)[:, :, None])[:, :, 0]
     axes = axis_vectors(view)
     numerator = np.einsum("nij,ni->nj", axes, weighted)
     plain = np.einsum("nij,ni->nj", axes, np.nan_to_num(error))
-    cells: list[Cell] = []
+    cells: list[Regime] = []
     for covariate in covariates(view):
         edges = np.quantile(covariate.values, np.linspace(0.0, 1.0, BINS + 1))
         for low, high in itertools.pairwise(edges):
@@ -119,7 +106,7 @@ def where_map(view: Scene, error: Array, known: Precision) -> tuple[Cell, ...]:
                     score = float(np.sum(numerator[inside, k]) / np.sqrt(own[k]))
                     mean = float(np.mean(plain[inside, k]))
                     cells.append(
-                        Cell(
+                        Regime(
                             covariate.name,
                             float(low),
                             float(high),
@@ -133,9 +120,9 @@ def where_map(view: Scene, error: Array, known: Precision) -> tuple[Cell, ...]:
     return tuple(cells)
 
 
-def strongest(cells: tuple[Cell, ...], count: int = 8) -> tuple[Cell, ...]:
+def strongest(cells: tuple[Regime, ...], count: int = 8) -> tuple[Regime, ...]:
     """The cells that disagree most, one per covariate and axis."""
-    best: dict[tuple[str, str], Cell] = {}
+    best: dict[tuple[str, str], Regime] = {}
     for cell in cells:
         key = cell.covariate, cell.axis
         if abs(cell.score) > STRONG and (key not in best or abs(cell.score) > abs(best[key].score)):

@@ -1,177 +1,363 @@
-"""What a diagnosis says, and how it is written down (schema syncline-design/diagnosis/v1)."""
+"""What a diagnosis says: typed, and written as JSON (schema syncline-design/diagnosis/v1)."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Final, Literal
 
-from syncline_design.diagnosis.checks import Check
-from syncline_design.diagnosis.findings import Finding, figure_text
-from syncline_design.diagnosis.gap import Gap
-from syncline_design.diagnosis.regimes import Cell
-from syncline_design.diagnosis.remainder import Remainder
+from syncline_design.machine.records import Record, optional
 from syncline_design.spec.effects_listed import EffectChoice
 
-SCHEMA = "syncline-design/diagnosis/v1"
+SCHEMA: Final = "syncline-design/diagnosis/v1"
 Verdict = Literal["agrees", "explained", "unexplained"]
-Json = dict[str, Any]
-EXIT_CODES: Mapping[Verdict, int] = {"agrees": 0, "explained": 1, "unexplained": 1}
+Severity = Literal["contradiction", "caution"]
+EXIT_CODES: Final[Mapping[Verdict, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
+LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
 
 
 @dataclass(frozen=True, slots=True)
-class Stairs:
-    """The held-out gap after an addition."""
+class Check(Record):
+    """One thing that is wrong with a log before anything is named.
 
-    label: str
-    gap: Gap
+    code: speed, turn_rate, range, velocity_columns or rate_columns.  value, limit: a quantile
+    against the platform's figure (SI), or the factor between columns and its 1; share: of rows
+    beyond the limit.
+    """
+
+    code: str
+    stage: str
+    severity: Severity
+    message: str
+    value: float
+    limit: float
+    unit: str
+    share: float
 
 
 @dataclass(frozen=True, slots=True)
-class Diagnosis:
-    """The outcome; `plots` holds what figures need, plain lists and numbers."""
+class Estimate(Record):
+    """One parameter: its value and standard uncertainty in SI; a convention is a word.
 
+    standard_uncertainty: None where nothing bounds it, as where the log says nothing of it.
+    seen: whether the log does; a lever arm has no seen down part in a planar log.
+    text: as every output prints it.
+    """
+
+    value: float | str
+    standard_uncertainty: float | None
+    unit: str
+    seen: bool
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rival(Record):
+    """Another effect beside the named one; nats_worse counts the freedom of both.
+
+    possible: whether it fits with values that the effect can have.  refitted: with noise fitted
+    anew, as the evidence is; otherwise to first order with the named effect's noise.
+    """
+
+    effect: str
+    sensor: str
+    stage: str
+    cosine: float
+    nats_worse: float
+    possible: bool = True
+    refitted: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Finding(Record):
+    """One missing effect: what is wrong, with figures, and how sure this is.
+
+    aliases: what this log cannot tell it from.  lookalikes: of the same signature, or as good in
+    its place, but not it.  excluded: told apart on this log.
+    """
+
+    effect: str
+    sensor: str
+    stage: str
+    parameters: Mapping[str, Estimate]
+    aliases: tuple[Rival, ...]
+    lookalikes: tuple[Rival, ...]
+    excluded: tuple[Rival, ...]
+    sentence: str
+    evidence: str
+    gain_nat: float
+    log10_p: float | None
+    confused_with: str
+    separated_by: str
+    source: str
+
+    def as_entry(self) -> EffectChoice:
+        """The finding as an entry of a spec's `effects:`."""
+        spreads = {name: e.standard_uncertainty for name, e in self.parameters.items()}
+        return EffectChoice(
+            effect=self.effect,
+            sensor=self.sensor,  # type: ignore[arg-type]  # a sensor of the effect's record
+            stage=self.stage,
+            parameters={name: e.value for name, e in self.parameters.items()},
+            standard_uncertainty={
+                n: s for n, s in spreads.items() if s is not None and math.isfinite(s)
+            },
+            source="diagnose",
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Fit(Record):
+    """How well a model predicts rows: 3-D RMS, chi-square and NLL per component, 95 % coverage."""
+
+    rms_m: float
+    reduced_chi2: float
+    nll_per_sample: float
+    coverage_95: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut(Record):
+    """Held-out rows before, after and at best.
+
+    fitted: at best, the same effects fitted to all rows, the held-out ones too.  floor: that, or
+    what the spec's own noise would give, whichever is lower, in RMS and in NLL: down to where a
+    closed fraction counts, which no model need reach.
+    """
+
+    before: Fit
+    after: Fit
+    floor: Fit
+    fitted: Fit
+
+    @property
+    def slight(self) -> bool:
+        """Whether what could be closed is next to nothing."""
+        return self.before.rms_m - self.floor.rms_m <= LEAST_SHARE * self.before.rms_m
+
+
+@dataclass(frozen=True, slots=True)
+class Saved(Record):
+    """NLL saved per sample, and its standard error over the blocks: None of one block."""
+
+    value: float
+    standard_error: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Gap(Record):
+    """The gap on rows that the fit has not seen; held_out: None where none could be held out.
+
+    added: what was added for it, of a step and of the placebo.  held_rows: which rows a regime is.
+    expected_rms_m: what the spec's noise gives.
+    closed_fraction: (before - after) / (before - floor), in NLL or in RMS, whichever is less; None
+    where nothing was held out (findings that only change the noise), and where there was no gap to
+    speak of (`HeldOut.slight`).
+    """
+
+    added: str | None = optional()
+    held_out: HeldOut | None = None
+    expected_rms_m: float | None = optional()
+    closed_fraction: float | None = None
+    nll_saved_per_sample: Saved | None = optional()
+    held_rows: str | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class WholeGap(Gap):
+    """The gap on blocks of the log, on its fastest part, and with a placebo added."""
+
+    regime: Gap = Gap()
+    placebo: Gap = Gap()
+
+
+@dataclass(frozen=True, slots=True)
+class Regime(Record):
+    """Part of a log told by a covariate, and an axis: the mean error over its standard error."""
+
+    covariate: str
+    low: float
+    high: float
+    unit: str
+    axis: str
+    score: float
+    mean_m: float
+    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Remaining(Record):
+    """What is left when everything named is in; p: chance that noise alone leaves it."""
+
+    unexplained: bool
+    spec_m: float | None
+    beyond_noise: bool
+    p: float
+    where: tuple[Regime, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Motion(Record):
+    """5 and 95 % quantile of one covariate."""
+
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class LogRead(Record):
+    """What was read and what was left out: rows = used + thinned + all that was rejected."""
+
+    kind: str
+    rows: int
+    used: int
+    rejected: Mapping[str, int]
+    thinned: int
+    notes: tuple[str, ...]
+    duration_s: float
+    interval_s: float
+    fitted: int
+    motion: Mapping[str, Motion]
+
+
+@dataclass(frozen=True, slots=True)
+class SlowNoise(Record):
+    """A sensor's slow noise per axis."""
+
+    variance_over_spec: tuple[float, ...]
+    time_constant_s: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Likelihoods(Record):
+    """Negative log likelihood of all rows [nat]."""
+
+    nll_before: float
+    nll_after: float
+
+
+@dataclass(frozen=True, slots=True)
+class Noise(Record):
+    """The fitted noise, by `stage/sensor`; white_factor: standard deviation over the spec's."""
+
+    white_factor: Mapping[str, float]
+    slow: Mapping[str, SlowNoise]
+    rows_fitted: int
+    remainder: Likelihoods
+
+
+@dataclass(frozen=True, slots=True)
+class AxisResiduals(Record):
+    """Residuals of one axis [m]; None where the log knows no truth along it."""
+
+    before: tuple[float | None, ...]
+    after: tuple[float | None, ...]
+    signature: tuple[float | None, ...]
+    expected_std: tuple[float | None, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Residuals(Record):
+    """Residuals over time, by axis."""
+
+    time_s: tuple[float, ...]
+    axes: Mapping[str, AxisResiduals]
+
+
+@dataclass(frozen=True, slots=True)
+class MapCell(Record):
+    """One regime of a covariate, and the axis that disagrees most in it."""
+
+    low: float
+    high: float
+    axis: str
+    score: float
+    mean_m: float
+    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class CovariateMap(Record):
+    """Disagreement over one covariate."""
+
+    covariate: str
+    unit: str
+    cells: tuple[MapCell, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage(Record):
+    """Share of components inside the interval of a nominal share."""
+
+    nominal: float
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class Plots(Record):
+    """What figures need, thinned to what a plot can show."""
+
+    residuals: Residuals
+    where_map: tuple[CovariateMap, ...]
+    coverage: tuple[Coverage, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SpecRead(Record):
+    """The spec beside the log."""
+
+    name: str
+    file: str
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance(Record):
+    """What the answer depends on besides the log."""
+
+    version: str
+    seed: int
+    false_alarm_rate: float
+    max_effects: int
+    exclude_effects: tuple[str, ...]
+    spec_sha256: str | None
+    catalogs_sha256: str | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Diagnosis(Record):
+    """The outcome.
+
+    sound: whether the log contradicts neither itself nor the limits of the spec's platform.
+    where: the regimes that disagreed most before anything was named.  steps: the gap after each
+    addition.  unseen: what this log could not show.
+    """
+
+    schema: str = SCHEMA
     verdict: Verdict
+    sound: bool
     checks: tuple[Check, ...]
     findings: tuple[Finding, ...]
-    remaining: Remainder
-    left: bool  # whether what remains is more than noise
-    where_before: tuple[Cell, ...]
-    where_after: tuple[Cell, ...]
+    remaining: Remaining
+    where: tuple[Regime, ...]
     first_disagreement_s: float | None
-    gap: Gap | None
-    regime: tuple[str, Gap | None]
-    placebo: tuple[str, Gap | None]
-    steps: tuple[Stairs, ...]
+    gap: WholeGap
+    steps: tuple[Gap, ...]
     unseen: tuple[str, ...]
-    log: Json
-    noise: Json
-    plots: Json
-    spec: Json | None
+    log: LogRead
+    noise: Noise
+    plots: Plots
+    spec: SpecRead | None
     log_files: tuple[str, ...]
-    provenance: Json
+    provenance: Provenance
 
     @property
     def exit_code(self) -> int:
         """0 agrees, 1 something is missing."""
         return EXIT_CODES[self.verdict]
 
-    @property
-    def sound(self) -> bool:
-        """Whether the log contradicts neither itself nor the limits of the spec's platform."""
-        return all(check.severity != "contradiction" for check in self.checks)
-
-    @property
-    def unexplained(self) -> bool:
-        return self.verdict == "unexplained"
-
     def effects_entries(self) -> tuple[EffectChoice, ...]:
-        """The findings as entries of a spec's `effects:`, for `spec_writer.with_effects_text`."""
-        return tuple(_entry(finding) for finding in self.findings)
-
-    def to_json(self) -> Json:
-        """Plain data; every number is finite or null."""
-        document = {
-            "schema": SCHEMA,
-            "verdict": self.verdict,
-            "sound": self.sound,
-            "checks": [asdict(check) for check in self.checks],
-            "findings": [finding_json(f) for f in self.findings],
-            "remaining": {
-                "unexplained": self.unexplained,
-                "spec_m": None if self.gap is None else self.gap.expected_rms_m,
-                "beyond_noise": self.left,
-                "p": self.remaining.p,
-                "where": [_cell_json(c) for c in self.where_after],
-            },
-            "where": [_cell_json(c) for c in self.where_before],
-            "first_disagreement_s": self.first_disagreement_s,
-            "gap": self._gap_json(),
-            "steps": [{"added": s.label, **_gap_json(s.gap)} for s in self.steps],
-            "unseen": list(self.unseen),
-            "log": self.log,
-            "noise": self.noise,
-            "plots": self.plots,
-            "spec": self.spec,
-            "log_files": list(self.log_files),
-            "provenance": self.provenance,
-        }
-        clean: Json = _finite(document)
-        return clean
-
-    def _gap_json(self) -> Json:
-        return {
-            **_gap_json(self.gap),
-            "regime": {"held_out": self.regime[0], **_gap_json(self.regime[1])},
-            "placebo": {"added": self.placebo[0], **_gap_json(self.placebo[1])},
-        }
-
-
-def _entry(finding: Finding) -> EffectChoice:
-    values = {name: figure.value for name, figure in finding.parameters.items()}
-    spreads = {
-        name: figure.standard_uncertainty
-        for name, figure in finding.parameters.items()
-        if figure.standard_uncertainty is not None and math.isfinite(figure.standard_uncertainty)
-    }
-    return EffectChoice(
-        effect=finding.effect.name,
-        sensor=finding.sensor,  # type: ignore[arg-type]
-        stage=finding.stage,
-        parameters=values,
-        standard_uncertainty=spreads,
-        source="diagnose",
-    )
-
-
-def finding_json(finding: Finding) -> Json:
-    """One finding as an entry of `findings`."""
-    return {
-        "effect": finding.effect.name,
-        "sensor": finding.sensor,
-        "stage": finding.stage,
-        "parameters": {
-            name: {**asdict(f), "text": figure_text(f)} for name, f in finding.parameters.items()
-        },
-        "aliases": [asdict(a) for a in finding.aliases],
-        "lookalikes": [asdict(a) for a in finding.lookalikes],
-        "excluded": [asdict(a) for a in finding.excluded],
-        "sentence": finding.sentence,
-        "evidence": finding.evidence,
-        "gain_nat": finding.gain_nat,
-        "log10_p": finding.log10_p,
-        "confused_with": finding.effect.confused_with,
-        "separated_by": finding.effect.separated_by,
-        "source": finding.effect.source,
-    }
-
-
-def _cell_json(cell: Cell) -> Json:
-    return asdict(cell)
-
-
-def _gap_json(gap: Gap | None) -> Json:
-    if gap is None:
-        return {"held_out": None, "closed_fraction": None}
-    return {
-        "held_out": {
-            "before": asdict(gap.before),
-            "after": asdict(gap.after),
-            "floor": asdict(gap.floor),
-            "fitted": asdict(gap.fitted),
-        },
-        "expected_rms_m": gap.expected_rms_m,
-        "closed_fraction": gap.closed_fraction,
-        "nll_saved_per_sample": {"value": gap.difference, "standard_error": gap.difference_error},
-    }
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(v) for v in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    return value
+        """The findings as entries of a spec's `effects:`."""
+        return tuple(finding.as_entry() for finding in self.findings)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,16 +13,29 @@ from syncline_design.diagnosis.axes import without_still_axes
 from syncline_design.diagnosis.candidates import candidates, directed_parts, noise_of_heading
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.figures_data import plots
 from syncline_design.diagnosis.findings import findings
 from syncline_design.diagnosis.fitting import WINDOW, Data, data_of, windows
-from syncline_design.diagnosis.gap import Gap, block_folds, gap, regime_fold
+from syncline_design.diagnosis.gap import block_folds, gap, regime_fold
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
 from syncline_design.diagnosis.linear_algebra import one_thread
+from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import covariates, first_disagreement_s, strongest, where_map
 from syncline_design.diagnosis.remainder import remainder
-from syncline_design.diagnosis.result import Diagnosis, Json, Stairs, Verdict
+from syncline_design.diagnosis.result import (
+    Diagnosis,
+    Gap,
+    Likelihoods,
+    LogRead,
+    Motion,
+    Noise,
+    Provenance,
+    Remaining,
+    SlowNoise,
+    SpecRead,
+    Verdict,
+    WholeGap,
+)
 from syncline_design.diagnosis.scene import Acting, scene
 from syncline_design.diagnosis.search import Search, SearchResult, start_search
 from syncline_design.diagnosis.settings import DiagnosisSettings, Progress, silent
@@ -79,38 +91,32 @@ def diagnose_measured(
     view = data.view
     progress("testing what remains", 0.7)
     rest = remainder(data, result.model, search.rng)
-    named = bool(result.model.labels or faults)
     left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
     checks = log_checks(view)
     sound = all(c.severity != "contradiction" for c in checks)
     verdict: Verdict = "unexplained"
     if sound and not left:
-        verdict = "explained" if named else "agrees"
+        verdict = "explained" if result.model.labels or faults else "agrees"
     progress("measuring the gap", 0.8)
-    shown = findings(result.final, faults)
     cells = where_map(view, result.base.error, result.model.precision)
-    cells_after = where_map(view, result.model.error, result.model.precision)
-    folds = block_folds(data)
-    regime_name, regime = regime_fold(data)
+    after = where_map(view, result.model.error, result.model.precision)
+    whole = _whole_gap(data, search, result)
+    unexplained = verdict == "unexplained"
     return Diagnosis(
         verdict=verdict,
+        sound=sound,
         checks=checks,
-        findings=shown,
-        remaining=rest,
-        left=left,
-        where_before=strongest(cells),
-        where_after=strongest(cells_after),
+        findings=findings(result.final, faults),
+        remaining=Remaining(unexplained, whole.expected_rms_m, left, rest.p, strongest(after)),
+        where=strongest(cells),
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
-        gap=gap(data, result.model, folds),
-        regime=(regime_name, gap(data, result.model, regime)),
-        placebo=_placebo(data, search, result),
-        steps=_stairs(data, result),
+        gap=whole,
+        steps=_steps(data, result),
         unseen=_unseen(data, search, result, settings.exclude_effects),
-        log=log_json(replace(inputs.log, notes=view.log.notes))
-        | {"fitted": len(view), "motion": _motion_json(data)},
-        noise=_noise_json(data, result),
+        log=_log_read(replace(inputs.log, notes=view.log.notes), data),
+        noise=_noise(data, result),
         plots=plots(data, result, cells),
-        spec=None if case is None else {"name": case.spec.name, "file": str(case.path)},
+        spec=None if case is None else SpecRead(case.spec.name, str(case.path)),
         log_files=tuple(inputs.files),
         provenance=_provenance(settings, case),
     )
@@ -151,27 +157,41 @@ def expected_size(inputs: Measured) -> float:
     return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
 
 
-def _stairs(data: Data, result: SearchResult) -> tuple[Stairs, ...]:
+def _steps(data: Data, result: SearchResult) -> tuple[Gap, ...]:
+    """The gap after each addition."""
     folds = block_folds(data)
-    stairs = []
-    for label, model in result.final.stairs:
-        found = gap(data, model, folds)
-        if found is not None:
-            name, sensor, _ = label
-            stairs.append(Stairs(f"{name} ({sensor})", found))
-    return tuple(stairs)
+    found = [(label, gap(data, model, folds)) for label, model in result.final.stairs]
+    return tuple(
+        replace(one, added=f"{name} ({sensor})")
+        for (name, sensor, _), one in found
+        if one.held_out is not None
+    )
 
 
-def _placebo(data: Data, search: Search, result: SearchResult) -> tuple[str, Gap | None]:
+def _whole_gap(data: Data, search: Search, result: SearchResult) -> WholeGap:
+    """On blocks of the log, on its fastest part, and with a placebo."""
+    blocks = gap(data, result.model, block_folds(data))
+    name, fold = regime_fold(data)
+    return WholeGap(
+        held_out=blocks.held_out,
+        expected_rms_m=blocks.expected_rms_m,
+        closed_fraction=blocks.closed_fraction,
+        nll_saved_per_sample=blocks.nll_saved_per_sample,
+        regime=replace(gap(data, result.model, fold), held_rows=name),
+        placebo=_placebo(data, search, result),
+    )
+
+
+def _placebo(data: Data, search: Search, result: SearchResult) -> Gap:
     """The gap with one more effect, drawn from those that were not chosen."""
     free = [s for s in search.free_signatures(result.model) if not s.at]
     if not free or not result.model.labels:
-        return "", None
+        return Gap(added="")
     chosen = free[int(search.rng.integers(len(free)))]
     name, sensor, _ = chosen.candidate.label
     columns = np.nan_to_num(chosen.columns)
     found = gap(data, result.model, block_folds(data), columns)
-    return f"{name} ({sensor})", found
+    return replace(found, added=f"{name} ({sensor})")
 
 
 def _unseen(
@@ -195,59 +215,46 @@ def _unseen_parts(result: SearchResult) -> tuple[str, ...]:
     return tuple(found)
 
 
-def log_json(log: Log) -> Json:
-    """What was read and what was left out: rows = used + thinned + all that was rejected."""
-    return {
-        "kind": log.kind,
-        "rows": log.rows_read,
-        "used": len(log),
-        "rejected": dict(log.rejected),
-        "thinned": log.thinned,
-        "notes": list(log.notes),
-        "duration_s": log.duration_s,
-        "interval_s": log.interval_s,
-    }
-
-
-def _motion_json(data: Data) -> Json:
-    """How the log moves: 5 and 95 % quantile of every covariate but time and angles."""
-    return {
-        c.name: {"low": float(low), "high": float(high), "unit": c.unit}
+def _log_read(log: Log, data: Data) -> LogRead:
+    """What was read of a log, and how it moves: every covariate but time and angles."""
+    motion = {
+        c.name: Motion(float(low), float(high), c.unit)
         for c in covariates(data.view)
         if c.name in ("speed", "turn_rate", "range")
         for low, high in [np.quantile(c.values, [0.05, 0.95])]
     }
+    return LogRead(
+        kind=log.kind,
+        rows=log.rows_read,
+        used=len(log),
+        rejected=dict(log.rejected),
+        thinned=log.thinned,
+        notes=log.notes,
+        duration_s=log.duration_s,
+        interval_s=log.interval_s,
+        fitted=len(data.view),
+        motion=motion,
+    )
 
 
-def _noise_json(data: Data, result: SearchResult) -> Json:
-    level = result.model.level
-    return {
-        "white_factor": {
-            "/".join(w.sensor): f for w, f in zip(data.structure.white, level.factor, strict=True)
-        },
-        "slow": {
-            "/".join(s.sensor): {"variance_over_spec": list(v), "time_constant_s": list(t)[:1]}
-            for s, v, t in zip(data.structure.slow, level.slow, level.time_constant_s, strict=True)
-        },
-        "rows_fitted": len(data.noise_rows),
-        "remainder": asdict(result_remainder(result)),
-    }
+def _noise(data: Data, result: SearchResult) -> Noise:
+    structure, level = data.structure, result.model.level
+    slow = zip(structure.slow, level.slow, level.time_constant_s, strict=True)
+    return Noise(
+        {"/".join(w.sensor): f for w, f in zip(structure.white, level.factor, strict=True)},
+        {"/".join(part.sensor): SlowNoise(v, t[:1]) for part, v, t in slow},
+        len(data.noise_rows),
+        Likelihoods(result.base.nll, result.model.nll),
+    )
 
 
-def result_remainder(result: SearchResult) -> Any:
-    """The negative log likelihoods before and after [nat]."""
-    from syncline_design.diagnosis.figures_data import Likelihoods
-
-    return Likelihoods(result.base.nll, result.model.nll)
-
-
-def _provenance(settings: DiagnosisSettings, case: Case | None) -> Json:
-    return {
-        "version": __version__,
-        "seed": settings.seed,
-        "false_alarm_rate": settings.false_alarm_rate,
-        "max_effects": settings.max_effects,
-        "exclude_effects": list(settings.exclude_effects),
-        "spec_sha256": case.spec_sha256 if case else None,
-        "catalogs_sha256": case.catalogs_sha256 if case else None,
-    }
+def _provenance(settings: DiagnosisSettings, case: Case | None) -> Provenance:
+    return Provenance(
+        version=__version__,
+        seed=settings.seed,
+        false_alarm_rate=settings.false_alarm_rate,
+        max_effects=settings.max_effects,
+        exclude_effects=settings.exclude_effects,
+        spec_sha256=case.spec_sha256 if case else None,
+        catalogs_sha256=case.catalogs_sha256 if case else None,
+    )

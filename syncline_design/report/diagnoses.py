@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from syncline_design.comparison.meaning import DiagnosisAndDesign
 from syncline_design.report.formats import DIAGNOSE_FORMATS as DIAGNOSE_FORMATS
 
 
-def render_diagnose(name: str, data: dict[str, Any]) -> str:
-    """The text of one format for a diagnosis (schema syncline-design/diagnosis/v1)."""
+def render_diagnose(name: str, found: DiagnosisAndDesign) -> str:
+    """The text of one format for a diagnosis and what it means for the design."""
     if name == "json":
         from syncline_design.report.json_out import json_text
 
-        return json_text(data)
+        return json_text(found.to_json())
     if name == "markdown":
         from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
 
-        return render_diagnosis_markdown(data)
+        return render_diagnosis_markdown(found)
     from syncline_design.report.on_diagnosis import render_diagnosis
 
-    return render_diagnosis(data)
+    return render_diagnosis(found)

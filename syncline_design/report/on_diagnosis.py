@@ -2,17 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Final
 
+from syncline_design.comparison.meaning import DesignMeaning, DiagnosisAndDesign
+from syncline_design.diagnosis.result import (
+    CovariateMap,
+    Coverage,
+    Diagnosis,
+    Estimate,
+    Finding,
+    Fit,
+    Gap,
+    LogRead,
+    Regime,
+    Rival,
+    WholeGap,
+)
+from syncline_design.machine.records import with_texts
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import figures_diagnosis as drawings
 from syncline_design.report import numbers, page
 from syncline_design.report.document import Outcome
 from syncline_design.report.svg import InlineFigure
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.text import harmless, sentence_list
-from syncline_design.report.verdict_words import Json, items, named, part
+from syncline_design.report.text import sentence_list, visible
 
 DIAGNOSES: Final[dict[str, Outcome]] = {
     "agrees": Outcome("good", "\u2713", "Log and simulation agree"),
@@ -31,380 +47,332 @@ _CONTENTS: Final = (
 )
 
 
-def render_diagnosis(data: Json) -> str:
-    """The HTML page of one diagnosis (schema syncline-design/diagnosis/v1)."""
-    data = harmless(data)
-    drawn = _figures(data)
+def render_diagnosis(found: DiagnosisAndDesign) -> str:
+    """The HTML page of one diagnosis."""
+    found = with_texts(found, visible)
+    drawn = _figures(found)
     sections: dict[str, Any] = {
-        "findings": [finding_words(entry) for entry in items(data, "findings")],
-        "gap": [t for t in (gap_table(data), _steps(data)) if t is not None],
+        "findings": [finding_words(entry) for entry in found.findings],
+        "gap": [t for t in (gap_table(found.gap), _steps(found.steps)) if t is not None],
         "residuals": "residuals" in drawn,
-        "where": where_lines(data),
-        "design": design_lines(data),
-        "log": _log_facts(data),
-        "provenance": _provenance(data),
+        "where": where_lines(found),
+        "design": design_lines(found.design),
+        "log": _log_facts(found),
+        "provenance": _provenance(found),
     }
     return page.render_page(
         "diagnosis.html.j2",
         kind="Diagnosis",
-        name=str(part(data, "spec").get("name") or "Measured log against simulation"),
-        outcome=outcome_of(data),
-        sentence=sentence_text(data),
-        facts=_facts(data),
+        name=name_of(found),
+        outcome=outcome_of(found),
+        sentence=sentence_text(found),
+        facts=_facts(found),
         contents=[(key, label) for key, label in _CONTENTS if sections[key]],
         sections=sections,
         figures={key: None if key not in drawn else page.trusted_svg(drawn[key].svg)
                  for key in ("residuals", "gap", "where", "coverage")},
-        coverage=_coverage(data),
-        meaning=meaning_table(data),
-        unseen=[plain_text(entry) for entry in data.get("unseen") or ()],
-        rejected=_rejected(data),
-        remaining=remaining_text(data),
+        coverage=_coverage(found.plots.coverage),
+        meaning=meaning_table(found.design),
+        unseen=list(found.unseen),
+        rejected=_rejected(found.log),
+        remaining=remaining_text(found),
     )  # fmt: skip
 
 
-def parameter_text(entry: Json) -> str:
-    """`87.1 ± 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
-    value, unit = numbers.finite(entry.get("value")), str(entry.get("unit") or "")
-    if entry.get("seen") is False:
+def name_of(found: Diagnosis) -> str:
+    """The spec's name; of a system in memory, what was done."""
+    return found.spec.name if found.spec is not None else "Measured log against simulation"
+
+
+def _parameter_text(shown: Estimate) -> str:
+    """`87.1 \u00b1 0.3 ms`: an estimate with its standard uncertainty, both in one unit."""
+    if not shown.seen:
         return "not seen in this log"
-    if value is None:
-        return plain_text(entry.get("value"))
-    return numbers.with_uncertainty(value, numbers.finite(entry.get("standard_uncertainty")), unit)
+    if isinstance(shown.value, str):
+        return shown.value
+    spread = numbers.finite(shown.standard_uncertainty)
+    return numbers.with_uncertainty(shown.value, spread, shown.unit)
 
 
-def _length(value_m: object) -> str:
+def _length(value_m: float) -> str:
     """Metres as the console prints them: 12.3 cm there is 12.3 cm here."""
-    known = numbers.finite(value_m)
-    return numbers.MISSING if known is None else numbers.with_uncertainty(known, None, "m")
+    return numbers.with_uncertainty(value_m, None, "m")
 
 
-def plain_text(value: object) -> str:
-    """Any JSON value as words: lists joined, mappings as `key value`."""
-    if value is None:
-        return ""
-    if isinstance(value, Mapping):
-        return ", ".join(
-            f"{key.replace('_', ' ')} {plain_text(entry)}" for key, entry in value.items()
-        )
-    if isinstance(value, list | tuple):
-        return sentence_list([plain_text(entry) for entry in value])
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return numbers.number(value) if isinstance(value, int | float) else str(value)
+@dataclass(frozen=True, slots=True)
+class FindingWords:
+    """A finding as pages and Markdown say it."""
+
+    title: str
+    place: str
+    sentence: str
+    parameters: tuple[tuple[str, str], ...]
+    aliases: str
+    lookalikes: str
+    excluded: str
+    separated_by: str
+    evidence: str
 
 
-def finding_words(entry: Json) -> dict[str, Any]:
-    parameters = [
-        (split_suffix(name)[0].replace("_", " "), parameter_text(value))
-        for name, value in named(entry, "parameters")
-    ]
-    return {
-        "title": str(entry.get("effect")).replace("_", " "),
-        "code": str(entry.get("effect")),
-        "place": " ".join(str(entry.get(key) or "") for key in ("stage", "sensor")).strip(),
-        "sentence": _full_stop(str(entry.get("sentence") or "")),
-        "parameters": parameters,
-        "aliases": sentence_list([_effect_text(e) for e in entry.get("aliases") or ()]),
-        "lookalikes": sentence_list([_excluded_text(e) for e in items(entry, "lookalikes")]),
-        "excluded": sentence_list([_excluded_text(e) for e in items(entry, "excluded")]),
-        "separated_by": plain_text(entry.get("separated_by")),
-        "evidence": plain_text(entry.get("evidence")),
-    }
+def finding_words(found: Finding) -> FindingWords:
+    """A finding's parts, lists joined."""
+    return FindingWords(
+        title=_spaced(found.effect),
+        place=f"{found.stage} {found.sensor}",
+        sentence=_full_stop(found.sentence),
+        parameters=tuple(
+            (_spaced(split_suffix(name)[0]), _parameter_text(one))
+            for name, one in found.parameters.items()
+        ),
+        aliases=sentence_list([_effect_text(one) for one in found.aliases]),
+        lookalikes=sentence_list([_excluded_text(one) for one in found.lookalikes]),
+        excluded=sentence_list([_excluded_text(one) for one in found.excluded]),
+        separated_by=found.separated_by,
+        evidence=found.evidence,
+    )
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
 
 
 def _full_stop(text: str) -> str:
     return text if not text or text.endswith(".") else text + "."
 
 
-def _effect_text(entry: object) -> str:
-    """`lever arm (position)`, from a record or from text."""
-    if not isinstance(entry, Mapping):
-        return str(entry)
-    name = str(entry.get("effect")).replace("_", " ")
-    return f"{name} ({entry.get('sensor')})" if entry.get("sensor") else name
+def _effect_text(one: Rival) -> str:
+    """`lever arm (position)`."""
+    return f"{_spaced(one.effect)} ({one.sensor})"
 
 
-def _excluded_text(entry: Json) -> str:
+def _excluded_text(one: Rival) -> str:
     """Name and how much worse it fits; one that fits better says why it is not the name."""
-    worse = numbers.finite(entry.get("nats_worse"))
-    if worse is None:
-        return _effect_text(entry)
-    if worse >= 0.0:
-        kept = " with the noise kept" if entry.get("refitted") is False else ""
-        return f"{_effect_text(entry)}, {worse:.3g} nat worse{kept}"
-    if entry.get("possible") is False:
-        return f"{_effect_text(entry)}, {-worse:.3g} nat better, but only with impossible values"
-    return f"{_effect_text(entry)}, as well in its place"
+    if one.nats_worse >= 0.0:
+        kept = "" if one.refitted else " with the noise kept"
+        return f"{_effect_text(one)}, {one.nats_worse:.3g} nat worse{kept}"
+    if not one.possible:
+        better = f"{-one.nats_worse:.3g} nat better"
+        return f"{_effect_text(one)}, {better}, but only with impossible values"
+    return f"{_effect_text(one)}, as well in its place"
 
 
-def outcome_of(data: Json) -> Outcome:
+def outcome_of(found: Diagnosis) -> Outcome:
     """The verdict's words; a log that contradicts itself is said to, whatever was named."""
-    if data.get("sound") is False:
-        return _UNSOUND
-    return DIAGNOSES.get(str(data.get("verdict")), DIAGNOSES["unexplained"])
+    return DIAGNOSES[found.verdict] if found.sound else _UNSOUND
 
 
-def check_sentences(data: Json) -> list[str]:
+def check_sentences(found: Diagnosis) -> list[str]:
     """What is wrong with the log itself, or beyond the platform's limits."""
-    said = [_full_stop(str(entry.get("message"))) for entry in items(data, "checks")]
+    said = [_full_stop(check.message) for check in found.checks]
     return [text[0].upper() + text[1:] for text in said]
 
 
-def sentence_text(data: Json) -> str:
+def sentence_text(found: Diagnosis) -> str:
     """What is wrong with the log first, then what was found in it."""
-    return " ".join([*check_sentences(data), _found_text(data)])
+    return " ".join([*check_sentences(found), _found_text(found)])
 
 
-def _found_text(data: Json) -> str:
-    found = items(data, "findings")
-    if not found:
-        return (
-            "No effect of the dictionary explains what differs."
-            if _left(data)
-            else "Nothing beyond the spec's own noise was found."
-        )
-    return " ".join(_full_stop(str(e.get("sentence") or _effect_text(e))) for e in found)
+def _found_text(found: Diagnosis) -> str:
+    if found.findings:
+        return " ".join(_full_stop(one.sentence) for one in found.findings)
+    if found.remaining.beyond_noise:
+        return "No effect of the dictionary explains what differs."
+    return "Nothing beyond the spec's own noise was found."
 
 
-def _facts(data: Json) -> list[tuple[str, str]]:
-    held_out, log = part(part(data, "gap"), "held_out"), part(data, "log")
-    facts = []
-    closed = part(data, "gap").get("closed_fraction")
-    if numbers.finite(closed) is not None:
-        facts.append(("Gap closed on held-out data", numbers.percent(closed)))
-    for key, label in (("before", "RMS before"), ("after", "RMS after"), ("fitted", "RMS at best")):
-        rms = part(held_out, key).get("rms_m")
-        if numbers.finite(rms) is not None:
-            facts.append((label, _length(rms)))
-    expected = numbers.finite(part(data, "gap").get("expected_rms_m"))
-    if expected is not None:
-        facts.append(("The spec's noise expects", _length(expected)))
-    if log.get("rows") is not None:
-        facts.append(("Rows used", f"{numbers.count(log.get('used'))} of "
-                                   f"{numbers.count(log.get('rows'))}"))  # fmt: skip
-    return facts
+def _facts(found: Diagnosis) -> list[tuple[str, str]]:
+    gap, log, facts = found.gap, found.log, []
+    if gap.closed_fraction is not None:
+        facts.append(("Gap closed on held-out data", numbers.percent(gap.closed_fraction)))
+    if gap.held_out is not None:
+        scores = gap.held_out
+        facts.append(("RMS before", _length(scores.before.rms_m)))
+        facts.append(("RMS after", _length(scores.after.rms_m)))
+        facts.append(("RMS at best", _length(scores.fitted.rms_m)))
+    if gap.expected_rms_m is not None:
+        facts.append(("The spec's noise expects", _length(gap.expected_rms_m)))
+    rows = f"{numbers.count(log.used)} of {numbers.count(log.rows)}"
+    return [*facts, ("Rows used", rows)]
 
 
-def design_lines(data: Json) -> list[str]:
+def design_lines(design: DesignMeaning | None) -> list[str]:
     """What the findings mean for the design, in words; the horizon last."""
-    design = part(data, "design")
-    lines = [plain_text(line) for line in design.get("text") or ()]
-    horizon = part(design, "horizon").get("text")
-    return [*lines, str(horizon)] if horizon else lines
+    return [] if design is None else [*design.text, design.horizon.text]
 
 
-def meaning_table(data: Json) -> Table | None:
+def meaning_table(design: DesignMeaning | None) -> Table | None:
     """The error without and with the findings, by model and simulated."""
+    if design is None:
+        return None
     rows: list[tuple[Cell | str, ...]] = [
         (
-            str(entry.get("label")),
-            *(Cell(numbers.length(entry.get(f"{side}_m")), numbers.finite(entry.get(f"{side}_m")))
-              for side in ("before", "after")),
-            _interval(entry.get("after_interval_m")),
+            one.label,
+            *(Cell(numbers.length(value), value) for value in (one.before_m, one.after_m)),
+            _interval(one.after_interval_m),
         )
-        for entry in items(part(data, "design"), "figures")
-    ]  # fmt: skip
+        for one in design.figures
+    ]
     heads = ("Error of the design", "Without #", "With the findings #", "95 % interval, with")
-    return table("The error without and with the findings", heads, rows) if rows else None
+    return table("The error without and with the findings", heads, rows)
 
 
-def _interval(ends: object) -> str:
-    found = [numbers.length(end) for end in ends] if isinstance(ends, list | tuple) else []
-    return " to ".join(found)
+def _interval(ends: tuple[float | None, float | None] | None) -> str:
+    return " to ".join(numbers.length(end) for end in ends or ())
 
 
-def _score_cells(entry: Json) -> list[Cell]:
+def _score_cells(scores: Fit) -> list[Cell]:
     return [
-        Cell(_length(entry.get("rms_m")), numbers.finite(entry.get("rms_m"))),
-        Cell(numbers.number(entry.get("reduced_chi2")), numbers.finite(entry.get("reduced_chi2"))),
-        Cell(numbers.number(entry.get("nll_per_sample")),
-             numbers.finite(entry.get("nll_per_sample"))),
-        Cell(numbers.percent(entry.get("coverage_95")), numbers.finite(entry.get("coverage_95"))),
-    ]  # fmt: skip
+        Cell(_length(scores.rms_m), scores.rms_m),
+        Cell(numbers.number(scores.reduced_chi2), scores.reduced_chi2),
+        Cell(numbers.number(scores.nll_per_sample), scores.nll_per_sample),
+        Cell(numbers.percent(scores.coverage_95), scores.coverage_95),
+    ]
 
 
 _SCORES: Final = ("RMS #", "Reduced \u03c7\u00b2 #", "NLL per sample #", "95 % coverage #")
 
 
-def gap_table(data: Json) -> Table | None:
+def gap_table(gap: WholeGap) -> Table | None:
     """Before, after and floor on blocks and on a regime that the fit did not see; the placebo."""
-    gap = part(data, "gap")
-    sources = (
-        ("held-out blocks, before", part(gap, "held_out"), "before"),
-        ("held-out blocks, after", part(gap, "held_out"), "after"),
-        ("held-out blocks, at best (fitted to all rows)", part(gap, "held_out"), "fitted"),
-        ("held-out regime, before", part(part(gap, "regime"), "held_out"), "before"),
-        ("held-out regime, after", part(part(gap, "regime"), "held_out"), "after"),
-    )
-    rows = [(Cell(label), *_score_cells(part(source, key))) for label, source, key in sources
-            if part(source, key)]  # fmt: skip
-    placebo = part(gap, "placebo")
-    if part(part(placebo, "held_out"), "after"):
-        label = f"after, plus a placebo: {plain_text(placebo.get('added'))}"
-        rows.append((Cell(label), *_score_cells(part(part(placebo, "held_out"), "after"))))
+    rows = []
+    if gap.held_out is not None:
+        blocks = gap.held_out
+        rows += [
+            (Cell("held-out blocks, before"), *_score_cells(blocks.before)),
+            (Cell("held-out blocks, after"), *_score_cells(blocks.after)),
+            (Cell("held-out blocks, at best (fitted to all rows)"), *_score_cells(blocks.fitted)),
+        ]
+    if gap.regime.held_out is not None:
+        regime = gap.regime.held_out
+        rows += [
+            (Cell("held-out regime, before"), *_score_cells(regime.before)),
+            (Cell("held-out regime, after"), *_score_cells(regime.after)),
+        ]
+    if gap.placebo.held_out is not None:
+        label = f"after, plus a placebo: {gap.placebo.added}"
+        rows.append((Cell(label), *_score_cells(gap.placebo.held_out.after)))
     return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
 
 
-def gap_lines(data: Json) -> list[str]:
+def gap_lines(gap: Gap) -> list[str]:
     """What the spec's noise expects on the held-out blocks, and the share of the gap closed."""
-    gap = part(data, "gap")
-    expected, closed = (numbers.finite(gap.get(k)) for k in ("expected_rms_m", "closed_fraction"))
-    lines = [] if expected is None else [f"The spec's noise expects {_length(expected)}."]
-    if closed is not None:
-        lines.append(f"Gap closed on held-out data: {numbers.percent(closed)}.")
+    lines = []
+    if gap.expected_rms_m is not None:
+        lines.append(f"The spec's noise expects {_length(gap.expected_rms_m)}.")
+    if gap.closed_fraction is not None:
+        lines.append(f"Gap closed on held-out data: {numbers.percent(gap.closed_fraction)}.")
     return lines
 
 
-def log_lines(data: Json) -> list[str]:
+def log_lines(log: LogRead) -> list[str]:
     """How many rows were read, used, fitted and left out, and how the log was read."""
-    log = part(data, "log")
-    if log.get("rows") is None:
-        return []
-    used, rows = numbers.count(log.get("used")), numbers.count(log.get("rows"))
-    lines = [f"Log: {used} of {rows} rows used, {numbers.count(log.get('fitted'))} fitted."]
-    if log.get("thinned"):
-        lines.append(f"Too long to hold: {numbers.count(log['thinned'])} rows are between windows.")
-    lines += [f"Left out: {numbers.count(n)} ({why})" for why, n in part(log, "rejected").items()]
-    return [*lines, *map(str, log.get("notes") or ())]
+    used, rows = numbers.count(log.used), numbers.count(log.rows)
+    lines = [f"Log: {used} of {rows} rows used, {numbers.count(log.fitted)} fitted."]
+    if log.thinned:
+        lines.append(f"Too long to hold: {numbers.count(log.thinned)} rows are between windows.")
+    lines += [f"Left out: {numbers.count(n)} ({why})" for why, n in log.rejected.items()]
+    return [*lines, *log.notes]
 
 
-def gap_steps(data: Json) -> list[tuple[str, Json]]:
+def gap_steps(steps: Sequence[Gap]) -> list[tuple[str, Fit]]:
     """(label, scores on held-out data), the spec as it is first, then each addition."""
-    found: list[tuple[str, Json]] = []
-    for entry in items(data, "steps"):
-        held_out = part(entry, "held_out")
-        if not found:
-            found.append(("spec as it is", part(held_out, "before")))
-        found.append((f"+ {plain_text(entry.get('added'))}", part(held_out, "after")))
-    return [(label, scores) for label, scores in found if scores]
+    found = [(step.added, step.held_out) for step in steps if step.held_out is not None]
+    first = [("spec as it is", scores.before) for _, scores in found[:1]]
+    return [*first, *((f"+ {added}", scores.after) for added, scores in found)]
 
 
-def _steps(data: Json) -> Table | None:
-    rows = [(Cell(label), *_score_cells(scores)) for label, scores in gap_steps(data)]
+def _steps(steps: Sequence[Gap]) -> Table | None:
+    rows = [(Cell(label), *_score_cells(scores)) for label, scores in gap_steps(steps)]
     heads = ("Step", *_SCORES)
     return table("Gap after each addition", heads, rows) if len(rows) > 2 else None
 
 
-def where_lines(data: Json) -> list[str]:
-    found = data.get("where") or part(data, "remaining").get("where") or ()
-    return [_cell_text(entry) for entry in found] if isinstance(found, Sequence) else []
+def where_lines(found: Diagnosis) -> list[str]:
+    """Where they disagreed most; of a log that agrees on average, where it still does."""
+    return [_regime_text(one) for one in found.where or found.remaining.where]
 
 
-def _cell_text(entry: object) -> str:
+def _regime_text(one: Regime) -> str:
     """`along track at speed 6.3 m/s to 9 m/s: mean -652 mm, 508 standard errors`."""
-    if not isinstance(entry, Mapping) or "covariate" not in entry:
-        return plain_text(entry)
-    unit = str(entry.get("unit") or "")
-    low, high = (numbers.si_quantity(entry.get(key), unit, 3) for key in ("low", "high"))
-    axis = str(entry.get("axis") or "all axes")
-    text = f"{axis}, {str(entry['covariate']).replace('_', ' ')} {low} to {high}"
-    mean, score = numbers.finite(entry.get("mean_m")), numbers.finite(entry.get("score"))
-    if mean is not None:
-        text += f": mean {_length(mean)}"
-    return text + (f", {abs(score):.3g} standard errors" if score is not None else "")
+    low, high = (numbers.si_quantity(end, one.unit, 3) for end in (one.low, one.high))
+    place = f"{one.axis}, {_spaced(one.covariate)} {low} to {high}"
+    return f"{place}: mean {_length(one.mean_m)}, {abs(one.score):.3g} standard errors"
 
 
-def _left(data: Json) -> bool:
-    """Whether more than noise remains; a log can be unexplained by what it contradicts alone."""
-    remaining = part(data, "remaining")
-    return bool(remaining.get("beyond_noise", remaining.get("unexplained")))
-
-
-def remaining_text(data: Json) -> str:
-    remaining = part(data, "remaining")
-    if not _left(data):
+def remaining_text(found: Diagnosis) -> str:
+    """What is more than noise; a log can be unexplained by what it contradicts alone."""
+    if not found.remaining.beyond_noise:
         return ""
-    where = "; ".join(_cell_text(entry) for entry in remaining.get("where") or ())
+    where = "; ".join(_regime_text(one) for one in found.remaining.where)
     return "Unexplained and still there" + (f": {where}." if where else ".")
 
 
-def _log_facts(data: Json) -> list[tuple[str, str]]:
-    log = part(data, "log")
-    simple = [
-        (str(key).replace("_", " "), plain_text(value))
-        for key, value in log.items()
-        if key not in ("rejected", "rows", "used") and value not in (None, "", [], {})
+def _log_facts(found: Diagnosis) -> list[tuple[str, str]]:
+    log = found.log
+    motion = ", ".join(
+        f"{_spaced(name)} low {numbers.number(m.low)}, high {numbers.number(m.high)}, unit {m.unit}"
+        for name, m in log.motion.items()
+    )
+    facts = [
+        ("files", sentence_list(list(found.log_files))),
+        ("rows", numbers.count(log.rows)),
+        ("used", numbers.count(log.used)),
+        ("kind", log.kind),
+        ("thinned", numbers.number(log.thinned)),
+        ("notes", sentence_list(list(log.notes))),
+        ("duration s", numbers.number(log.duration_s)),
+        ("interval s", numbers.number(log.interval_s)),
+        ("fitted", numbers.number(log.fitted)),
+        ("motion", motion),
     ]
-    files = plain_text(data.get("log_files"))
-    counted = [("rows", numbers.count(log.get("rows"))), ("used", numbers.count(log.get("used")))]
-    return [*([("files", files)] if files else []), *(counted if log else []), *simple]
+    return [(label, text) for label, text in facts if text]
 
 
-def _rejected(data: Json) -> Table | None:
-    rows = [
-        (str(reason), Cell(numbers.count(count), numbers.finite(count)))
-        for reason, count in part(part(data, "log"), "rejected").items()
-    ]
+def _rejected(log: LogRead) -> Table | None:
+    rows = [(reason, Cell(numbers.count(n), n)) for reason, n in log.rejected.items()]
     return table("Rows left out", ("Reason", "Rows #"), rows) if rows else None
 
 
-def _coverage(data: Json) -> Table | None:
+def _coverage(found: Sequence[Coverage]) -> Table | None:
     rows = [
-        tuple(Cell(numbers.percent(entry.get(key)), numbers.finite(entry.get(key)))
-              for key in ("nominal", "before", "after"))
-        for entry in items(part(data, "plots"), "coverage")
-    ]  # fmt: skip
+        tuple(Cell(numbers.percent(share), share) for share in (one.nominal, one.before, one.after))
+        for one in found
+    ]
     caption = "Share of residuals inside the spec's own intervals"
     return table(caption, ("Nominal #", "Before #", "After #"), rows) if rows else None
 
 
-def _provenance(data: Json) -> list[tuple[str, str]]:
-    file = part(data, "spec").get("file")
-    found = {**part(data, "versions"), **part(data, "provenance")}
-    known = [(str(key).replace("_", " "), str(value)) for key, value in found.items()]
-    return [*([("Spec file", str(file))] if file else []), *known]
+def _provenance(found: Diagnosis) -> list[tuple[str, str]]:
+    file = [] if found.spec is None else [("Spec file", found.spec.file)]
+    known = found.provenance.to_json().items()
+    return [*file, *((_spaced(key), str(value)) for key, value in known)]
 
 
-def _floats(values: object) -> tuple[float, ...]:
-    found = values if isinstance(values, list | tuple) else ()
-    return tuple(float("nan") if numbers.finite(v) is None else float(v) for v in found)
+def _floats(values: Sequence[float | None]) -> tuple[float, ...]:
+    return tuple(math.nan if v is None else v for v in values)
 
 
-def _figures(data: Json) -> dict[str, InlineFigure]:
+def _figures(found: Diagnosis) -> dict[str, InlineFigure]:
     drawn: dict[str, InlineFigure] = {}
-    plots = part(data, "plots")
-    residuals = part(plots, "residuals")
-    time = _floats(residuals.get("time_s"))
+    plots = found.plots
     axes = [
-        drawings.ResidualAxis(name, _floats(entry.get("before")), _floats(entry.get("after")),
-                              _floats(entry.get("signature")))
-        for name, entry in named(residuals, "axes")
-        if len(_floats(entry.get("before"))) == len(time) > 1
-    ]  # fmt: skip
-    if axes:
-        drawn["residuals"] = drawings.residuals(time, axes)
-    steps = [
-        drawings.Step(label, rms)
-        for label, scores in gap_steps(data)
-        if (rms := numbers.finite(scores.get("rms_m"))) is not None
+        drawings.ResidualAxis(name, _floats(one.before), _floats(one.after), _floats(one.signature))
+        for name, one in plots.residuals.axes.items()
     ]
-    if steps:
-        floor = part(part(part(data, "gap"), "held_out"), "floor").get("rms_m")
-        drawn["gap"] = drawings.gap_staircase(steps, numbers.finite(floor))
-    maps = [_where_cells(entry) for entry in items(plots, "where_map")]
-    shown = [entry for entry in maps if entry.cells]
-    if shown:
-        drawn["where"] = drawings.where_map(shown[:6])
-    coverage = [
-        (nominal, before, after)
-        for entry in items(plots, "coverage")
-        if (nominal := numbers.finite(entry.get("nominal"))) is not None
-        and (before := numbers.finite(entry.get("before"))) is not None
-        and (after := numbers.finite(entry.get("after"))) is not None
-    ]
-    if len(coverage) > 2:
-        drawn["coverage"] = drawings.coverage(coverage)
+    if len(plots.residuals.time_s) > 1:
+        drawn["residuals"] = drawings.residuals(plots.residuals.time_s, axes)
+    steps = [drawings.Step(label, scores.rms_m) for label, scores in gap_steps(found.steps)]
+    if steps and found.gap.held_out is not None:
+        drawn["gap"] = drawings.gap_staircase(steps, found.gap.held_out.floor.rms_m)
+    maps = [_where_cells(one) for one in plots.where_map]
+    if maps:
+        drawn["where"] = drawings.where_map(maps[:6])
+    rows = [(one.nominal, one.before, one.after) for one in plots.coverage]
+    if rows:
+        drawn["coverage"] = drawings.coverage(rows)
     return drawn
 
 
-def _where_cells(entry: Json) -> drawings.WhereCells:
-    cells = []
-    for cell in items(entry, "cells"):
-        values = [numbers.finite(cell.get(key)) for key in ("low", "high", "score")]
-        known = [value for value in values if value is not None]
-        if len(known) == 3:
-            cells.append((known[0], known[1], abs(known[2])))
-    return drawings.WhereCells(
-        str(entry.get("covariate")), str(entry.get("unit") or ""), tuple(cells)
-    )
+def _where_cells(one: CovariateMap) -> drawings.WhereCells:
+    cells = tuple((cell.low, cell.high, abs(cell.score)) for cell in one.cells)
+    return drawings.WhereCells(one.covariate, one.unit, cells)
