@@ -47,9 +47,9 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 @guarded
 def schema(
     name: Annotated[
-        Literal["spec", "catalog", "study", "difference", "reproduction", "simulation"],
+        Literal["spec", "catalog", "study", "diagnosis", "difference", "reproduction", "simulation"],
         typer.Argument(
-            help="A kind of file (spec, catalog, study) or of result (difference, reproduction, "
+            help="A kind of file (spec, catalog, study) or of result (diagnosis, difference, reproduction, "
             "simulation)."
         ),
     ],

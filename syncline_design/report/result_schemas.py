@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final, Literal, get_args
 
-from syncline_design.comparison import difference
+from syncline_design.comparison import difference, meaning
+from syncline_design.diagnosis import result as diagnosis
 from syncline_design.machine.records import Record, schema_of
 from syncline_design.paper import reproduce
 from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
 
-ResultName = Literal["difference", "reproduction", "simulation"]
+ResultName = Literal["diagnosis", "difference", "reproduction", "simulation"]
 _RESULTS: Final[Mapping[ResultName, tuple[type[Record], str]]] = {
+    "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),

@@ -1,0 +1,111 @@
+"""Real diagnoses as data: their schema, the way back from JSON, and every output of them."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import jsonschema
+import pytest
+
+from html_page import Page
+from syncline_design.comparison.meaning import DiagnosisAndDesign, meaning, with_design
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
+from syncline_design.machine.records import read_as
+from syncline_design.report.diagnoses import render_diagnose
+from syncline_design.report.diagnosis_summary import summary_text
+from syncline_design.report.result_schemas import result_schema
+from syncline_design.spec.load import load
+from tests.world import WorldLog, hidden, make_log, scenario
+
+EXAMPLES = Path(__file__).parents[1] / "examples"
+IRON = hidden("heading_hard_iron", "attitude", sin_rad=0.015, cos_rad=0.01)
+TURNED = hidden("frame_convention", "attitude", convention="yaw_sign")
+
+
+def of(log: WorldLog, *exclude: str) -> DiagnosisAndDesign:
+    with TemporaryDirectory() as folder:
+        spec = Path(folder) / "spec.yaml"
+        spec.write_text(log.spec_yaml(), encoding="utf-8")
+        data = log.to_csv(Path(folder) / "log.csv")
+        found = diagnose(spec, [data], DiagnosisSettings(exclude_effects=exclude))
+        means = meaning(load(spec), found.effects_entries())
+    return with_design(found, None if means is None else means.design)
+
+
+@cache
+def example() -> DiagnosisAndDesign:
+    spec = EXAMPLES / "hidden_latency.yaml"
+    found = diagnose(spec, [EXAMPLES / "hidden_latency.csv"])
+    means = meaning(load(spec), found.effects_entries())
+    assert means is not None
+    return with_design(found, means.design)
+
+
+@cache
+def clean() -> DiagnosisAndDesign:
+    return of(make_log(scenario("multirotor_lines", 7, 60.0, 5.0), ()))
+
+
+@cache
+def unexplained() -> DiagnosisAndDesign:
+    return of(make_log(scenario("multirotor_lines", 12, 80.0, 5.0), (IRON,)), "heading_hard_iron")
+
+
+@cache
+def turned() -> DiagnosisAndDesign:
+    return of(make_log(scenario("car_stops", 31, 60.0, 5.0), (TURNED,)))
+
+
+VERDICTS = {example: "explained", clean: "agrees", unexplained: "unexplained", turned: "explained"}
+REAL = pytest.mark.parametrize("make", VERDICTS, ids=lambda make: make.__name__)
+
+
+@REAL
+def test_it_is_what_its_schema_says(make: object) -> None:
+    found = make()  # type: ignore[operator]
+    assert found.verdict == VERDICTS[make]  # type: ignore[index]
+    schema = result_schema("diagnosis")
+    jsonschema.Draft202012Validator.check_schema(schema)
+    written = json.loads(render_diagnose("json", found))
+    jsonschema.Draft202012Validator(schema).validate(written)
+    assert written == found.to_json()
+    assert list(written) == list(found.to_json())
+
+
+@REAL
+def test_it_reads_back_as_it_was(make: object) -> None:
+    """But for figures without end, which JSON has no number for."""
+    found = make()  # type: ignore[operator]
+    again = read_as(DiagnosisAndDesign, render_diagnose("json", found))
+    assert again.to_json() == found.to_json()
+    assert again.findings == found.findings
+    assert again.exit_code == found.exit_code
+
+
+@REAL
+def test_every_output_says_it(make: object) -> None:
+    found = make()  # type: ignore[operator]
+    page = Page(render_diagnose("html", found))
+    assert page.unbalanced == []
+    texts = {"page": page.text, "markdown": render_diagnose("markdown", found),
+             "console": summary_text(found)}  # fmt: skip
+    for kind, text in texts.items():
+        said = text.replace("\u00a0", " ").replace("\u2212", "-").replace("\\", "")
+        for finding in found.findings:
+            for estimate in finding.parameters.values():
+                assert estimate.text in said, (kind, estimate)
+        for other in ("None", "nan", "Record", "Estimate("):
+            assert kind == "page" or other not in said
+    read = render_diagnose("json", found)
+    assert ("held_rows" in read) == (found.gap.regime.held_rows is not None)
+
+
+def test_a_key_that_is_not_there_is_not_read_as_one() -> None:
+    """What is missing is no error of later states, what has another type is."""
+    data = clean().to_json()
+    assert read_as(DiagnosisAndDesign, json.dumps(data | {"added_later": 1})).verdict == "agrees"
+    with pytest.raises(ValueError, match="remaining"):
+        read_as(DiagnosisAndDesign, json.dumps(data | {"remaining": "nothing"}))
