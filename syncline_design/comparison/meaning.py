@@ -11,13 +11,14 @@ from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
 from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.simulation.results import QuantileEstimate
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects_text
 from syncline_design.spec.effects_listed import EffectChoice
 from syncline_design.spec.known_effects import NoBudget
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.optimise import pinned_text
-from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word
+from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
 from syncline_design.verdict.verified import frame
 from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
 
@@ -180,7 +181,12 @@ def error_figures(before: Verdict, after: Verdict) -> tuple[ErrorFigure, ...]:
     one, other = _quantile(before), _quantile(after)
     label = f"simulated, {100 * float(QUANTILE):g} % of errors below"
     simulated = ErrorFigure(
-        "simulated_95_m", label, one.get("value_m"), other.get("value_m"), _ends(one), _ends(other)
+        "simulated_95_m",
+        label,
+        None if one is None else finite(one.value_m),
+        None if other is None else finite(other.value_m),
+        _ends(one),
+        _ends(other),
     )
     return (*found, simulated)
 
@@ -201,13 +207,12 @@ def _modelled(verdict: Verdict, model: SyncModelName) -> float | None:
     return (models.syncline if model == "syncline" else models.per_sensor).total_m
 
 
-def _quantile(verdict: Verdict) -> Mapping[str, Any]:
-    quantiles = (verdict.monte_carlo or {}).get("quantiles") or {}
-    return quantiles.get(QUANTILE) or {}
+def _quantile(verdict: Verdict) -> QuantileEstimate | None:
+    return None if verdict.monte_carlo is None else verdict.monte_carlo.quantiles.get(QUANTILE)
 
 
-def _ends(quantile: Mapping[str, Any]) -> tuple[float | None, float | None] | None:
-    return (quantile.get("low_m"), quantile.get("high_m")) if quantile else None
+def _ends(found: QuantileEstimate | None) -> tuple[float | None, float | None] | None:
+    return None if found is None else (finite(found.low_m), finite(found.high_m))
 
 
 def _length(value_m: float | None) -> str:
