@@ -47,10 +47,12 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 @guarded
 def schema(
     name: Annotated[
-        Literal["spec", "catalog", "study", "diagnosis", "difference", "reproduction", "simulation"],
+        Literal[
+            "spec", "catalog", "study", "diagnosis", "difference", "reproduction", "simulation"
+        ],
         typer.Argument(
-            help="A kind of file (spec, catalog, study) or of result (diagnosis, difference, reproduction, "
-            "simulation)."
+            help="A kind of file (spec, catalog, study) or of result (diagnosis, difference, "
+            "reproduction, simulation)."
         ),
     ],
 ) -> int:
