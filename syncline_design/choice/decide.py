@@ -49,7 +49,7 @@ def choose(
     empty = tuple(r for r, role in enumerate(problem.roles) if not role.options)
     if is_empty(problem):
         return Infeasible(Proof("tables", True, True), empty)
-    deadline = in_force() if time_limit_s is None else Deadline(time_limit_s)
+    deadline = in_force().inner(time_limit_s)
     deadline.check()
     found = _by_sums(problem, method, deadline)
     if problem.judge is None or isinstance(found, Infeasible):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,6 +18,7 @@ from syncline_design.cli.shared import (
     SeedOption,
     SpecArgument,
     StudyOutput,
+    StudyTimeLimit,
     TimeLimitOption,
     deadline_of,
     emit,
@@ -52,7 +54,8 @@ def check(
     from syncline_design.verdict.tree import Refused
     from syncline_design.verdict.verify import CheckSettings, check_files
 
-    found = spec_files(spec, skip_others=skip_others)
+    with watched(deadline, quiet=quiet):
+        found = spec_files(spec, skip_others=skip_others)
     targets = output_targets(output, CHECK_FORMATS, found.files)
     settings = CheckSettings(seed=seed, method=road(method))
     with watched(deadline, targets, quiet=quiet):
@@ -105,24 +108,30 @@ def optimize(
     from syncline_design.verdict.optimise import OptimizeSettings, optimisation_text, optimize
 
     targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
-    case = load(spec)
-    for name in case.spec.catalogs if write_design is not None else ():
-        if write_design is not None and not (write_design.parent / name).exists():
-            refuse(
-                f"syncline-design: --write-design {write_design}: the spec draws in {name}, which "
-                "is not in that folder; write the design beside the spec"
-            )
     settings = OptimizeSettings(
         best, pareto, resource, road(method), seed=seed,
         every=every,
         report=any(target.format == "html" for target in targets),
     )  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
+        case = load(spec)
+        if write_design is not None:
+            _refuse_elsewhere(write_design, case.spec.catalogs)
         found = optimize(case, settings)
     if write_design is not None and found.exit_code == 0:
         _write_design(found, write_design)
     emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
     return found.exit_code
+
+
+def _refuse_elsewhere(path: Path, catalogs: Sequence[str]) -> None:
+    """A design lies where its catalogs are found from."""
+    for name in catalogs:
+        if not (path.parent / name).exists():
+            refuse(
+                f"syncline-design: --write-design {path}: the spec draws in {name}, which "
+                "is not in that folder; write the design beside the spec"
+            )
 
 
 def _write_design(found: Any, path: Path) -> None:
@@ -158,8 +167,10 @@ def study(
     fresh: Annotated[
         bool, typer.Option("--fresh", help="Believe no case file that is there: compute all anew.")
     ] = False,
+    time_limit: StudyTimeLimit = None,
 ) -> int:
     """Sweep specs over grids or samples of their keys; a stopped study resumes."""
+    deadline = deadline_of(time_limit)
     from syncline_design.report.on_study import on_study
     from syncline_design.report.progress_line import ProgressLine
     from syncline_design.report.render_console import console
@@ -172,7 +183,8 @@ def study(
     targets = output_targets(wanted, STUDY_FORMATS, [study_file])
     _keep_cases([Path(t.path) for t in targets], store or study_file.parent / FOLDER)
     settings = StudySettings(seed, workers, store, scheduler, dask, fresh=fresh)
-    result = run_study(study_file, settings, None if quiet else ProgressLine())
+    with watched(deadline, targets, quiet=quiet, steps=False):
+        result = run_study(study_file, settings, None if quiet else ProgressLine())
     text = f"{console(on_study(result))}\n{stored_text(result)}"
     emit(text, targets, lambda name: render_study(name, result), quiet=quiet)
     return result.exit_code
@@ -193,14 +205,17 @@ def diff(
     output: DiffOutput = None,
     seed: SeedOption = 0,
     quiet: QuietOption = False,
+    time_limit: TimeLimitOption = None,
 ) -> int:
     """Say in words what changed between two specs or verdicts; the exit code is the new one's."""
+    deadline = deadline_of(time_limit)
     from syncline_design.comparison.diff import diff as compare
     from syncline_design.report.on_difference import DIFF_FORMATS, on_difference, render_diff
     from syncline_design.report.render_console import console
     from syncline_design.verdict.verify import CheckSettings
 
     targets = output_targets(output, DIFF_FORMATS, [old, new])
-    found = compare(old, new, CheckSettings(seed=seed))
+    with watched(deadline, targets, quiet=quiet):
+        found = compare(old, new, CheckSettings(seed=seed))
     emit(console(on_difference(found)), targets, lambda name: render_diff(name, found), quiet=quiet)
     return found.exit_code

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -17,11 +17,20 @@ from syncline_design.cli.shared import (
     SeedOption,
     SimulateOutput,
     SpecArgument,
+    TimeLimitOption,
+    deadline_of,
     emit,
     guarded,
     output_targets,
+    watched,
 )
 from syncline_design.machine.streams import say
+
+if TYPE_CHECKING:
+    from syncline_design.comparison.meaning import DesignMeaning
+    from syncline_design.diagnosis import Diagnosis
+    from syncline_design.machine.deadline import Deadline
+    from syncline_design.spec.load import Case
 
 
 @guarded
@@ -36,8 +45,10 @@ def simulate(
     workers: Annotated[
         int | None, typer.Option(min=1, help="Processes for long runs; the result is the same.")
     ] = None,
+    time_limit: TimeLimitOption = None,
 ) -> int:
     """Simulate the nonlinear chain against the Syncline over a grid of tau."""
+    deadline = deadline_of(time_limit)
     from syncline_design.report.render_console import console
     from syncline_design.report.simulations import (
         SIMULATE_FORMATS,
@@ -48,8 +59,8 @@ def simulate(
     from syncline_design.verdict.simulated_spec import simulate_spec
 
     targets = output_targets(output, SIMULATE_FORMATS, [spec])
-    case = load(spec)
-    run = simulate_spec(case, seed=seed, samples=samples, workers=workers)
+    with watched(deadline, targets, quiet=quiet):
+        run = simulate_spec(load(spec), seed=seed, samples=samples, workers=workers)
     text = console(simulated_document(run))
     emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
     return 0
@@ -72,9 +83,11 @@ def diagnose(
         float, typer.Option(min=0.0005, max=0.5, help="Chance that a clean log is found at fault.")
     ] = 0.05,
     max_effects: Annotated[int, typer.Option(min=0, max=20, help="Effects named at most.")] = 4,
+    time_limit: TimeLimitOption = None,
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
-    from syncline_design.comparison.meaning import as_measured, meaning, with_design
+    deadline = deadline_of(time_limit)
+    from syncline_design.comparison.meaning import as_measured, with_design
     from syncline_design.diagnosis import DiagnosisSettings
     from syncline_design.diagnosis import diagnose as diagnose_log
     from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
@@ -83,13 +96,13 @@ def diagnose(
     from syncline_design.spec.load import load
 
     targets = output_targets(output, DIAGNOSE_FORMATS, [spec, *(log or ())], [write_spec])
-    case = load(spec)
     settings = DiagnosisSettings(
         seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects
     )
-    with _progress(quiet) as progress:
-        found = diagnose_log(as_measured(case), log or (), settings, progress)
-        means = meaning(case, found.effects_entries(), seed)
+    with watched(deadline, targets, quiet=quiet, steps=False), _progress(quiet) as progress:
+        case = load(spec)
+        found = diagnose_log(as_measured(case, seed), log or (), settings, progress)
+        means = _meaning(case, found, seed, deadline)
     whole = with_design(found, None if means is None else means.design)
     text = f"{visible(case.spec.name)} ({visible(spec)})\n\n{summary_text(found)}"
     if means is not None:
@@ -100,9 +113,25 @@ def diagnose(
         write_checked(means.spec_text, write_spec)
         say(f"spec with the findings written to {write_spec}")
     elif write_spec is not None:
-        say("nothing was found: no spec written")
+        found_any = bool(found.effects_entries())
+        say(f"{'the time was over' if found_any else 'nothing was found'}: no spec written")
     emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
     return found.exit_code
+
+
+def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> DesignMeaning | None:
+    """What a diagnosis means for the design; without it the diagnosis stands, for want of time."""
+    from syncline_design.comparison.meaning import meaning
+    from syncline_design.machine.deadline import OutOfTime
+
+    try:
+        deadline.doing("checking the design with the findings")
+        means = meaning(case, found.effects_entries(), seed)
+        deadline.check()
+        return means
+    except OutOfTime:
+        say(f"syncline-design: {deadline.passed()}")
+        return None
 
 
 @contextmanager
@@ -122,9 +151,13 @@ def _progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
 
 @guarded
 def reproduce(
-    output: ReproduceOutput = None, seed: SeedOption = 0, quiet: QuietOption = False
+    output: ReproduceOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    time_limit: TimeLimitOption = None,
 ) -> int:
     """Compute every table and figure of the paper and compare it with what is printed."""
+    deadline = deadline_of(time_limit)
     from syncline_design.paper import reproduce as paper
     from syncline_design.report.formats import REPRODUCE_FORMATS
     from syncline_design.report.json_out import json_text
@@ -133,7 +166,8 @@ def reproduce(
     from syncline_design.report.render_html import html
 
     targets = output_targets(output, REPRODUCE_FORMATS)
-    found = paper.reproduce(seed=seed)
+    with watched(deadline, targets, quiet=quiet):
+        found = paper.reproduce(seed=seed)
     said = on_paper(found)
     render = {"json": lambda: json_text(found.to_json()), "html": lambda: html(said)}
     emit(console(said), targets, lambda name: render[name](), quiet=quiet)

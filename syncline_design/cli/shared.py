@@ -33,6 +33,10 @@ TimeLimitOption = Annotated[
     float | None,
     typer.Option(min=0.0, help="Seconds for the whole command; then what is known."),
 ]
+StudyTimeLimit = Annotated[
+    float | None,
+    typer.Option(min=0.0, help="Seconds for the whole command; the cases done by then are kept."),
+]
 
 
 def output_option(formats: tuple[str, ...]) -> Any:
@@ -178,22 +182,30 @@ def deadline_of(time_limit_s: float | None) -> Deadline:
     """The command's time limit, which begins now: before anything slow is imported."""
     from syncline_design.machine.deadline import Deadline
 
-    return Deadline(time_limit_s)
+    return Deadline(time_limit_s, doing="reading")
 
 
 @contextmanager
-def watched(deadline: Deadline, targets: Sequence[Target], *, quiet: bool) -> Iterator[None]:
-    """The time limit put in force, with time kept back for pages and signs of progress."""
-    from syncline_design.machine.deadline import within
+def watched(
+    deadline: Deadline, targets: Sequence[Target] = (), *, quiet: bool, steps: bool = True
+) -> Iterator[None]:
+    """The whole work of a command, its reading included, within its time limit.
+
+    With time kept back for pages and, of commands that show no bar of their own, signs of progress
+    (`steps`).  Where the time is over before anything can be concluded, the command ends.
+    """
+    from syncline_design.machine.deadline import OutOfTime, overdue, within
     from syncline_design.report.progress_line import StepLine
 
     if any(target.format == "html" for target in targets):
         deadline.keep_back(PAGE_S)
-    line = StepLine(quiet=quiet)
+    line = StepLine(quiet=quiet or not steps)
     deadline.tick = line
     try:
-        with within(deadline):
+        with within(deadline), overdue(deadline):
             yield
+    except OutOfTime:
+        refuse(f"syncline-design: {deadline.passed()}; nothing can be concluded", NO_VERDICT)
     finally:
         line.clear()
 

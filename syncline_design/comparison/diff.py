@@ -14,6 +14,7 @@ from typing import Any
 
 from syncline_design.comparison.difference import Cause, Difference, changes, difference
 from syncline_design.comparison.verdict_file import read_verdict, text_of
+from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
@@ -46,6 +47,7 @@ def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None
     """The difference of two specs or verdict files (schema syncline-design/diff/v1)."""
     chosen = settings or CheckSettings()
     before, after = read_side(Path(old), chosen), read_side(Path(new), chosen)
+    in_force().check()  # what a verdict lacks for want of time is no difference
     causes = list(_causes(before, after))
     if before.case is not None and after.case is not None and 1 < len(causes) <= MOST_TRIED:
         causes = [(_tried(cause, path, before, after, chosen), path) for cause, path in causes]
@@ -217,6 +219,7 @@ def _tried(
         return cause
     plain = replace(settings, monte_carlo=False)
     try:
+        in_force().check()
         data = put(original, place, value)
         document = replace(before.document, data=data)
         path = before.case.path
@@ -224,6 +227,8 @@ def _tried(
         verdict = check_loaded(without_simulated(alone), plain).to_json()
         start = check_loaded(without_simulated(before.case), plain).to_json()
     except Exception:  # a change that needs the others; the whole difference stands without it
+        return cause
+    if in_force().is_over:
         return cause
     return replace(cause, effect=changes(start, verdict))
 

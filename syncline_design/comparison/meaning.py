@@ -100,11 +100,11 @@ def with_design(found: Diagnosis, means: DesignMeaning | None) -> DiagnosisAndDe
     return DiagnosisAndDesign(**parts, design=means)
 
 
-def as_measured(case: Case) -> Case:
+def as_measured(case: Case, seed: int = 0) -> Case:
     """The spec of the system that made a log: with choices open, its best design pinned."""
     if sole_design(build_problem(case)) is not None:
         return case
-    problem, design = picked_design(case)
+    problem, design = picked_design(case, seed)
     if problem.combinations == 1:
         return case
     text = pinned_text(case, problem, design)

@@ -41,6 +41,7 @@ from syncline_design.diagnosis.search import Search, SearchResult, start_search
 from syncline_design.diagnosis.settings import DiagnosisSettings, Progress, silent
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.logs.log import Log
+from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load
 
@@ -59,10 +60,21 @@ def diagnose(
     Raises BadInput for a spec or log that cannot be used.
     """
     case = spec if isinstance(spec, Case) else load(spec)
-    progress("reading the log", 0.0)
+    said = _within_time(progress)
+    said("reading the log", 0.0)
     with one_thread():
         inputs = measured(case, [Path(p) for p in log_paths])
-        return diagnose_measured(inputs, settings or DiagnosisSettings(), case, progress)
+        return diagnose_measured(inputs, settings or DiagnosisSettings(), case, said)
+
+
+def _within_time(progress: Progress) -> Progress:
+    """The same progress; OutOfTime instead once the time is over."""
+
+    def said(words: str, share: float) -> None:
+        in_force().doing(words)
+        progress(words, share)
+
+    return said
 
 
 def diagnose_measured(

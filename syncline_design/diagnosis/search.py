@@ -35,6 +35,7 @@ from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.settling import Settled, settle
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance, plausible, with_effect
+from syncline_design.machine.deadline import in_force
 
 TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
@@ -109,6 +110,7 @@ class Search:
                 if trial.log_p > threshold:
                     break
             model = self.exchanged(trial.model)
+            in_force().doing("searching beyond " + ", ".join(name for name, *_ in model.labels))
             self.progress(len(model.labels) / self.settings.max_effects)
         return SearchResult(base, self.settled(model))
 

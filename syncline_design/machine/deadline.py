@@ -1,17 +1,21 @@
 """One time limit for a whole command, and what it is doing when that runs long.
 
 The limit is set once, by `within`, and every search, simulation and what-if asks the one in force,
-however deep it is called: none can forget to hand it on.
+however deep it is called: none can forget to hand it on.  Steps that cannot ask (a file that does
+not come, a library at work) are ended by `overdue` a second later, as Ctrl-C would end them.
 """
 
 from __future__ import annotations
 
 import math
+import signal
+import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
-from typing import TypeVar
+from types import FrameType
+from typing import NoReturn, TypeVar
 
 
 class NoVerdict(Exception):  # noqa: N818 - an outcome with its own exit code, not a failure
@@ -28,15 +32,18 @@ Tick = Callable[[str, float], None]  # what is being done, for how long the comm
 class Deadline:
     """A point in time after which everything gives up.
 
-    tick: called at every check with what is being done, for a sign of progress.
+    tick: called at every check with what is being done, for a sign of progress.  doing: what that
+    is at first.
     """
 
-    def __init__(self, limit_s: float | None = None, tick: Tick | None = None) -> None:
+    def __init__(
+        self, limit_s: float | None = None, tick: Tick | None = None, doing: str = ""
+    ) -> None:
         self.limit_s = limit_s
         self._start = time.monotonic()
         self._end = math.inf if limit_s is None else self._start + limit_s
         self.tick = tick
-        self._doing = ""
+        self._doing = doing
 
     def keep_back(self, seconds: float) -> None:
         """End earlier, by no more than a quarter of the limit, for what follows the search."""
@@ -56,6 +63,16 @@ class Deadline:
             raise OutOfTime(f"the time limit of {limit} was reached without a proof")
         if self.tick is not None:
             self.tick(self._doing, now - self._start)
+
+    def passed(self) -> str:
+        """That the time is over, and what was being done: a sentence without its stop."""
+        during = f" while {self._doing}" if self._doing else ""
+        return f"the time limit of {self.limit_s:g} s was reached{during}"
+
+    def inner(self, limit_s: float | None) -> Deadline:
+        """A deadline that begins now and ends no later than this one."""
+        own = Deadline(limit_s, self.tick, self._doing)
+        return self if self._end <= own._end else own
 
     def left_s(self) -> float | None:
         """Seconds left, None without a limit."""
@@ -83,6 +100,40 @@ def within(deadline: Deadline) -> Iterator[Deadline]:
         yield deadline
     finally:
         _IN_FORCE.reset(token)
+
+
+def within_s(limit_s: float | None) -> AbstractContextManager[Deadline]:
+    """Put a time limit in force inside the one that is; None: that one alone."""
+    return within(in_force().inner(limit_s))
+
+
+OVERDUE_S = 0.8  # how long work may go on without asking, after the time is over
+AGAIN_S = 5.0  # until it is ended once more: tidying up takes less
+
+
+@contextmanager
+def overdue(deadline: Deadline) -> Iterator[None]:
+    """End the block with OutOfTime where it goes on long after the end, whatever it is at.
+
+    As with Ctrl-C it is the main thread that hears of it; elsewhere, and on systems without
+    alarms, only asking helps.  Where the time is over from the start, the block still gets as long.
+    """
+    left = deadline.left_s()
+    main = threading.current_thread() is threading.main_thread()
+    if left is None or not main or not hasattr(signal, "setitimer"):
+        yield
+        return
+
+    def end(_: int, __: FrameType | None) -> NoReturn:
+        raise OutOfTime(deadline.passed())
+
+    before = signal.signal(signal.SIGALRM, end)
+    signal.setitimer(signal.ITIMER_REAL, left + OVERDUE_S, AGAIN_S)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 T = TypeVar("T")

@@ -89,7 +89,7 @@ def ended_by_signals() -> Iterator[None]:
 
 @contextlib.contextmanager
 def interrupts_held_back() -> Iterator[None]:
-    """Ctrl-C waits until the block is done; what is started in it never hears of it."""
+    """Ctrl-C and alarms wait until the block is done; what is started in it hears of neither."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -97,7 +97,7 @@ def interrupts_held_back() -> Iterator[None]:
 
     with starting_safely():  # when it starts by itself, it lets signals through again
         resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, signal.SIGALRM})
     try:
         yield
     finally:

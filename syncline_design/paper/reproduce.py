@@ -14,6 +14,7 @@ from fractions import Fraction
 from typing import Any, Final, Literal
 
 from syncline_design import __version__
+from syncline_design.machine.deadline import in_force
 from syncline_design.machine.records import Record
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
@@ -99,6 +100,7 @@ def reproduce(catalog: Catalog | None = None, simulate: bool = True, seed: int =
     simulate: whether to add the simulated points of figures 3 and 7 (takes a second or two).
     seed: of the starting points of their search; nothing else here is random.
     """
+    in_force().doing("computing what the paper prints")
     catalog = load_builtin() if catalog is None else catalog
     cells = tuple(
         _cell((table, row, column), printed, _computed_si(catalog, table, row, column))
@@ -110,6 +112,7 @@ def reproduce(catalog: Catalog | None = None, simulate: bool = True, seed: int =
         for table in ("platforms", "sensors")
         for row, column, printed in _entries(table)
     )
+    in_force().doing("simulating points of the figures")
     return Reproduction(
         schema=SCHEMA,
         version=__version__,

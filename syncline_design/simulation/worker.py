@@ -21,6 +21,7 @@ from typing import IO
 import numpy as np
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import in_force
 from syncline_design.machine.processes import end_with_stream, ended_by_signals, python_command
 from syncline_design.model.system import System
 from syncline_design.simulation.distribution import Counts, add_counts, no_counts
@@ -80,7 +81,7 @@ def _tally_on_processes(shares: list[Share]) -> tuple[Counts, int]:
     with ExitStack() as lifelines, ended_by_signals():
         try:
             children.extend(_started(share, lifelines) for share in shares)
-            answers = [child.communicate() for child in children]
+            answers = [_answer(child) for child in children]
         finally:
             for child in children:
                 child.kill()
@@ -94,6 +95,16 @@ def _tally_on_processes(shares: list[Share]) -> tuple[Counts, int]:
         counts += numbers[1:]
         within += int(numbers[0])
     return counts, within
+
+
+def _answer(child: subprocess.Popen[bytes]) -> tuple[bytes, bytes]:
+    """What a child says; OutOfTime when that takes too long."""
+    deadline = in_force()
+    while True:
+        try:
+            return child.communicate(timeout=deadline.left_s())
+        except subprocess.TimeoutExpired:
+            deadline.check()
 
 
 def _started(share: Share, lifelines: ExitStack) -> subprocess.Popen[bytes]:

@@ -17,6 +17,7 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from syncline_design.machine.deadline import in_force
 from syncline_design.machine.processes import end_with_parent, ended_by_signals, starting_safely
 from syncline_design.studies.case import CaseSettings, canonical, check_case
 from syncline_design.studies.loading import Study
@@ -112,7 +113,9 @@ class Pool:
             worker.connection.send(message)
 
     def _collect(self, queue: deque[int]) -> Iterator[Result]:
-        ready = wait([worker.connection for worker in self._workers])
+        deadline = in_force()
+        ready = wait([worker.connection for worker in self._workers], deadline.left_s())
+        deadline.check()
         for place, worker in enumerate(self._workers):
             if worker.connection not in ready:
                 continue

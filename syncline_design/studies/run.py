@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design.choice.outcome import NoVerdict
+from syncline_design.machine.deadline import Deadline, OutOfTime, in_force, within
 from syncline_design.studies.case import CaseSettings, canonical, case_keys, is_final
 from syncline_design.studies.cluster import ClusterError, run_on_cluster
 from syncline_design.studies.inputs import Looked, full_key
@@ -74,6 +75,8 @@ def run_loaded(
         raise StudyError(str(error)) from None
     except (PoolError, StoreError) as error:
         raise StudyStoppedError(str(error)) from None
+    except OutOfTime:
+        raise StudyStoppedError(run.out_of_time()) from None
 
 
 @dataclass
@@ -87,6 +90,8 @@ class _Run:
     started: float
     progress: Report | None
     retried: int = 0
+    done: tuple[int, int] | None = None  # of how many
+    unsettled: dict[str, Json] = field(default_factory=dict)
     looked: Looked = field(default_factory=Looked)
 
     def finish(self) -> StudyResult:
@@ -97,19 +102,18 @@ class _Run:
         again = len(cases) - len(twins)  # cases of equal content are computed once
         reused = len(keys) + again
         self._say(reused, len(cases), reused)
-        unsettled: dict[str, Json] = {}
         for done, (index, encoded) in enumerate(self._records(missing), 1):
             record = json.loads(encoded)
             keys[index] = self._keep(cases[index], encoded, record)
             if not is_final(record):
-                unsettled[keys[index]] = record
+                self.unsettled[keys[index]] = record
             self._say(reused + done, len(cases), reused)
         elapsed = time.monotonic() - self.started
         firsts = {twin: index for index, group in twins.items() for twin in group}
         placed = tuple(keys[firsts[index]] for index in range(len(cases)))
         return StudyResult(
-            self.study, self.settings.seed, placed, self.store, unsettled, reused, len(missing),
-            self.retried, elapsed,
+            self.study, self.settings.seed, placed, self.store, self.unsettled, reused,
+            len(missing), self.retried, elapsed,
         )  # fmt: skip
 
     def _twins(self, cases: Sequence[str]) -> dict[int, list[int]]:
@@ -154,14 +158,26 @@ class _Run:
             )  # fmt: skip
         elif settings.workers <= 1 or len(missing) <= FEW_CASES:
             for index in missing:
-                yield index, encoded_case(self.study, index, self.shared)
+                with within(Deadline()):  # its own limit alone: or its record would tell of ours
+                    encoded = encoded_case(self.study, index, self.shared)
+                in_force().check()
+                yield index, encoded
         else:
             pool = Pool(self.study, self.shared, settings.workers)
             for result in pool.run(missing):
                 self.retried = pool.retried
                 yield result
 
+    def out_of_time(self) -> str:
+        """How far the study came within the time limit."""
+        limit = f"the time limit of {in_force().limit_s:g} s was reached"
+        if self.done is None:
+            return f"{limit} before the first case"
+        done, total = self.done
+        return f"{limit}: {done} of {total} cases are done and kept; run the study again to go on"
+
     def _say(self, done: int, total: int, reused: int) -> None:
+        self.done = done - len(self.unsettled), total
         if self.progress is not None:
             elapsed = time.monotonic() - self.started
             self.progress(Progress(done, total, reused, elapsed, self.retried))

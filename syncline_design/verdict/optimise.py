@@ -24,7 +24,7 @@ from syncline_design.choice.tolerance import (
     tolerance_verdict,
 )
 from syncline_design.choice.variations import Build
-from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_force, within
+from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
 from syncline_design.machine.records import json_of
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned_spec_text
@@ -113,8 +113,7 @@ class Optimisation:
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimisation:
     """The best designs of a spec; pinned roles stay as they are."""
-    limit = settings.time_limit_s
-    with within(in_force() if limit is None else Deadline(limit)):
+    with within_s(settings.time_limit_s):
         return _optimize(case, settings)
 
 

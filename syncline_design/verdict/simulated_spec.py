@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from syncline_design.choice.chosen_system import system_of
+from syncline_design.machine.deadline import in_force
 from syncline_design.model.system import System
 from syncline_design.simulation import Simulation, SimulationError, simulate
 from syncline_design.simulation.results import SpecContent, SpecName
@@ -26,10 +27,12 @@ def simulate_spec(
     case: Case, seed: int = 0, samples: int | None = None, workers: int | None = None
 ) -> SimulatedSpec:
     """Simulate a spec as its `monte_carlo` part says; samples and workers override."""
+    in_force().doing("choosing")
     system = system_of(case, *picked_design(case, seed), effect_entries(case))
     settings = replace(simulation_settings(case, seed), workers=workers)
     if samples is not None:
         settings = replace(settings, samples=samples)
+    in_force().doing("simulating")
     try:
         found = simulate(system, settings)
     except SimulationError as error:

@@ -15,7 +15,7 @@ from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.choice.table import Design
 from syncline_design.choice.table import Problem as DesignProblem
 from syncline_design.effects.acting import known_of
-from syncline_design.machine.deadline import Deadline, OutOfTime, Pieces, in_force, within
+from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
@@ -79,13 +79,8 @@ class CheckSettings:
 def check_file(path: str | Path, settings: CheckSettings | None = None) -> Verdict:
     """The verdict of a spec file (schema syncline-design/verdict/v1)."""
     wanted = settings or CheckSettings()
-    with within(_deadline(wanted)):
+    with within_s(wanted.time_limit_s):
         return check_loaded(load(path), replace(wanted, time_limit_s=None))
-
-
-def _deadline(settings: CheckSettings) -> Deadline:
-    """A deadline of the settings' own, or the one in force."""
-    return in_force() if settings.time_limit_s is None else Deadline(settings.time_limit_s)
 
 
 def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Verdict | Refused]:
@@ -93,8 +88,8 @@ def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Verdict 
 
     Of a refused file nothing is computed.  A time limit binds all of them together.
     """
-    read = [_or_refused(path, load) for path in paths]  # all of them before anything is computed
-    with within(_deadline(settings)):
+    with within_s(settings.time_limit_s):
+        read = [_or_refused(path, load) for path in paths]  # all before anything is computed
         alone = replace(settings, time_limit_s=None)
         return [_check_or_refuse(item, alone) for item in read]
 
@@ -116,7 +111,7 @@ def check_loaded(case: Case, settings: CheckSettings) -> Verdict:
     """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
     build = _build(settings)
     problem: DesignProblem | None = None
-    with within(_deadline(settings)):
+    with within_s(settings.time_limit_s):
         try:
             problem = build(case)
             if sole_design(problem) is not None:
