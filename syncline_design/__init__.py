@@ -12,6 +12,51 @@ Conventions, said once for the whole package
 - Arrays: rows first; vectors are (n, 3), rotations (n, 3, 3).
 """
 
+from importlib import import_module
+
+TYPE_CHECKING = False  # of `typing`, which would double the time of this import
+if TYPE_CHECKING:
+    from syncline_design.api import (
+        BadInput,
+        Case,
+        NoVerdict,
+        OutOfTime,
+        check,
+        diagnose,
+        diff,
+        load,
+        optimize,
+        reproduce,
+        simulate,
+        study,
+    )
+
 __version__ = "0.1.0"
 
-__all__ = ["__version__"]
+__all__ = [
+    "BadInput",
+    "Case",
+    "NoVerdict",
+    "OutOfTime",
+    "__version__",
+    "check",
+    "diagnose",
+    "diff",
+    "load",
+    "optimize",
+    "reproduce",
+    "simulate",
+    "study",
+]
+
+
+def __getattr__(name: str) -> object:
+    """The functions of `api`, loaded when one of them is first used."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    found = globals()[name] = getattr(import_module(f"{__name__}.api"), name)
+    return found
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

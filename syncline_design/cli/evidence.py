@@ -27,10 +27,10 @@ from syncline_design.cli.shared import (
 from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:
-    from syncline_design.comparison.meaning import DesignMeaning
+    from syncline_design.comparison.meaning import Meaning
     from syncline_design.diagnosis import Diagnosis
     from syncline_design.machine.deadline import Deadline
-    from syncline_design.spec.load import Case
+    from syncline_design.spec.case import Case
 
 
 @guarded
@@ -119,7 +119,7 @@ def diagnose(
     return found.exit_code
 
 
-def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> DesignMeaning | None:
+def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> Meaning | None:
     """What a diagnosis means for the design; without it the diagnosis stands, for want of time."""
     from syncline_design.comparison.meaning import meaning
     from syncline_design.machine.deadline import OutOfTime
