@@ -136,8 +136,8 @@ def test_every_case_is_what_the_spec_written_out_gives(result: StudyResult, tmp_
             "requirements[ACC-1].limit": limit,
         }
         assert case.verdict == expected["verdict"]
-        assert case.record["design"] == expected["design"]
-        assert case.figure("syncline", "total_m") == (expected["syncline"] or {}).get("total_m")
+        assert case.record.design == expected["design"]
+        assert case.record.error_m == (expected["syncline"] or {}).get("total_m")
 
 
 def test_heat_map_winners_and_boundaries_follow_from_the_rows(result: StudyResult) -> None:
@@ -150,20 +150,18 @@ def test_heat_map_winners_and_boundaries_follow_from_the_rows(result: StudyResul
     summary = summarise(result)
     heat = heat_map(summary)
     assert heat is not None
-    for y, limit in enumerate(heat.y_labels):
-        for x, distance in enumerate(heat.x_labels):
+    for y, limit in enumerate(heat.y_values):
+        for x, distance in enumerate(heat.x_values):
             costs = [
                 float(row["cost"])
                 for row in met
                 if row["stages[uav].distance"] == distance
                 and row["requirements[ACC-1].limit"] == limit
             ]
-            assert heat.cost[y][x] == (min(costs) if costs else None)
+            assert heat.least_cost[y][x] == (min(costs) if costs else None)
     for winner in winners(summary):
-        chosen = [row for row in met if row[winner.pick.role] == winner.pick.sensor]
-        stamped = [
-            r for r in chosen if r[f"{winner.pick.role} timestamping"] == winner.pick.timestamping
-        ]
+        chosen = [row for row in met if row[winner.role] == winner.sensor]
+        stamped = [r for r in chosen if r[f"{winner.role} timestamping"] == winner.timestamping]
         assert (winner.cases, winner.of) == (len(stamped), len(met))
     verdicts = {
         (r["stages[uav].distance"], r["requirements[ACC-1].limit"]): r["verdict"] for r in rows
@@ -176,7 +174,7 @@ def test_heat_map_winners_and_boundaries_follow_from_the_rows(result: StudyResul
                 ok, bad = sorted(pair, key=lambda p: p[1] != "meets")
                 expected.add(("stages[uav].distance", ok[0], bad[0], limit))
     found = {
-        (b.factor, b.met, b.missed, b.fixed[0][1])
+        (b.factor, b.met, b.missed, next(iter(b.fixed.values())))
         for b in boundaries(summary)
         if b.factor == "stages[uav].distance"
     }
@@ -205,10 +203,10 @@ def test_a_catalog_figure_can_vary(tmp_path: Path) -> None:
         '"catalog.sensors[sbg_apogee].cost": [20000 EUR, 25000.50 EUR]',
     ).replace("[0.15 m, 0.3 m]", "[0.3 m]")
     cheap, dear = run_study(write(tmp_path, study)).cases()
-    first, second = cheap.figure("design", "cost"), dear.figure("design", "cost")
+    first, second = cheap.record.cost, dear.record.cost
     assert first is not None
     assert second is not None
-    picked = cheap.record["design"]["stages"][0]["roles"]["attitude"]["sensor"]
+    picked = cheap.record.design["stages"][0]["roles"]["attitude"]["sensor"]
     assert picked == "sbg_apogee"
     assert second - first == pytest.approx(5000.50, abs=1e-6)
 
@@ -247,7 +245,7 @@ def test_lists_of_candidates_vary_as_a_whole(tmp_path: Path) -> None:
     grid = '"timestamping.candidates": [[hardware], [gpio]]'
     done = run_study(write(tmp_path, f"study: 1\nname: L\nbase: spec.yaml\ngrid: {{{grid}}}\n"))
     methods = [
-        {role["timestamping"] for role in case.record["design"]["stages"][0]["roles"].values()}
+        {role["timestamping"] for role in case.record.design["stages"][0]["roles"].values()}
         for case in done.cases()
     ]
     assert methods == [{"hardware"}, {"gpio"}]
@@ -278,12 +276,12 @@ def test_monte_carlo_runs_where_a_requirement_asks_for_it(tmp_path: Path) -> Non
     study = STUDY.replace("[40 m, 60 m, 100 m]", "[60 m]").replace("[0.15 m, 0.3 m]", "[0.3 m]")
     done = run_study(write(tmp_path, study, spec))
     [case] = done.cases()
-    rows = {row["id"]: row for row in case.record["requirements"]}
-    assert rows["MC-1"]["status"] == "pass"
+    rows = {row.id: row for row in case.record.requirements}
+    assert rows["MC-1"].status == "pass"
     assert done.not_simulated == ()
     left_out = run_study(write(tmp_path, study + "check: {monte_carlo: false}\n", spec))
     [case] = left_out.cases()
-    assert "MC-1" not in {row["id"] for row in case.record["requirements"]}
+    assert "MC-1" not in {row.id for row in case.record.requirements}
     assert left_out.not_simulated == ("MC-1",)
     assert case.verdict == "meets"
 
@@ -296,7 +294,7 @@ def test_requirements_keep_their_lines_when_simulated_ones_are_left_out(tmp_path
     study = STUDY + "check: {monte_carlo: false}\n"
     done = run_study(write(tmp_path, study, spec))
     for case in done.cases():
-        lines = {row["id"]: row["line"] for row in case.record["requirements"] if row["line"]}
+        lines = {row.id: row.line for row in case.record.requirements if row.line}
         assert lines == {"ACC-1": 5, "COST-1": 6}
 
 
@@ -312,7 +310,7 @@ grid:
     fits, misfit = run_study(write(tmp_path, study)).cases()
     assert fits.verdict == "meets"
     assert misfit.verdict == "refused"
-    assert "ptp cannot stamp ublox_f9p_rtk" in misfit.record["problems"][0]["message"]
+    assert "ptp cannot stamp ublox_f9p_rtk" in misfit.record.problems[0].message
 
 
 BAD = [

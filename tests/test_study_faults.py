@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 
 from study_specs import STUDY, write
+from syncline_design.machine.records import read_as
 from syncline_design.report.studies import render_study
 from syncline_design.studies import (
     Progress,
@@ -25,9 +26,10 @@ from syncline_design.studies import (
     StudyStoppedError,
     run_study,
 )
-from syncline_design.studies.case import CaseSettings, canonical, case_keys
+from syncline_design.studies.case import CaseSettings, case_keys
 from syncline_design.studies.loading import load_study
 from syncline_design.studies.pool import MAX_DEATHS, Pool
+from syncline_design.studies.record import CaseRecord
 from syncline_design.studies.store import Store
 
 FORMATS = ("csv", "json", "junit", "sarif", "github", "markdown")
@@ -303,11 +305,11 @@ def test_a_case_that_kills_every_worker_ends_without_verdict(tmp_path: Path) -> 
         stop.set()
         killer.join()
     assert sorted(records) == [0, 1, 2]
-    expected = {
-        "verdict": "indeterminate",
-        "reason": f"its worker process died {MAX_DEATHS} times",
-    }
-    assert records[0] == canonical(expected)
+    kept = read_as(CaseRecord, records[0])
+    assert kept == CaseRecord(
+        verdict="indeterminate", reason=f"its worker process died {MAX_DEATHS} times"
+    )
+    assert not kept.is_final
     assert '"verdict":"indeterminate"' not in records[1] + records[2]
 
 

@@ -19,7 +19,6 @@ from syncline_design.report.render_markdown import markdown_table
 from syncline_design.report.studies import render_study
 from syncline_design.report.study_words import MOST_ACROSS, heat_table
 from syncline_design.studies import StudyResult, StudySettings, run_study
-from syncline_design.studies.definition import Factor
 from syncline_design.studies.scatter import scatter
 from syncline_design.studies.summary import HeatMap, heat_map, summarise
 from test_report_browser import Opened, browser  # noqa: F401  a fixture
@@ -104,24 +103,24 @@ def test_a_sample_crossed_with_a_grid_keeps_its_map(tmp_path: Path) -> None:
     result = done(tmp_path, text.replace(speed, ""))
     heat = heat_map(summarise(result))
     assert heat is not None
-    assert (len(heat.x_labels), len(heat.y_labels)) == (2, 5)
+    assert (len(heat.x_values), len(heat.y_values)) == (2, 5)
 
 
 def test_dearer_cells_are_stronger_whatever_the_theme(tmp_path: Path) -> None:
     result = done(tmp_path, GRID.format(across=4, up=5))
     heat = heat_map(summarise(result))
     assert heat is not None
-    svg = cost_map(heat, "EUR").svg
+    svg = cost_map(heat).svg
     cells = svg.partition('id="fig-heat-legend')[0]
     strengths = [
         float(found) for found in re.findall(r"fill: var\(--series-1\); opacity: ([\d.]+)", cells)
     ]
-    costs = [cost for row in heat.cost for cost in row if cost is not None]
+    costs = [cost for row in heat.least_cost for cost in row if cost is not None]
     assert len(strengths) == len(costs)
     assert len(set(costs)) > 1
     order = sorted(range(len(costs)), key=lambda i: costs[i])
     assert [strengths[i] for i in order] == sorted(strengths)
-    assert svg.count("\u2715") == sum(cost is None for row in heat.cost for cost in row)
+    assert svg.count("\u2715") == sum(cost is None for row in heat.least_cost for cost in row)
     assert "darker" not in str(render_study("html", result))
 
 
@@ -132,24 +131,25 @@ def drawn_map(across: int, up: int) -> HeatMap:
         tuple(drawn.choice([None, drawn.uniform(1e3, 9e4), 5e4]) for _ in range(across))
         for _ in range(up)
     )
-    x, y = (Factor(key, (), "grid", ("grid", key)) for key in ("a.x", "b.y"))
     names = [tuple(f"{k} m" for k in range(n)) for n in (across, up)]
-    return HeatMap(x, y, names[0], names[1], cost, tuple(("",) * across for _ in range(up)))
+    return HeatMap(
+        "a.x", "b.y", "EUR", names[0], names[1], cost, tuple(("",) * across for _ in range(up))
+    )
 
 
 @pytest.mark.parametrize(("across", "up"), [(3, 12), (12, 3), (8, 40), (40, 8), (12, 12)])
 def test_tables_of_costs_have_few_columns_and_every_cost(across: int, up: int) -> None:
     heat = drawn_map(across, up)
-    shown = heat_table(heat, "EUR")
+    shown = heat_table(heat)
     assert len(shown.heads) <= MOST_ACROSS + 1
     assert markdown_table(shown)
-    costs = sorted(cost for row in heat.cost for cost in row if cost is not None)
+    costs = sorted(cost for row in heat.least_cost for cost in row if cost is not None)
     sorts = [cell.sort for row in shown.rows for cell in row if cell.text.endswith("EUR")]
     assert sorted(sort for sort in sorts if sort is not None) == costs
     if (across, up) == (40, 8):  # turned round: the column of a row's own value
         assert [cell.text for cell in shown.rows[7][:1]] == ["7 m"]
         values = [cell.sort for cell in shown.rows[7][1:]]
-        assert values == [heat.cost[y][7] for y in range(8)]
+        assert values == [heat.least_cost[y][7] for y in range(8)]
 
 
 def test_a_cell_without_a_verdict_is_not_said_to_fail(tmp_path: Path) -> None:
@@ -161,7 +161,7 @@ def test_a_cell_without_a_verdict_is_not_said_to_fail(tmp_path: Path) -> None:
     heat = heat_map(replace(summary, briefs=tuple(briefs)))
     assert heat is not None
     assert heat.undecided == 1
-    assert heat_table(heat, "EUR").note == "In 1 cells a case got no verdict."
+    assert heat_table(heat).note == "In 1 cells a case got no verdict."
 
 
 @pytest.mark.browser

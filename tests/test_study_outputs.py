@@ -9,17 +9,23 @@ import json
 from pathlib import Path
 from xml.etree import ElementTree
 
+import jsonschema
 import pytest
 
 from report_samples import HOSTILE
 from study_specs import SPEC, STUDY, write
+from syncline_design.machine.records import read_as, schema_of
 from syncline_design.report.on_study import on_study
 from syncline_design.report.progress_line import ProgressLine
 from syncline_design.report.render_console import console, table_lines
+from syncline_design.report.result_schemas import result_schema
 from syncline_design.report.studies import STUDY_FORMATS, render_study
+from syncline_design.report.study_data import StudyData, study_data
 from syncline_design.report.study_words import progress_text
 from syncline_design.report.table import table
 from syncline_design.studies import Progress, StudyResult, StudySettings, run_study
+from syncline_design.studies.record import SCHEMA as CASE_SCHEMA
+from syncline_design.studies.record import CaseRecord
 
 LINE_OF_ACC = 4
 
@@ -85,6 +91,29 @@ def test_json_says_what_the_table_says(result: StudyResult) -> None:
     assert [c["verdict"] for c in data["cases"]] == [r["verdict"] for r in rows]
     assert data["counts"] == result.counts
     assert data["factors"][0]["values"] == ["40 m", "60 m", "100 m"]
+
+
+def test_a_study_satisfies_its_schema_and_reads_back(result: StudyResult, tmp_path: Path) -> None:
+    """Real ones: a grid with fronts and ends; cases that cannot be as combined."""
+    combined = STUDY.partition("grid:")[0] + (
+        'grid:\n  "stages[uav].position.sensor": [ublox_f9p_rtk]\n'
+        '  "stages[uav].position.timestamping": [gpio, ptp]\n'
+    )
+    schema = result_schema("study-result")
+    for done in (result, run_study(write(tmp_path, combined))):
+        text = text_of("json", done)
+        jsonschema.validate(json.loads(text), schema)
+        assert read_as(StudyData, text) == study_data(done)
+    assert {case.verdict for case in done.cases()} == {"meets", "refused"}
+
+
+def test_every_case_that_is_kept_satisfies_its_schema(result: StudyResult) -> None:
+    schema = schema_of(CaseRecord, CASE_SCHEMA, "case")
+    files = list(result.store.folder.glob("*/*.json"))
+    assert len(files) == len(result)
+    for file in files:
+        kept = json.loads(file.read_text())["record"]
+        jsonschema.validate({**kept, "schema": CASE_SCHEMA}, schema)
 
 
 def test_the_page_is_offline_and_complete(result: StudyResult) -> None:

@@ -48,12 +48,16 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 def schema(
     name: Annotated[
         Literal[
-            "spec", "catalog", "study", "diagnosis", "difference", "reproduction", "simulation"
+            "spec",
+            "catalog",
+            "study",
+            "diagnosis",
+            "difference",
+            "reproduction",
+            "simulation",
+            "study-result",
         ],
-        typer.Argument(
-            help="A kind of file (spec, catalog, study) or of result (diagnosis, difference, "
-            "reproduction, simulation)."
-        ),
+        typer.Argument(help="A kind of file (spec, catalog, study) or of result (the others)."),
     ],
 ) -> int:
     """Print the JSON Schema of a kind of file, for editors, or of a kind of result."""

@@ -22,6 +22,7 @@ Json = dict[str, Any]
 R = TypeVar("R", bound="Record")
 DRAFT: Final = "https://json-schema.org/draft/2020-12/schema"
 _OPTIONAL: Final = "optional"
+_ADAPTERS: Final[dict[Any, Any]] = {}
 
 
 def key_of(field: str) -> str:
@@ -114,12 +115,22 @@ class NotThisResultError(ValueError):
 
 def read_as(kind: type[R], text: str | bytes) -> R:
     """A result read back from its JSON; NotThisResultError where it does not hold what it must."""
-    from pydantic import TypeAdapter, ValidationError
+    from pydantic import ValidationError
 
     try:
-        return TypeAdapter(kind).validate_json(text)
+        found: R = _adapter(kind).validate_json(text)
     except ValidationError as error:
         raise NotThisResultError("\n".join(_lines(error.errors()))) from None
+    return found
+
+
+def _adapter(kind: type[Record]) -> Any:
+    """The reader of a kind of record; making one takes as long as reading hundreds."""
+    from pydantic import TypeAdapter
+
+    if kind not in _ADAPTERS:
+        _ADAPTERS[kind] = TypeAdapter(kind)
+    return _ADAPTERS[kind]
 
 
 def _lines(errors: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -139,9 +150,7 @@ def schema_of(kind: type[Record], name: str, title: str) -> Json:
 
     Further keys are allowed everywhere: a later state of the same version may add some.
     """
-    from pydantic import TypeAdapter
-
-    raw = TypeAdapter(kind).json_schema()
+    raw = _adapter(kind).json_schema()
     body = _without_titles(raw)
     body["properties"]["schema"] = {"const": name}
     return {"$schema": DRAFT, "$id": f"urn:{name.replace('/', ':')}", **body, "title": title}

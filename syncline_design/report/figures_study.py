@@ -16,6 +16,7 @@ from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.svg import InlineFigure, add_axes, draw
 from syncline_design.report.text import shortened
+from syncline_design.studies.record import FrontPoint
 from syncline_design.studies.scatter import Scatter, ScatterAxis
 from syncline_design.studies.summary import HeatMap
 
@@ -27,31 +28,31 @@ _FAINT, _STRONG = 0.08, 0.5  # opacity of the cheapest and the dearest cell: tex
 MOST_TEXT = 8  # cells across in which the cost itself still fits
 
 
-def cost_map(heat: HeatMap, currency: str, name: str = "fig-heat") -> InlineFigure:
+def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineFigure:
     """Heat map of the least cost over two factors; a cross where no case meets."""
-    costs = [cost for row in heat.cost for cost in row if cost is not None]
+    costs = [cost for row in heat.least_cost for cost in row if cost is not None]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        for y, row in enumerate(heat.cost):
+        for y, row in enumerate(heat.least_cost):
             for x, cost in enumerate(row):
                 _cell(axes, (x, y), cost, costs, len(row))
-        axes.set_xlim(-0.5, len(heat.x_labels) - 0.5)
-        axes.set_ylim(-0.5, len(heat.y_labels) - 0.5)
-        _label_axis(axes, "x", heat.x_labels)
-        _label_axis(axes, "y", heat.y_labels)
-        axes.set_xlabel(shortened(heat.x.key, 60))
-        axes.set_ylabel(shortened(heat.y.key, 40))
-        _cost_scale(figure, costs, currency)
+        axes.set_xlim(-0.5, len(heat.x_values) - 0.5)
+        axes.set_ylim(-0.5, len(heat.y_values) - 0.5)
+        _label_axis(axes, "x", heat.x_values)
+        _label_axis(axes, "y", heat.y_values)
+        axes.set_xlabel(shortened(heat.x, 60))
+        axes.set_ylabel(shortened(heat.y, 40))
+        _cost_scale(figure, costs, heat.currency)
 
     spoken = "No case meets its requirements."
     if costs:
         spoken = (
-            f"Least cost from {numbers.money(min(costs), currency)} to "
-            f"{numbers.money(max(costs), currency)} in {len(costs)} of "
-            f"{len(heat.x_labels) * len(heat.y_labels)} cells; in the others no case meets."
+            f"Least cost from {numbers.money(min(costs), heat.currency)} to "
+            f"{numbers.money(max(costs), heat.currency)} in {len(costs)} of "
+            f"{len(heat.x_values) * len(heat.y_values)} cells; in the others no case meets."
         )
-    height = 140.0 + 30.0 * min(len(heat.y_labels), 14)
+    height = 140.0 + 30.0 * min(len(heat.y_values), 14)
     return draw(name, "Least cost over two factors", spoken, (WIDTH, height), build)
 
 
@@ -96,7 +97,7 @@ class NamedFront:
     """One exact front with the words that tell it from the others."""
 
     label: str
-    points: tuple[tuple[float, float], ...]  # (cost, error [m])
+    points: tuple[FrontPoint, ...]
 
 
 def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts") -> InlineFigure:
@@ -106,12 +107,12 @@ def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts")
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         axes.set_yscale("log")
-        costs = [cost for front in shown for cost, _ in front.points]
+        costs = [point.cost for front in shown for point in front.points]
         span = (max(costs) - min(costs)) or max(costs) or 1.0
         right = max(costs) + 0.08 * span
         for index, front in enumerate(shown):
-            x = [cost for cost, _ in front.points] + [right]
-            y = [error for _, error in front.points] + [front.points[-1][1]]
+            x = [point.cost for point in front.points] + [right]
+            y = [point.error_m for point in (*front.points, front.points[-1])]
             colour, style = SERIES[index % len(SERIES)], styles[index // 2 % len(styles)]
             axes.step(x, y, where="post", color=colour, linestyle=style, linewidth=1.8,
                       label=shortened(front.label, 44))  # fmt: skip
@@ -126,7 +127,7 @@ def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts")
         axes.set_ylabel("Syncline error")
         figure.legend(loc="outside lower left", ncols=1, fontsize=9)
 
-    errors = [error for front in shown for _, error in front.points]
+    errors = [point.error_m for front in shown for point in front.points]
     spoken = (
         f"{len(shown)} exact fronts; errors from {numbers.length(min(errors))} to "
         f"{numbers.length(max(errors))}. The table holds their ends."

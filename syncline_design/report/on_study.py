@@ -71,18 +71,17 @@ def _heat(summary: Summary) -> list[Node]:
     heat = heat_map(summary)
     if heat is None:
         return []
-    currency = summary.currencies[0]
-    shown = heat_table(heat, currency)
+    shown = heat_table(heat)
     caption = (
         "Least cost of a payload that meets the requirements; the stronger the colour, the dearer. "
         "A cross: computed, and no case is known to meet."
     )
     short = show(shown, silent=True, reach="text")
     if len(shown.rows) > MOST_DOWN:
-        size = f"{len(heat.x_labels)} by {len(heat.y_labels)} values"
+        size = f"{len(heat.x_values)} by {len(heat.y_values)} values"
         short = [Text(f"Over {size}: see the page or the CSV table.", reach="text")]
     return [
-        Chart("heat", lambda: figures_study.cost_map(heat, currency), caption),
+        Chart("heat", lambda: figures_study.cost_map(heat), caption),
         *show(shown, silent=True, reach="page"),
         *short,
     ]
@@ -151,14 +150,16 @@ def _common(summary: Summary, front: Front) -> str:
 def _fronts_table(summary: Summary) -> Table:
     rows = []
     for front in summary.fronts:
-        (least, worst), (most, best) = front.points[0], front.points[-1]
+        cheapest, finest = front.points[0], front.points[-1]
         currency = front.currency
         rows.append((
             Cell(_common(summary, front)),
             Cell(numbers.count(len(front.cases)), float(len(front.cases))),
             Cell(numbers.count(len(front.points)), float(len(front.points))),
-            Cell(numbers.money(least, currency), least), Cell(numbers.length(worst), worst),
-            Cell(numbers.money(most, currency), most), Cell(numbers.length(best), best),
+            Cell(numbers.money(cheapest.cost, currency), cheapest.cost),
+            Cell(numbers.length(cheapest.error_m), cheapest.error_m),
+            Cell(numbers.money(finest.cost, currency), finest.cost),
+            Cell(numbers.length(finest.error_m), finest.error_m),
         ))  # fmt: skip
     heads = ("With", "Cases #", "Points #", "Cheapest #", "its error #", "Most accurate: cost #",
              "its error #")  # fmt: skip

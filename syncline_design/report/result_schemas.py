@@ -9,15 +9,17 @@ from syncline_design.comparison import difference, meaning
 from syncline_design.diagnosis import result as diagnosis
 from syncline_design.machine.records import Record, schema_of
 from syncline_design.paper import reproduce
+from syncline_design.report import study_data
 from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
 
-ResultName = Literal["diagnosis", "difference", "reproduction", "simulation"]
+ResultName = Literal["diagnosis", "difference", "reproduction", "simulation", "study-result"]
 _RESULTS: Final[Mapping[ResultName, tuple[type[Record], str]]] = {
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),
+    "study-result": (study_data.StudyData, study_data.SCHEMA),
 }
 RESULT_NAMES: Final[tuple[ResultName, ...]] = get_args(ResultName)
 

@@ -19,9 +19,9 @@ def render_study(name: str, result: StudyResult) -> str | bytes:
             return study_parquet(result)
         case "json":
             from syncline_design.report.json_out import json_text
-            from syncline_design.report.study_findings import study_data
+            from syncline_design.report.study_data import study_data
 
-            return json_text(study_data(result))
+            return json_text(study_data(result).to_json())
         case "html":
             from syncline_design.report.on_study import on_study
             from syncline_design.report.render_html import html

@@ -7,28 +7,23 @@ from typing import Any
 
 from syncline_design.model.quantity import Dimension
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import design_sentence, items
+from syncline_design.report.verdict_words import design_sentence
 from syncline_design.studies.definition import Factor, figure_of
+from syncline_design.studies.record import CaseRecord
 from syncline_design.studies.result import CaseResult, StudyResult
-from syncline_design.studies.summary import picks_of
 
-Json = dict[str, Any]
 _SI_UNITS = {
     Dimension.LENGTH: "m", Dimension.TIME: "s", Dimension.ANGLE: "rad", Dimension.SPEED: "m/s",
     Dimension.ANGULAR_RATE: "rad/s", Dimension.MASS: "kg", Dimension.POWER: "W",
     Dimension.RATIO: "1", Dimension.DIMENSIONLESS: "1", Dimension.FREQUENCY: "Hz",
     Dimension.ACCELERATION: "m/s^2",
 }  # fmt: skip
-FIGURES = {
-    "cost": ("design", "cost"),
-    "mass_kg": ("design", "mass"),
-    "power_w": ("design", "power"),
-    "error_m": ("syncline", "total_m"),
-    "sensor_error_m": ("syncline", "sensor_error_m"),
-    "sync_error_m": ("syncline", "sync_error_m"),
-    "tau_s": ("syncline", "tau_s"),
-    "tau_crit_s": ("syncline", "tau_crit_s"),
-}
+FIGURES = (
+    "cost", "mass_kg", "power_w", "error_m", "sensor_error_m", "sync_error_m", "tau_s",
+    "tau_crit_s",
+)  # fmt: skip
+Value = str | int | float | None  # of a cell
+Row = dict[str, Value]
 
 
 def si_unit(factor: Factor) -> str | None:
@@ -70,48 +65,57 @@ def _roles(result: StudyResult) -> list[str]:
     return list(roles)
 
 
-def rows(result: StudyResult) -> Iterator[Json]:
+def rows(result: StudyResult) -> Iterator[Row]:
     """A row per case, in the order of the study."""
     units = {factor.key: si_unit(factor) for factor in result.study.factors}
     for case in result.cases():
         yield row(case, units)
 
 
-def row(case: CaseResult, units: Mapping[str, str | None]) -> Json:
+def row(case: CaseResult, units: Mapping[str, str | None]) -> Row:
     """One case as a row; what it lacks is None."""
-    found: Json = {"case": case.number, "base": case.file, "verdict": case.verdict}
-    labels = case.labels
+    found: Row = {"case": case.number, "base": case.file, "verdict": case.verdict}
+    labels, record = case.labels, case.record
     for key, value in case.settings:
         found[key] = labels[key]
         figure = figure_of(value) if units[key] is not None else None
         if figure is not None:
             found[f"{key} [{units[key]}]"] = figure[0]
-    for name, path in FIGURES.items():
-        found[name] = case.figure(*path)
-    found["currency"] = case.currency if found["cost"] is not None else None
-    for pick in picks_of(case):
+    found |= zip(FIGURES, _figures(record), strict=True)
+    found["currency"] = case.currency if record.cost is not None else None
+    for pick in record.picks:
         found[pick.role] = pick.sensor
         found[f"{pick.role} timestamping"] = pick.timestamping
-    failing = [str(r["id"]) for r in items(case.record, "requirements") if r["status"] == "fail"]
-    found["failing"] = " ".join(failing)
-    found["not_simulated"] = " ".join(case.record.get("not_simulated") or ())
+    found["failing"] = " ".join(one.id for one in record.requirements if one.status == "fail")
+    found["not_simulated"] = " ".join(record.not_simulated)
     found["reason"] = reason(case)
     return found
+
+
+def _figures(record: CaseRecord) -> tuple[float | None, ...]:
+    design, syncline = record.design, record.syncline
+    sums = (None,) * 3 if design is None else (design["cost"], design["mass"], design["power"])
+    if syncline is None:
+        return (*sums, None, None, None, None, None)
+    return (
+        *sums, syncline.total_m, syncline.sensor_error_m, syncline.sync_error_m, syncline.tau_s,
+        syncline.tau_crit_s,
+    )  # fmt: skip
 
 
 def reason(case: CaseResult) -> str:
     """Why a case has no design, and what would give it one; empty where it has."""
     record = case.record
-    if record.get("reason"):
-        return str(record["reason"])
-    problems = items(record, "problems")
-    if problems:
-        return "; ".join(f"{p.get('path')}: {p.get('message')}" for p in problems)
-    if case.verdict != "infeasible":
+    if record.reason:
+        return record.reason
+    if record.problems:
+        return "; ".join(f"{problem.path}: {problem.message}" for problem in record.problems)
+    if record.verdict != "infeasible":
         return ""
-    fixes = [str(entry.get("text")) for entry in items(record.get("infeasibility"), "fixes")]
+    why = record.infeasibility or {}
+    fixes = [fix["text"] for fix in why["fixes"]]
     would = f" Either would do: {'; '.join(fixes)}." if fixes else ""
-    return design_sentence({**record, "design": None}) + would
+    return design_sentence({"infeasibility": why}) + would
 
 
 def study_csv(result: StudyResult) -> str:
@@ -137,5 +141,5 @@ def study_parquet(result: StudyResult) -> bytes:
     return stream.getvalue()
 
 
-def _value(value: Any) -> Any:
+def _value(value: Value) -> Value:
     return visible(value) if isinstance(value, str) else value

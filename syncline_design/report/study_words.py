@@ -71,18 +71,18 @@ def currency_sentence(summary: Summary) -> str:
     return f" Prices are in {names}, so there is no least cost among them."
 
 
-def heat_table(heat: HeatMap, currency: str) -> Table:
+def heat_table(heat: HeatMap) -> Table:
     """Least cost over two factors as a table: across and down, or a row per cell where too wide."""
-    across, down, costs = heat.x, heat.y, heat.cost
-    names, sides = heat.x_labels, heat.y_labels
+    across, down, costs = heat.x, heat.y, heat.least_cost
+    names, sides = heat.x_values, heat.y_values
     if len(names) > MOST_ACROSS and len(sides) <= MOST_ACROSS:
         across, down, names, sides = down, across, sides, names
-        costs = tuple(zip(*heat.cost, strict=True))
+        costs = tuple(zip(*heat.least_cost, strict=True))
     if len(names) > MOST_ACROSS:
-        return _cell_table(heat, currency)
-    heads = [f"{down.key} \\ {across.key}", *(f"{text} #" for text in names)]
+        return _cell_table(heat)
+    heads = [f"{down} \\ {across}", *(f"{text} #" for text in names)]
     rows = [
-        [Cell(name), *(_cost_cell(cost, currency) for cost in line)]
+        [Cell(name), *(_cost_cell(cost, heat.currency) for cost in line)]
         for name, line in zip(sides, costs, strict=True)
     ]
     return table(LEAST_COST, heads, rows, _undecided_note(heat))
@@ -93,20 +93,20 @@ def _undecided_note(heat: HeatMap) -> str:
     return f"In {heat.undecided} cells a case got no verdict." if heat.undecided else ""
 
 
-def _cell_table(heat: HeatMap, currency: str) -> Table:
+def _cell_table(heat: HeatMap) -> Table:
     """The cells of a large map that a payload meets, a row each."""
     rows = [
-        [Cell(y), Cell(x), _cost_cell(cost, currency), Cell(picks)]
-        for y, costs, payloads in zip(heat.y_labels, heat.cost, heat.picks, strict=True)
-        for x, cost, picks in zip(heat.x_labels, costs, payloads, strict=True)
+        [Cell(y), Cell(x), _cost_cell(cost, heat.currency), Cell(picks)]
+        for y, costs, payloads in zip(heat.y_values, heat.least_cost, heat.payload, strict=True)
+        for x, cost, picks in zip(heat.x_values, costs, payloads, strict=True)
         if cost is not None
     ]
-    left = len(heat.x_labels) * len(heat.y_labels) - len(rows)
+    left = len(heat.x_values) * len(heat.y_values) - len(rows)
     more = max(0, len(rows) - MOST_ROWS)
     note = f"In {left} cells no case meets." if left else ""
     note += f" {more} further rows are left out." if more else ""
     note += f" {_undecided_note(heat)}"
-    heads = (heat.y.key, heat.x.key, "Least cost #", "Payload")
+    heads = (heat.y, heat.x, "Least cost #", "Payload")
     return table(LEAST_COST, heads, rows[:MOST_ROWS], note.strip())
 
 
@@ -121,7 +121,7 @@ def winners_table(summary: Summary) -> Table:
     several = [factor.key for _, factor in varied(summary)]
     rows = [
         [
-            Cell(w.pick.role), Cell(w.pick.name), Cell(w.pick.timestamping),
+            Cell(w.role), Cell(w.name), Cell(w.timestamping),
             Cell(f"{w.cases} of {w.of}", float(w.cases)), *_where_cells(several, w.where),
         ]
         for w in winners(summary)
@@ -143,7 +143,7 @@ def boundary_table(summary: Summary, most: int = MOST_ROWS) -> Table:
     """Where feasibility ends along each factor; equal ends are one row."""
     ends: dict[tuple[str, str, str, str], list[str]] = {}
     for b in boundaries(summary):
-        fixed = "; ".join(f"{key} = {value}" for key, value in b.fixed)
+        fixed = "; ".join(f"{key} = {value}" for key, value in b.fixed.items())
         ends.setdefault((b.factor, b.met, b.missed, b.why), []).append(fixed)
     rows = [
         [*map(Cell, end), Cell(_with_words(fixed), float(len(fixed)))]

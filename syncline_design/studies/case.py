@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from importlib import metadata
 from pathlib import Path
@@ -19,11 +18,11 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.keys import plain
 from syncline_design.spec.load import BadInput, without_simulated
 from syncline_design.spec.yaml_text import Problem
-from syncline_design.studies.inputs import inputs_of
+from syncline_design.studies.inputs import canonical, inputs_of
 from syncline_design.studies.loading import Base, Study
+from syncline_design.studies.record import SCHEMA, CaseFigures, CaseRecord, FrontPoint, lost
+from syncline_design.verdict.tree import FileProblem, SynclineFigures, Verdict
 
-Json = dict[str, Any]
-SCHEMA = "syncline-design/study-case/v1"
 # Layers that a check cannot import: they show its results.
 ABOVE_CHECKS = ("__main__.py", "cli", "comparison", "diagnosis", "logs", "paper", "report")
 
@@ -65,13 +64,6 @@ def engine_sha256() -> str:
         digest.update(file.relative_to(root).as_posix().encode())
         digest.update(b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()
-
-
-def canonical(data: Any) -> str:
-    """JSON of one form only: sorted keys, no spaces, ASCII, no NaN."""
-    return json.dumps(
-        data, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False
-    )
 
 
 def case_keys(study: Study, settings: CaseSettings) -> list[str]:
@@ -118,7 +110,7 @@ def simulates(study: Study, base: Base) -> bool:
     return bool(base.simulated) if asked is None else asked
 
 
-def check_case(study: Study, index: int, settings: CaseSettings) -> Json:
+def check_case(study: Study, index: int, settings: CaseSettings) -> CaseRecord:
     """The record of one case; what goes wrong inside it is part of the record.
 
     `inputs`: the files that it read besides spec and catalogs, with what was in them.
@@ -127,13 +119,12 @@ def check_case(study: Study, index: int, settings: CaseSettings) -> Json:
     base = study.bases[place]
     with noting() as found:
         record = _judged(study, base, chosen, settings)
-    inputs = inputs_of(found, base.path.parent)
-    return record | {"inputs": inputs} if inputs else record
+    return replace(record, inputs=inputs_of(found, base.path.parent))
 
 
 def _judged(
     study: Study, base: Base, chosen: Sequence[tuple[str, Any]], settings: CaseSettings
-) -> Json:
+) -> CaseRecord:
     from syncline_design.choice.outcome import NoVerdict
     from syncline_design.simulation import SimulationError
 
@@ -143,14 +134,14 @@ def _judged(
     except ReplacedInputError:
         raise
     except BadInput as bad:
-        return {"verdict": "refused", "problems": [_problem_json(p) for p in bad.problems]}
+        return CaseRecord(verdict="refused", problems=tuple(map(_problem, bad.problems)))
     except (NoVerdict, SimulationError) as error:
-        return {"verdict": "indeterminate", "reason": str(error)}
+        return lost(str(error))
     except Exception as error:  # one broken case must not take the others with it
-        return {"verdict": "indeterminate", "reason": f"{type(error).__name__}: {error}"}
+        return lost(f"{type(error).__name__}: {error}")
 
 
-def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Json:
+def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> CaseRecord:
     from syncline_design.verdict.verify import CheckSettings, check_loaded
 
     simulated = simulates(study, base)
@@ -165,52 +156,32 @@ def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Js
             monte_carlo=simulated,
             today=settings.today,
         ),
-    ).to_json()
-    record = _record(verdict, left_out)
-    proof = (verdict.get("choice") or {}).get("proof") or {}
-    if proof.get("optimal") is False:  # as far as this machine came within the time limit
-        record["provisional"] = True
-    return record
+    )
+    return _record(verdict, left_out)
 
 
-def _problem_json(problem: Problem) -> Json:
-    return {
-        "file": problem.file,
-        "line": problem.line,
-        "column": problem.column,
-        "path": problem.path,
-        "message": str(problem).partition(": ")[2],
-    }
+def _problem(problem: Problem) -> FileProblem:
+    message = str(problem).partition(": ")[2]
+    return FileProblem(problem.file, problem.line, problem.column, problem.path, message)
 
 
-_SYNCLINE = (
-    "model", "sensor_error_m", "sync_rate_mps", "tau_s", "tau_crit_s", "sync_error_m",
-    "systematic_error_m", "total_m",
-)  # fmt: skip
+def _record(verdict: Verdict, left_out: tuple[str, ...]) -> CaseRecord:
+    """What a study keeps of a verdict."""
+    choice = verdict.choice or {}
+    return CaseRecord(
+        verdict=verdict.verdict,
+        requirements=verdict.requirements,
+        design=verdict.design,
+        syncline=None if verdict.syncline is None else _figures(verdict.syncline),
+        front=tuple(FrontPoint(p["cost"], p["error_m"]) for p in choice.get("front", ())),
+        infeasibility=verdict.infeasibility,
+        not_simulated=left_out,
+        provisional=choice.get("proof", {}).get("optimal") is False,
+    )
 
 
-def _record(verdict: Json, left_out: tuple[str, ...]) -> Json:
-    """What a study keeps of a verdict: all that its tables and findings need, no more."""
-    syncline = verdict.get("syncline")
-    record: Json = {
-        "verdict": verdict["verdict"],
-        "requirements": verdict.get("requirements") or [],
-        "design": verdict.get("design"),
-        "syncline": None if syncline is None else {k: syncline.get(k) for k in _SYNCLINE},
-        "front": [
-            {"cost": point["cost"], "error_m": point["error_m"]}
-            for point in (verdict.get("choice") or {}).get("front") or []
-        ],
-        "infeasibility": verdict.get("infeasibility"),
-        "not_simulated": list(left_out),
-    }
-    if verdict.get("reason"):
-        record["reason"] = verdict["reason"]
-    return record
-
-
-def is_final(record: Json) -> bool:
-    """Whether the same case would come out the same again: not after a time limit or a crash."""
-    if record.get("provisional"):
-        return False
-    return not (record["verdict"] == "indeterminate" and record.get("reason"))
+def _figures(whole: SynclineFigures) -> CaseFigures:
+    return CaseFigures(
+        whole.model, whole.sensor_error_m, whole.sync_rate_mps, whole.tau_s, whole.tau_crit_s,
+        whole.sync_error_m, whole.systematic_error_m, whole.total_m,
+    )  # fmt: skip

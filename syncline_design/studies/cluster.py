@@ -13,9 +13,11 @@ from syncline_design.machine.processes import (
     interrupts_held_back,
     starting_safely,
 )
-from syncline_design.studies.case import CaseSettings, canonical
+from syncline_design.studies.case import CaseSettings
+from syncline_design.studies.inputs import canonical
 from syncline_design.studies.loading import Study
 from syncline_design.studies.pool import Result, encoded_case
+from syncline_design.studies.record import lost
 
 IN_HAND = 8  # cases given to the scheduler per thread of the cluster
 RETRIES = 5
@@ -104,4 +106,4 @@ def _record(future: Any) -> str:
     error = future.exception() if future.status == "error" else None
     if error is None:
         return str(future.result())
-    return canonical({"verdict": "indeterminate", "reason": f"lost on the cluster: {error}"})
+    return canonical(lost(f"lost on the cluster: {error}").to_json())

@@ -21,6 +21,7 @@ from syncline_design.spec.keys import label
 from syncline_design.spec.yaml_text import plain_scalar
 
 MAX_CASES = 1_000_000
+MeetsWhen = Literal["all", "any", "decided"]
 FIGURES = 6
 Scale = Literal["linear", "log"]
 
@@ -119,7 +120,7 @@ class StudyFile(Record):
     sample: SampleChoice | None = None
     check: CheckChoice = Field(default_factory=CheckChoice)
     heat_map: HeatMapChoice | None = None
-    meets_when: Literal["all", "any", "decided"] = "all"
+    meets_when: MeetsWhen = "all"
 
 
 class FactorError(Exception):

@@ -8,25 +8,32 @@ study may move with its files.
 from __future__ import annotations
 
 import hashlib
+import json
 import os
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from syncline_design.machine.input_files import FilesRead, content_of, place_of
 
-Inputs = list[list[str]]  # [kind, name from the base's folder, what is there]
+Inputs = tuple[tuple[str, str, str], ...]  # kind, name from the base's folder, what is there
 CONTENT, PLACE = "content", "place"
+
+
+def canonical(data: Any) -> str:
+    """JSON of one form only: sorted keys, no spaces, ASCII, no NaN."""
+    return json.dumps(
+        data, sort_keys=True, separators=(",", ":"), ensure_ascii=True, allow_nan=False
+    )
 
 
 def inputs_of(found: FilesRead, folder: Path) -> Inputs:
     """What a case read, in one order."""
     real, named = folder.resolve(), folder.absolute()
-    read = [[CONTENT, _name(path, real), digest] for path, digest in found.contents.items()]
+    read = [(CONTENT, _name(path, real), digest) for path, digest in found.contents.items()]
     sought = [
-        [PLACE, _name(path, named), there.seen_from(real)] for path, there in found.places.items()
+        (PLACE, _name(path, named), there.seen_from(real)) for path, there in found.places.items()
     ]
-    return sorted(read + sought)
+    return tuple(sorted(read + sought))
 
 
 def _name(path: str, folder: Path) -> str:
@@ -39,9 +46,9 @@ class Looked:
     def __init__(self) -> None:
         self._known: dict[tuple[str, str, str], str] = {}
 
-    def now(self, sought: Sequence[Sequence[str]], folder: Path) -> Inputs:
+    def now(self, sought: Inputs, folder: Path) -> Inputs:
         """The same files, with what is there now."""
-        return [[kind, name, self._there(kind, name, folder)] for kind, name, *_ in sought]
+        return tuple((kind, name, self._there(kind, name, folder)) for kind, name, _ in sought)
 
     def _there(self, kind: str, name: str, folder: Path) -> str:
         key = kind, name, str(folder)
@@ -53,16 +60,8 @@ class Looked:
         return self._known[key]
 
 
-def is_inputs(data: Any) -> bool:
-    """Whether data from a file have the shape of inputs."""
-    return isinstance(data, list) and all(
-        isinstance(item, list) and len(item) == 3 and all(isinstance(text, str) for text in item)
-        for item in data
-    )
-
-
-def full_key(case_key: str, inputs: Inputs, canonical: str) -> str:
+def full_key(case_key: str, inputs: Inputs) -> str:
     """The key of a case with the content of every file that it reads."""
     if not inputs:
         return case_key
-    return hashlib.sha256(f"{case_key}{canonical}".encode("ascii")).hexdigest()
+    return hashlib.sha256(f"{case_key}{canonical(inputs)}".encode("ascii")).hexdigest()

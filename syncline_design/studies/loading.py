@@ -27,6 +27,7 @@ from syncline_design.studies.definition import (
     Factor,
     FactorError,
     HeatMapChoice,
+    MeetsWhen,
     StudyFile,
     grid_values,
     sample_values,
@@ -73,7 +74,7 @@ class Study:
     samples: int
     check: CheckChoice
     heat_map: HeatMapChoice | None
-    meets_when: str
+    meets_when: MeetsWhen
 
     @property
     def factors(self) -> tuple[Factor, ...]:

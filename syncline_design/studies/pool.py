@@ -19,8 +19,10 @@ from typing import Any
 
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.processes import end_with_parent, ended_by_signals, starting_safely
-from syncline_design.studies.case import CaseSettings, canonical, check_case
+from syncline_design.studies.case import CaseSettings, check_case
+from syncline_design.studies.inputs import canonical
 from syncline_design.studies.loading import Study
+from syncline_design.studies.record import lost
 
 IN_HAND = 4
 MAX_DEATHS = 3  # of workers on one and the same case, or before they start at all
@@ -42,7 +44,7 @@ class _Worker:
 
 def encoded_case(study: Study, index: int, settings: CaseSettings) -> str:
     """The record of one case as canonical JSON."""
-    return canonical(check_case(study, index, settings))
+    return canonical(check_case(study, index, settings).to_json())
 
 
 def _work(connection: Connection) -> None:
@@ -149,7 +151,7 @@ class Pool:
             if self._deaths[guilty] >= MAX_DEATHS:
                 worker.cases.popleft()
                 reason = f"its worker process died {MAX_DEATHS} times"
-                yield guilty, canonical({"verdict": "indeterminate", "reason": reason})
+                yield guilty, canonical(lost(reason).to_json())
         self.retried += len(worker.cases)
         queue.extendleft(reversed(worker.cases))
         self._workers[place] = self._start()

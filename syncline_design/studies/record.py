@@ -1,56 +1,124 @@
-"""Whether a case's record hangs together: its verdict has to follow from its own requirements."""
+"""What a study keeps of a case, and whether that hangs together.
+
+All that the tables and findings of a study need of a verdict, no more.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
 
-Json = dict[str, Any]
-_WORDS = ("meets", "fails", "infeasible", "refused", "indeterminate")
-_STATUSES = ("pass", "fail", "indeterminate")
+from syncline_design.machine.records import Record
+from syncline_design.studies.inputs import Inputs
+from syncline_design.verdict.tree import FileProblem, RequirementResult
+
+SCHEMA = "syncline-design/study-case/v1"
+CaseWord = Literal["meets", "fails", "infeasible", "refused", "indeterminate"]
 _ROUNDING = 1e-9  # of a printed figure against the exact one that was decided
 
 
-def is_believable(record: Json) -> bool:
-    """Whether a record has the shape of one and its verdict follows from what it says."""
-    word, requirements = record.get("verdict"), record.get("requirements", [])
-    if word not in _WORDS or not isinstance(requirements, list):
-        return False
-    if not all(_is_requirement(item) for item in requirements):
-        return False
-    if not all(isinstance(record.get(key) or {}, dict) for key in ("design", "syncline")):
-        return False
-    if not all(isinstance(record.get(key) or [], list) for key in ("front", "problems")):
-        return False
-    return word != "meets" or (bool(requirements) and _follows(requirements))
+@dataclass(frozen=True, slots=True)
+class CaseFigures(Record):
+    """The Syncline figures of a case's design; tau_crit_s None: it has no limit."""
+
+    model: str
+    sensor_error_m: float
+    sync_rate_mps: float
+    tau_s: float
+    tau_crit_s: float | None
+    sync_error_m: float
+    systematic_error_m: float
+    total_m: float
 
 
-def _is_requirement(item: Any) -> bool:
-    if not isinstance(item, dict) or item.get("status") not in _STATUSES:
-        return False
-    figures = (item.get("value"), item.get("limit"))
-    return isinstance(item.get("id"), str) and all(_is_figure(figure) for figure in figures)
+@dataclass(frozen=True, slots=True)
+class FrontPoint(Record):
+    """One point of an exact front."""
+
+    cost: float
+    error_m: float
 
 
-def _is_figure(value: Any) -> bool:
-    if value is None:
-        return True
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(value)
+@dataclass(frozen=True, slots=True)
+class Pick(Record):
+    """One role of a design: stage.role, sensor, and how it is stamped."""
+
+    role: str
+    sensor: str
+    name: str
+    timestamping: str
 
 
-def _follows(requirements: Iterable[Json]) -> bool:
-    """Whether a system with these requirements meets them: each passes, or is waived."""
-    return all(_holds(item) for item in requirements)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class CaseRecord(Record):
+    """One case; inputs: the files that it read besides spec and catalogs.
+
+    problems: of one that cannot be as combined; reason: of one without a verdict; provisional: as
+    far as this machine came within the time limit.
+    """
+
+    verdict: CaseWord
+    requirements: tuple[RequirementResult, ...] = ()
+    design: Mapping[str, Any] | None = None
+    syncline: CaseFigures | None = None
+    front: tuple[FrontPoint, ...] = ()
+    infeasibility: Mapping[str, Any] | None = None
+    not_simulated: tuple[str, ...] = ()
+    problems: tuple[FileProblem, ...] = ()
+    reason: str = ""
+    provisional: bool = False
+    inputs: Inputs = ()
+
+    @property
+    def is_final(self) -> bool:
+        """Whether the same case would come out the same again: not after a time limit or crash."""
+        return not self.provisional and not (self.verdict == "indeterminate" and self.reason)
+
+    @property
+    def is_believable(self) -> bool:
+        """Whether the verdict follows from what the record says."""
+        if not all(_is_finite(row) for row in self.requirements):
+            return False
+        return self.verdict != "meets" or (
+            bool(self.requirements) and all(map(_holds, self.requirements))
+        )
+
+    @property
+    def cost(self) -> float | None:
+        """Of the design; None where there is none, or where its price is unknown."""
+        return None if self.design is None else self.design["cost"]
+
+    @property
+    def error_m(self) -> float | None:
+        """Total error of the design."""
+        return None if self.syncline is None else self.syncline.total_m
+
+    @property
+    def picks(self) -> Iterator[Pick]:
+        """What fills the roles of the case's design."""
+        for stage in self.design["stages"] if self.design is not None else ():
+            for role, entry in stage["roles"].items():
+                stamping = f"{entry['timestamping']} ({entry['primitive']})"
+                sensor = str(entry["sensor"])
+                yield Pick(f"{stage['name']}.{role}", sensor, entry["name"] or sensor, stamping)
 
 
-def _holds(item: Json) -> bool:
-    waiver = item.get("waiver")
-    if item["status"] == "fail":
-        return isinstance(waiver, dict) and waiver.get("expired") is False
-    value, limit = item.get("value"), item.get("limit")
-    if value is None or limit is None:
-        return bool(item["status"] == "pass")
-    room = _ROUNDING * max(abs(value), abs(limit))
-    return bool(item["status"] == "pass" and value <= limit + room)
+def lost(reason: str) -> CaseRecord:
+    """The record of a case that came to no verdict."""
+    return CaseRecord(verdict="indeterminate", reason=reason)
+
+
+def _is_finite(row: RequirementResult) -> bool:
+    return math.isfinite(row.limit) and (row.value is None or math.isfinite(row.value))
+
+
+def _holds(row: RequirementResult) -> bool:
+    """Whether a system that meets its requirements may have this one: it passes, or is waived."""
+    if row.status == "fail":
+        return row.is_waived
+    if row.value is None:
+        return row.status == "pass"
+    room = _ROUNDING * max(abs(row.value), abs(row.limit))
+    return row.status == "pass" and row.value <= row.limit + room

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, Literal, get_args
 
 from syncline_design.spec.keys import label
+from syncline_design.studies.definition import MeetsWhen
 from syncline_design.studies.loading import Study
+from syncline_design.studies.record import CaseRecord, CaseWord
 from syncline_design.studies.store import Store, StoreError
 
-Json = dict[str, Any]
-VERDICTS = ("meets", "fails", "infeasible", "refused", "indeterminate")
-EXIT_CODES = {"meets": 0, "fails": 1, "indeterminate": 3}
+VERDICTS: tuple[CaseWord, ...] = get_args(CaseWord)
+StudyWord = Literal["meets", "fails", "indeterminate"]
+EXIT_CODES: dict[StudyWord, int] = {"meets": 0, "fails": 1, "indeterminate": 3}
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,24 +29,17 @@ class CaseResult:
     name: str  # of the base spec
     currency: str
     settings: tuple[tuple[str, Any], ...]
-    record: Json
+    record: CaseRecord
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> CaseWord:
         """meets, fails, infeasible, refused or indeterminate."""
-        return str(self.record["verdict"])
+        return self.record.verdict
 
     @property
     def labels(self) -> dict[str, str]:
         """Key path to value as the tables show it."""
         return {key: label(value) for key, value in self.settings}
-
-    def figure(self, *path: str) -> float | None:
-        """A figure of the record, such as ("design", "cost"); None where there is none."""
-        node: Any = self.record
-        for step in path:
-            node = node.get(step) if isinstance(node, dict) else None
-        return float(node) if isinstance(node, int | float) else None
 
 
 @dataclass(frozen=True)
@@ -55,7 +50,7 @@ class StudyResult:
     seed: int
     keys: tuple[str, ...] = field(repr=False)
     store: Store = field(repr=False)
-    unsettled: dict[str, Json] = field(repr=False)  # by key: no verdict this time
+    unsettled: dict[str, CaseRecord] = field(repr=False)  # by key: no verdict this time
     reused: int
     computed: int
     retried: int
@@ -68,10 +63,10 @@ class StudyResult:
         """One case by its index, from 0."""
         place, settings = self.study.case(index)
         base, record = self.study.bases[place], self._record(index)
-        currency = str((record.get("design") or {}).get("currency") or base.currency)
+        currency = base.currency if record.design is None else record.design["currency"]
         return CaseResult(index + 1, place, str(base.path), base.name, currency, settings, record)
 
-    def _record(self, index: int) -> Json:
+    def _record(self, index: int) -> CaseRecord:
         key = self.keys[index]
         record = self.unsettled.get(key) or self.store.read(key)
         if record is None:
@@ -84,7 +79,7 @@ class StudyResult:
         return (self.case(index) for index in range(len(self.keys)))
 
     @cached_property
-    def counts(self) -> dict[str, int]:
+    def counts(self) -> dict[CaseWord, int]:
         """How many cases ended how."""
         found = Counter(case.verdict for case in self.cases())
         return {word: found.get(word, 0) for word in VERDICTS}
@@ -92,10 +87,10 @@ class StudyResult:
     @cached_property
     def not_simulated(self) -> tuple[str, ...]:
         """Requirements that no case decided because the study leaves Monte Carlo out."""
-        return tuple(sorted({i for case in self.cases() for i in _left_out(case)}))
+        return tuple(sorted({i for case in self.cases() for i in case.record.not_simulated}))
 
     @property
-    def verdict(self) -> str:
+    def verdict(self) -> StudyWord:
         """meets, fails or indeterminate, by the study's `meets_when`.
 
         all: every case meets; any: at least one does; decided: every case got an answer.
@@ -108,11 +103,7 @@ class StudyResult:
         return EXIT_CODES[self.verdict]
 
 
-def _left_out(case: CaseResult) -> list[str]:
-    return case.record.get("not_simulated") or []
-
-
-def study_verdict(counts: dict[str, int], meets_when: str) -> str:
+def study_verdict(counts: Mapping[CaseWord, int], meets_when: MeetsWhen) -> StudyWord:
     """The verdict of a study from how its cases ended."""
     failed = counts["fails"] + counts["infeasible"] + counts["refused"]
     if meets_when == "any":

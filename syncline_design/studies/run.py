@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from pathlib import Path
-from typing import Any
 
 from syncline_design.choice.outcome import NoVerdict
 from syncline_design.machine.deadline import Deadline, OutOfTime, in_force, within
-from syncline_design.studies.case import CaseSettings, canonical, case_keys, is_final
+from syncline_design.machine.records import read_as
+from syncline_design.studies.case import CaseSettings, case_keys
 from syncline_design.studies.cluster import ClusterError, run_on_cluster
 from syncline_design.studies.inputs import Looked, full_key
 from syncline_design.studies.loading import Study, load_study
 from syncline_design.studies.pool import Pool, PoolError, Result, encoded_case
+from syncline_design.studies.record import CaseRecord
 from syncline_design.studies.result import Progress, Report, StudyResult
 from syncline_design.studies.store import FOLDER, Store, StoreError
 
-Json = dict[str, Any]
 FEW_CASES = 8  # as many are done sooner than a worker process starts
 
 
@@ -91,7 +90,7 @@ class _Run:
     progress: Report | None
     retried: int = 0
     done: tuple[int, int] | None = None  # of how many
-    unsettled: dict[str, Json] = field(default_factory=dict)
+    unsettled: dict[str, CaseRecord] = field(default_factory=dict)
     looked: Looked = field(default_factory=Looked)
 
     def finish(self) -> StudyResult:
@@ -103,9 +102,9 @@ class _Run:
         reused = len(keys) + again
         self._say(reused, len(cases), reused)
         for done, (index, encoded) in enumerate(self._records(missing), 1):
-            record = json.loads(encoded)
+            record = read_as(CaseRecord, encoded)
             keys[index] = self._keep(cases[index], encoded, record)
-            if not is_final(record):
+            if not record.is_final:
                 self.unsettled[keys[index]] = record
             self._say(reused + done, len(cases), reused)
         elapsed = time.monotonic() - self.started
@@ -131,19 +130,19 @@ class _Run:
         if self.settings.fresh:
             return None
         folder = self._folder(index)
-        for sought in self.store.reads(case_key) or [[]]:
+        for sought in self.store.reads(case_key) or ((),):
             inputs = self.looked.now(sought, folder)
-            key = full_key(case_key, inputs, canonical(inputs))
+            key = full_key(case_key, inputs)
             record = self.store.read(key)
-            if record is not None and (record.get("inputs") or []) == inputs:
+            if record is not None and record.inputs == inputs:
                 return key
         return None
 
-    def _keep(self, case_key: str, encoded: str, record: Json) -> str:
+    def _keep(self, case_key: str, encoded: str, record: CaseRecord) -> str:
         """Put a record where the next run finds it, unless the same case may come out otherwise."""
-        inputs = record.get("inputs") or []
-        key = full_key(case_key, inputs, canonical(inputs))
-        if is_final(record):
+        inputs = record.inputs
+        key = full_key(case_key, inputs)
+        if record.is_final:
             self.store.write(key, encoded)
             if inputs:
                 self.store.note_reads(case_key, inputs)

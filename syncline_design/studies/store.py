@@ -8,21 +8,24 @@ from its own figures.  Anything else is computed again.
 from __future__ import annotations
 
 import hashlib
-import json
 import re
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Final, TypeVar
 
 from syncline_design.machine.input_files import UnsuitableError, read_plain
+from syncline_design.machine.records import NotThisResultError, Record, read_as
 from syncline_design.machine.result_files import clear_stale, replace_whole
-from syncline_design.studies.case import canonical
-from syncline_design.studies.inputs import Inputs, is_inputs
-from syncline_design.studies.record import is_believable
+from syncline_design.studies.inputs import Inputs, canonical
+from syncline_design.studies.record import CaseRecord
 
-Json = dict[str, Any]
+R = TypeVar("R", bound=Record)
 FOLDER = ".syncline-cases"
 MOST_BYTES = 2**26
 MOST_ALTERNATIVES = 32
+# A file is {"key":"KEY","sha256":"DIGEST","record":RECORD} and a newline, RECORD in canonical JSON.
+_MIDDLE: Final = '","record":'
+_TAIL: Final = "}\n"
 _SHARD = re.compile(r"[0-9a-f]{2}")
 
 
@@ -56,37 +59,31 @@ class Store:
         """Where the record of a case lies."""
         return self.folder / key[:2] / f"{key}.json"
 
-    def read(self, key: str) -> Json | None:
+    def read(self, key: str) -> CaseRecord | None:
         """The record, or None where there is none that is whole, right and believable."""
-        content = _read_json(self.path(key))
-        if not isinstance(content, dict) or content.get("key") != key:
-            return None
-        record = content.get("record")
-        if not isinstance(record, dict) or content.get("sha256") != _digest_of(record):
-            return None
-        return record if is_believable(record) else None
+        encoded = _kept(key, _text(self.path(key)))
+        record = None if encoded is None else _read(CaseRecord, encoded)
+        return record if record is not None and record.is_believable else None
 
     def write(self, key: str, encoded: str) -> None:
         """Put a record (canonical JSON) in place in one step.
 
         No fsync: a file that a power cut tears does not match its own hash and is computed again.
         """
-        text = f'{{"key":"{key}","sha256":"{_digest(encoded)}","record":{encoded}}}\n'
-        self._put(self.path(key), text)
+        self._put(self.path(key), f"{_head(key)}{_digest(encoded)}{_MIDDLE}{encoded}{_TAIL}")
 
-    def reads(self, case_key: str) -> list[Inputs]:
+    def reads(self, case_key: str) -> tuple[Inputs, ...]:
         """The files that a case has been seen to read, each time they were others."""
-        data = _read_json(self._reads_path(case_key))
-        kept = data.get("reads") if isinstance(data, dict) else None
-        return [item for item in kept if is_inputs(item)] if isinstance(kept, list) else []
+        found = _read(_Reads, _text(self._reads_path(case_key)))
+        return () if found is None else found.reads
 
     def note_reads(self, case_key: str, inputs: Inputs) -> None:
         """Keep the names of what a case read; their content is in the key of its record."""
-        names = [[kind, name, ""] for kind, name, _ in inputs]
+        names = tuple((kind, name, "") for kind, name, _ in inputs)
         known = self.reads(case_key)
         if names not in known:
-            kept = [names, *known][:MOST_ALTERNATIVES]
-            self._put(self._reads_path(case_key), canonical({"reads": kept}) + "\n")
+            kept = _Reads((names, *known)[:MOST_ALTERNATIVES])
+            self._put(self._reads_path(case_key), canonical(kept.to_json()) + "\n")
 
     def _reads_path(self, case_key: str) -> Path:
         return self.folder / case_key[:2] / f"{case_key}.reads"
@@ -106,19 +103,40 @@ class Store:
         )
 
 
-def _read_json(path: Path) -> Any:
-    """What a JSON file holds; None where it cannot be read or is nested beyond reason."""
+@dataclass(frozen=True, slots=True)
+class _Reads(Record):
+    """What a case has been seen to read; without what was there."""
+
+    reads: tuple[Inputs, ...]
+
+
+def _text(path: Path) -> str:
+    """What a file holds; nothing where it cannot be read."""
     try:
-        return json.loads(read_plain(path, MOST_BYTES))
-    except (OSError, ValueError, UnsuitableError, RecursionError):
+        return read_plain(path, MOST_BYTES).decode("ascii")
+    except (OSError, UnsuitableError, UnicodeDecodeError):
+        return ""
+
+
+def _read(kind: type[R], text: str) -> R | None:
+    try:
+        return read_as(kind, text)
+    except NotThisResultError:
         return None
 
 
-def _digest_of(record: Json) -> str | None:
-    try:
-        return _digest(canonical(record))
-    except (ValueError, RecursionError):  # no JSON of ours
+def _head(key: str) -> str:
+    return f'{{"key":"{key}","sha256":"'
+
+
+def _kept(key: str, text: str) -> str | None:
+    """The encoded record in the text of its file; None where that is not as it was written."""
+    head = _head(key)
+    digest, middle, rest = text.removeprefix(head).partition(_MIDDLE)
+    if not (text.startswith(head) and middle and rest.endswith(_TAIL)):
         return None
+    encoded = rest.removesuffix(_TAIL)
+    return encoded if digest == _digest(encoded) else None
 
 
 def _digest(text: str) -> str:

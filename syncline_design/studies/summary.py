@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
+from syncline_design.machine.records import Record, optional
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import Factor, figure_of
+from syncline_design.studies.record import CaseWord, FrontPoint, Pick
 from syncline_design.studies.result import CaseResult, StudyResult
 
 MOST_FRONTS = 500
 MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
-
-
-@dataclass(frozen=True, slots=True)
-class Pick:
-    """One role of a design: stage.role, sensor, and how it is stamped."""
-
-    role: str
-    sensor: str
-    name: str
-    timestamping: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +24,7 @@ class Brief:
     number: int
     base: int
     labels: tuple[str, ...]
-    verdict: str
+    verdict: CaseWord
     cost: float | None
     currency: str
     error_m: float | None
@@ -45,12 +37,12 @@ class Brief:
 
 
 @dataclass(frozen=True, slots=True)
-class Front:
-    """One exact front of cost against error, and the cases that share it."""
+class Front(Record):
+    """One exact front of cost against error; cases: the numbers of those that share it."""
 
-    points: tuple[tuple[float, float], ...]
+    cases: tuple[int, ...]
     currency: str
-    cases: tuple[int, ...]  # numbers
+    points: tuple[FrontPoint, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,68 +61,68 @@ class Summary:
 
 
 @dataclass(frozen=True, slots=True)
-class HeatMap:
-    """Least cost of a meeting case over two factors; None where no case meets."""
+class HeatMap(Record):
+    """Least cost of a meeting case over two factors [y][x]; None where no case meets.
 
-    x: Factor
-    y: Factor
-    x_labels: tuple[str, ...]
-    y_labels: tuple[str, ...]
-    cost: tuple[tuple[float | None, ...], ...]  # [y][x]
-    picks: tuple[tuple[str, ...], ...]  # the payload of that case
-    undecided: int = 0  # cells without a cost in which a case got no verdict
+    payload: of that case.  undecided: cells without a cost in which a case got no verdict.
+    """
+
+    x: str
+    y: str
+    currency: str
+    x_values: tuple[str, ...]
+    y_values: tuple[str, ...]
+    least_cost: tuple[tuple[float | None, ...], ...]
+    payload: tuple[tuple[str, ...], ...]
+    undecided: int | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
-class Winner:
-    """One option of a role: in how many meeting cases it was chosen, and between which values."""
+class Winner(Pick):
+    """One option of a role: in how many of how many meeting cases it was chosen.
 
-    pick: Pick
+    where: per factor that varies, the values between which it wins.
+    """
+
     cases: int
     of: int
-    where: tuple[str, ...]  # per factor, the values at which it wins
+    where: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Boundary:
-    """Along one factor, everything else fixed: neighbours of which one meets and one does not."""
+class Boundary(Record):
+    """Along one factor, everything else fixed: neighbours of which one meets and one does not.
+
+    why: the verdict at the value that misses.
+    """
 
     factor: str
     met: str
     missed: str
-    fixed: tuple[tuple[str, str], ...]
-    why: str  # verdict at the value that misses
+    fixed: Mapping[str, str]
+    why: CaseWord
 
 
 def summarise(result: StudyResult) -> Summary:
     """One pass over all cases."""
     briefs: list[Brief] = []
-    fronts: dict[tuple[tuple[tuple[float, float], ...], str], list[int]] = {}
+    fronts: dict[tuple[tuple[FrontPoint, ...], str], list[int]] = {}
     for case in result.cases():
         briefs.append(_brief(case))
-        points = tuple((p["cost"], p["error_m"]) for p in case.record.get("front") or ())
+        points = case.record.front
         key = (points, case.currency)
         if points and (key in fronts or len(fronts) < MOST_FRONTS):
             fronts.setdefault(key, []).append(case.number)
-    found = tuple(Front(*key, tuple(cases)) for key, cases in fronts.items())
-    return Summary(result, tuple(briefs), found)
+    found = (Front(tuple(cases), currency, points) for (points, currency), cases in fronts.items())
+    return Summary(result, tuple(briefs), tuple(found))
 
 
 def _brief(case: CaseResult) -> Brief:
+    record = case.record
     return Brief(
-        case.number, case.base, tuple(case.labels.values()), case.verdict,
-        case.figure("design", "cost"), case.currency, case.figure("syncline", "total_m"),
-        tuple(picks_of(case)),
+        case.number, case.base, tuple(case.labels.values()), record.verdict, record.cost,
+        case.currency, record.error_m, tuple(record.picks),
     )  # fmt: skip
-
-
-def picks_of(case: CaseResult) -> Iterator[Pick]:
-    """The roles of a case's design."""
-    for stage in (case.record.get("design") or {}).get("stages") or ():
-        for role, entry in stage["roles"].items():
-            stamping = f"{entry['timestamping']} ({entry['primitive']})"
-            sensor = str(entry["sensor"])
-            yield Pick(f"{stage['name']}.{role}", sensor, entry.get("name") or sensor, stamping)
 
 
 def varied(summary: Summary) -> list[tuple[int, Factor]]:
@@ -196,10 +188,10 @@ def _filled(summary: Summary, x: Factor, y: Factor) -> HeatMap:
     columns, rows = axis_values(x), axis_values(y)
     found = [[best.get((column, row)) for column in columns] for row in rows]
     return HeatMap(
-        x, y, columns, rows,
+        x.key, y.key, summary.currencies[0], columns, rows,
         tuple(tuple(None if b is None else b.cost for b in row) for row in found),
         tuple(tuple("" if b is None else payload(b) for b in row) for row in found),
-        len(open_cells - set(best)),
+        len(open_cells - set(best)) or None,
     )  # fmt: skip
 
 
@@ -218,13 +210,18 @@ def winners(summary: Summary) -> list[Winner]:
     several = varied(summary)
     roles = list(dict.fromkeys(pick.role for pick in held))
     order = sorted(held, key=lambda p: (roles.index(p.role), -len(held[p]), p.sensor))
-    return [
-        Winner(
-            pick, len(held[pick]), sum(any(p.role == pick.role for p in b.picks) for b in meeting),
-            tuple(_extent(factor, {b.labels[i] for b in held[pick]}) for i, factor in several),
-        )
-        for pick in order
-    ]  # fmt: skip
+    return [_winner(pick, held[pick], meeting, several) for pick in order]
+
+
+def _winner(
+    pick: Pick, choosing: list[Brief], meeting: list[Brief], several: list[tuple[int, Factor]]
+) -> Winner:
+    """choosing: the meeting cases that chose it."""
+    having = sum(any(p.role == pick.role for p in brief.picks) for brief in meeting)
+    where = tuple(_extent(factor, {b.labels[i] for b in choosing}) for i, factor in several)
+    return Winner(
+        pick.role, pick.sensor, pick.name, pick.timestamping, len(choosing), having, where
+    )
 
 
 def _extent(factor: Factor, present: set[str]) -> str:
@@ -269,5 +266,5 @@ def _flips(
         if one.meets != other.meets and "indeterminate" not in (one.verdict, other.verdict):
             met, missed = (one, other) if one.meets else (other, one)
             yield Boundary(
-                factor.key, met.labels[place], missed.labels[place], tuple(fixed), missed.verdict
+                factor.key, met.labels[place], missed.labels[place], dict(fixed), missed.verdict
             )

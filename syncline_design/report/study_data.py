@@ -1,0 +1,102 @@
+"""A study as data: what its JSON holds, with the rows of its table."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from syncline_design import __version__
+from syncline_design.machine.records import Record
+from syncline_design.report.study_rows import Value, rows, si_unit
+from syncline_design.spec.keys import label
+from syncline_design.studies.definition import MeetsWhen
+from syncline_design.studies.loading import Study
+from syncline_design.studies.record import CaseWord
+from syncline_design.studies.result import StudyResult, StudyWord
+from syncline_design.studies.summary import (
+    Boundary,
+    Front,
+    HeatMap,
+    Winner,
+    boundaries,
+    heat_map,
+    summarise,
+    winners,
+)
+
+SCHEMA = "syncline-design/study/v1"
+
+
+@dataclass(frozen=True, slots=True)
+class VariedKey(Record):
+    """A key path and the values it takes; unit: of its figures in SI, None of words."""
+
+    key: str
+    origin: Literal["grid", "sample"]
+    unit: str | None
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class BaseHashes(Record):
+    """What a base spec and its catalogs held."""
+
+    file: str
+    spec_sha256: str
+    catalogs_sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class StudyProvenance(Record):
+    """What the numbers depend on."""
+
+    version: str
+    seed: int
+    study_sha256: str
+    bases: tuple[BaseHashes, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StudyData(Record):
+    """A finished study; cases: the rows of its table, what a case lacks null or left out."""
+
+    schema: str
+    verdict: StudyWord
+    name: str
+    file: str
+    meets_when: MeetsWhen
+    counts: Mapping[CaseWord, int]
+    not_simulated: tuple[str, ...]
+    factors: tuple[VariedKey, ...]
+    heat_map: HeatMap | None
+    winners: tuple[Winner, ...]
+    boundaries: tuple[Boundary, ...]
+    fronts: tuple[Front, ...]
+    cases: tuple[Mapping[str, Value], ...]
+    provenance: StudyProvenance
+
+
+def study_data(result: StudyResult) -> StudyData:
+    """The study as data."""
+    study, summary = result.study, summarise(result)
+    return StudyData(
+        SCHEMA, result.verdict, study.name, str(study.path), study.meets_when, result.counts,
+        result.not_simulated, _factors(study), heat_map(summary), tuple(winners(summary)),
+        tuple(boundaries(summary)), summary.fronts, tuple(rows(result)), _provenance(result),
+    )  # fmt: skip
+
+
+def _factors(study: Study) -> tuple[VariedKey, ...]:
+    return tuple(
+        VariedKey(factor.key, factor.origin, si_unit(factor), tuple(map(label, factor.values)))
+        for factor in study.factors
+    )
+
+
+def _provenance(result: StudyResult) -> StudyProvenance:
+    bases = tuple(
+        BaseHashes(str(base.path), base.document.sha256, base.catalogs.sha256())
+        for base in result.study.bases
+    )
+    return StudyProvenance(__version__, result.seed, result.study.sha256, bases)
