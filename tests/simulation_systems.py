@@ -5,9 +5,12 @@ from __future__ import annotations
 import dataclasses
 import math
 
+import numpy as np
+
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import Distribution, TimingError, Uniform
+from syncline_design.simulation.chain import Noise
 
 DEG = math.pi / 180.0
 DEFAULT_ERROR = Uniform(-2e-4, 2e-4)
@@ -80,3 +83,9 @@ def altered(system: System, **platform: float) -> System:
     first = system.stages[0]
     changed = dataclasses.replace(first, platform=dataclasses.replace(first.platform, **platform))
     return dataclasses.replace(system, stages=(changed, *system.stages[1:]))
+
+
+def no_noise(rows: int) -> Noise:
+    """A draw without noise and without timestamp errors."""
+    vector, scalar = np.zeros((rows, 3)), np.zeros(rows)
+    return Noise(vector, vector, scalar, scalar, scalar, scalar, scalar, scalar)

@@ -14,7 +14,6 @@ from syncline_design.simulation import kernel
 from syncline_design.simulation.chain import (
     ConstantTwist,
     Noise,
-    no_noise,
     rotation_exp,
     rotation_to_euler,
     screw_displacement,
@@ -22,7 +21,7 @@ from syncline_design.simulation.chain import (
 )
 from syncline_design.simulation.draws import RandomSource, generator, stage_draw, timing_draws
 from syncline_design.simulation.surroundings import Moment, placed_rows
-from tests.simulation_systems import DEG, altered, fixed_wing, position_only, survey
+from tests.simulation_systems import DEG, altered, fixed_wing, no_noise, position_only, survey
 
 
 def bearing_of(azimuth: float, elevation: float) -> np.ndarray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -16,7 +17,7 @@ from syncline_design.choice.decide import best, choose
 from syncline_design.choice.evaluate import broken, evaluate
 from syncline_design.choice.front import front
 from syncline_design.choice.outcome import Choice, Infeasible
-from syncline_design.choice.prices import price_of, staircase
+from syncline_design.choice.prices import Step, staircase
 from syncline_design.choice.problem import build_problem, selection_of
 from syncline_design.choice.slack import Slack, payload, same_design, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem
@@ -77,6 +78,11 @@ def test_steps_join_without_gaps() -> None:
         assert after.extra == after.amount - before.amount > 0
     assert steps[0].looser_than_m is None
     assert price_of(steps, 0.0) is None
+
+
+def price_of(steps: Sequence[Step], target_m: float) -> Step | None:
+    """The step that buys an accuracy target; None where no design reaches it."""
+    return next((step for step in steps if step.tightest_m <= target_m), None)
 
 
 def row_of(rows: tuple[Slack, ...], term: str) -> Slack:

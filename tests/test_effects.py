@@ -19,10 +19,10 @@ from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.chain import (
     ConstantTwist,
     euler_to_rotation,
-    no_noise,
     rotation_to_euler,
     stage_error,
 )
+from tests.simulation_systems import no_noise
 
 Array = NDArray[np.float64]
 PAIRS = [(e, s) for e in registry().values() for s in e.sensors]
@@ -118,10 +118,10 @@ def test_nothing_departs_at_zero(effect: Effect, sensor: Target) -> None:
     if effect.kind == "discrete" or effect.name in {"noise_understated", "heavy_tails"}:
         return  # a convention has no zero; a factor's neutral value is 1, tails' is infinity
     state = rows()
-    values = values_of(effect, sensor) | {"time_constant_s": 1.0} if effect.spread else None
-    departed = effect.depart(
-        state, values or values_of(effect, sensor), sensor, np.random.default_rng(1)
-    )
+    values = dict(values_of(effect, sensor))
+    if "time_constant_s" in values:
+        values["time_constant_s"] = 1.0
+    departed = effect.depart(state, values, sensor, np.random.default_rng(1))
     assert np.abs(error_of(state, departed)).max() < 1e-9
 
 
@@ -155,29 +155,27 @@ def neutral(effect: Effect, size: float) -> dict[str, float]:
     return {}
 
 
-STOCHASTIC = [(e, s) for e, s in PAIRS if e.spread is not None and e.name != "noise_understated"]
+FACTORS = ("noise_understated", "heavy_tails")  # they change a sensor's own noise
+STOCHASTIC = [(e, s) for e, s in PAIRS if e.kind == "stochastic" and e.name not in FACTORS]
 
 
 @pytest.mark.parametrize(("effect", "sensor"), STOCHASTIC, ids=lambda x: getattr(x, "name", x))
-def test_spread_is_the_covariance_of_what_is_drawn(effect: Effect, sensor: Target) -> None:
+def test_what_is_drawn_has_the_stated_variance(effect: Effect, sensor: Target) -> None:
     """400 draws: every diagonal entry within 5 of its standard errors (2/400)^0.5 = 7 %.
 
     180 entries at 5 sigma: a true covariance fails one run in 10 000 (chi-square's skew included).
     """
-    assert effect.spread is not None
     state, rng, draws = rows(), np.random.default_rng(3), 400
     values = {"std_s": 1e-4, "interval_s": 1e-4, "std_m": 0.1, "time_constant_s": 2.0}
     kept = {p.name: values[p.name] for p in effect.parameters}
     sample = np.stack(
         [error_of(state, effect.depart(state, kept, sensor, rng)) for _ in range(draws)]
     )
-    spread = effect.spread(state, kept, sensor)
-    if spread.directions is not None:
-        expected = (spread.directions**2).sum(axis=2)
-    else:
-        assert spread.wander is not None
-        loading = np.atleast_2d(spread.wander.loading)
-        expected = np.broadcast_to((loading**2).sum(axis=1) * spread.wander.std_m**2, (ROWS, 3))
+    if effect.spread is not None:
+        expected = (effect.spread(state, kept, sensor) ** 2).sum(axis=2)
+    else:  # a process of std_m on each axis
+        axes = {"correlated_noise": (1.0, 1.0, 1.0), "height_drift": (0.0, 0.0, 1.0)}
+        expected = np.broadcast_to(np.square(axes[effect.name]) * kept["std_m"] ** 2, (ROWS, 3))
     measured = sample.var(axis=0)
     assert np.all(np.abs(measured - expected) <= 5 * (2 / draws) ** 0.5 * expected + 1e-15)
 

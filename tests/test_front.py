@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from random_problems import random_problem, with_random_limits
 from syncline_design.choice import front as front_module
-from syncline_design.choice.enumerate import all_designs, best_by_enumeration, front_by_enumeration
+from syncline_design.choice.enumerate import all_designs, best_by_enumeration
 from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
 from syncline_design.choice.front import front, merged_front
 from syncline_design.choice.outcome import FrontPoint
@@ -30,6 +30,7 @@ from syncline_design.choice.table import (
     RoleTable,
     VehicleTable,
 )
+from tests.plain_front import front_by_enumeration
 
 
 def option(name: str, error: float, tau: float, cost: float | Fraction, **more: object) -> Option:

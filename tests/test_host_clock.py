@@ -19,7 +19,6 @@ import numpy as np
 import pytest
 
 from syncline_design.choice.decide import choose
-from syncline_design.choice.enumerate import front_by_enumeration
 from syncline_design.choice.front import front
 from syncline_design.choice.outcome import Choice
 from syncline_design.choice.problem import build_problem, selection_of
@@ -35,6 +34,7 @@ from syncline_design.simulation.sampling import sample_errors
 from syncline_design.spec.load import load
 from syncline_design.verdict.recheck import recheck
 from syncline_design.verdict.verify import CheckSettings, check_file
+from tests.plain_front import front_by_enumeration
 
 HOST, OTHER = "host:v", "host:w"
 EXACT = (0.0, 0.0, 0.0)

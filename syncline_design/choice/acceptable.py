@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
-from syncline_design.choice.evaluate import broken, evaluate
 from syncline_design.choice.narrowed import Narrowed, kept
 from syncline_design.choice.outcome import Deadline
 from syncline_design.choice.ranked import iter_best
@@ -27,14 +26,6 @@ def judgement(problem: Problem, design: Design) -> Judgement:
 def refusals(problem: Problem) -> int:
     """How often simulation was refused because too many designs had been simulated."""
     return 0 if problem.judge is None else problem.judge.refusals
-
-
-def unmet(problem: Problem, design: Design) -> tuple[str, ...]:
-    """Kinds of requirement that a design does not meet; none: it is acceptable."""
-    kinds = broken(problem, evaluate(problem, design))
-    if kinds or judgement(problem, design).passed:
-        return kinds
-    return ("monte_carlo",)
 
 
 def iter_acceptable(

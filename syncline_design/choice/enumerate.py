@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from syncline_design.choice.evaluate import Evaluation, broken, error_key, evaluate, rank
-from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
-from syncline_design.choice.table import Design, Problem, ResourceName
+from syncline_design.choice.evaluate import Evaluation, broken, evaluate, rank
+from syncline_design.choice.outcome import Deadline, TooLarge
+from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import in_force
 
 MOST_COMBINATIONS = 300_000
@@ -40,21 +40,3 @@ def best_by_enumeration(problem: Problem, deadline: Deadline | None = None) -> D
         if not broken(problem, found)
     ]
     return min(feasible, key=lambda entry: entry[0])[1] if feasible else None
-
-
-def front_by_enumeration(
-    problem: Problem, resource: ResourceName = "cost"
-) -> tuple[FrontPoint, ...]:
-    """The Pareto front over all designs that meet every requirement but accuracy."""
-    found = []
-    for design, evaluation in all_designs(problem):
-        amount = evaluation.amount(resource)
-        if amount is not None and not broken(problem, evaluation, accuracy=False):
-            ranked = rank(problem, design, evaluation)[2:]
-            found.append((amount, error_key(evaluation.error_m), ranked, evaluation, design))
-    found.sort(key=lambda entry: entry[:3])
-    points: list[FrontPoint] = []
-    for amount, error, _, evaluation, design in found:
-        if not points or error < error_key(points[-1].error_m):
-            points.append(FrontPoint(amount, evaluation.error_m, design))
-    return tuple(points)

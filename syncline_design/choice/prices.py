@@ -51,8 +51,3 @@ def staircase(points: Sequence[FrontPoint]) -> tuple[Step, ...]:
         )
         before = point
     return tuple(steps)
-
-
-def price_of(steps: Sequence[Step], target_m: float) -> Step | None:
-    """The step that buys an accuracy target; None where no design reaches it."""
-    return next((step for step in steps if step.tightest_m <= target_m), None)

@@ -109,7 +109,6 @@ class _Search:
         ]
         self.least_sums = [[c.min() for c in columns] for columns in self.columns]
         self.least_error = [float(role.error.min()) for role in tables.roles]
-        self.most_error = [float(role.error.max()) for role in tables.roles]
         self.least_tau = [float(role.tau.min()) for role in tables.roles]
         self.suffixes = self._suffix_fronts()
         self.counter = itertools.count()

@@ -187,6 +187,5 @@ def directed_parts(view: Scene, found: Sequence[Candidate]) -> tuple[Directed, .
         if one.effect.spread is None or len(names) != 1:
             continue
         spread = one.effect.spread(view.rows[one.stage], {names[0]: 1.0}, one.sensor)
-        if spread.directions is not None:
-            parts.append(Directed(one.key, spread.directions))
+        parts.append(Directed(one.key, spread))
     return tuple(parts)

@@ -41,7 +41,6 @@ TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
 WITHIN_NATS, WITHIN_SHARE = 12.0, 0.35  # how far behind the best a candidate may be to be fitted
 MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
-SCATTER_SHARE = 0.2  # for effects that only scatter; the rest is the remainder test's
 WANDERING = frozenset({"correlated_noise", "height_drift"})
 WANDER_NATS = (
     15.0  # slow noise can take the shape of anything slow, so it has to be that much better
@@ -50,7 +49,6 @@ TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
 NEAR = 2.0  # log p within this factor of the threshold is checked on simulated logs
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
-AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
 

@@ -8,7 +8,6 @@ from syncline_design.effects.kinematics import wander
 from syncline_design.effects.record import (
     Basis,
     Contribution,
-    Covariance,
     Departures,
     Effect,
     Parameter,
@@ -16,7 +15,6 @@ from syncline_design.effects.record import (
     StageRows,
     Target,
     Values,
-    Wander,
 )
 from syncline_design.model.system import Stage
 
@@ -29,11 +27,6 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
         return Departures()
     draws = rng.standard_normal((len(rows), 3)) * AXES
     return Departures(position_m=values["std_m"] * wander(rows, values["time_constant_s"], draws))
-
-
-def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
-    """Cov(t, t') += std^2 exp(-|t - t'| / T) on the down axis."""
-    return Covariance(wander=Wander(np.diag(AXES), values["std_m"], values["time_constant_s"]))
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
@@ -56,5 +49,4 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=None,
     contribute=_contribute,
-    spread=_spread,
 )

@@ -8,7 +8,6 @@ from syncline_design.effects.kinematics import column
 from syncline_design.effects.record import (
     Basis,
     Contribution,
-    Covariance,
     Departures,
     Effect,
     Parameter,
@@ -28,11 +27,6 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     if sensor == "attitude":
         return Departures(attitude_noise=extra)
     return Departures(ranging_noise=extra)
-
-
-def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
-    """Standard deviations of the sensor times factor."""
-    return Covariance(factors=((sensor, values["factor"]),))
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
@@ -62,5 +56,4 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=None,
     contribute=_contribute,
-    spread=_spread,
 )

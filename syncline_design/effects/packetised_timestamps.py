@@ -9,7 +9,6 @@ from syncline_design.effects.record import (
     Array,
     Basis,
     Contribution,
-    Covariance,
     Departures,
     Effect,
     Parameter,
@@ -33,10 +32,10 @@ def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     return (-0.5 * shift_slope(rows, sensor))[:, :, None]
 
 
-def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
+def _spread(rows: StageRows, values: Values, sensor: Target) -> Array:
     """Cov += interval^2 / 12 V V' [m2]: a uniform age; mean over standard deviation is sqrt(3)."""
     size = values["interval_s"] / math.sqrt(12.0)
-    return Covariance(directions=(size * shift_slope(rows, sensor))[:, :, None])
+    return (size * shift_slope(rows, sensor))[:, :, None]
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:

@@ -184,36 +184,10 @@ class Contribution:
         return self.systematic_m + self.sight_rad * d + self.turn_rad * (d + basis.arm_m)
 
 
-@dataclass(frozen=True, slots=True)
-class Wander:
-    """Gauss-Markov noise of the error: e += loading x, x of std_m and time_constant_s.
-
-    loading (3,): NED axis, or (3, 3) with a column per independent process.
-    """
-
-    loading: Array
-    std_m: float
-    time_constant_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class Covariance:
-    """What a stochastic effect adds to the covariance of the error.
-
-    directions (n, 3, k): white noise with covariance directions directions' [m2] per row.
-    factors: (sensor, factor): that sensor's standard deviations are times factor.
-    wander: a Gauss-Markov process.
-    """
-
-    directions: Array | None = None
-    factors: tuple[tuple[Target, float], ...] = ()
-    wander: Wander | None = None
-
-
 Depart = Callable[[StageRows, Values, Target, Rng], Departures]
 Sensitivity = Callable[[StageRows, Values, Target], Array]
 Contribute = Callable[[Stage, Values, Target, Basis], Contribution]
-Spread = Callable[[StageRows, Values, Target], Covariance]
+Spread = Callable[[StageRows, Values, Target], Array]
 Applies = Callable[[Stage, Target], bool]
 Unbudgeted = Callable[[Values], str]
 
@@ -237,8 +211,8 @@ class Effect:
     depart: exact departures; stochastic effects draw from the generator they are given.
     sensitivity: (n, 3, p) slope of the (mean) error [m], NED, by each parameter that is neither
     located nor discrete, at zero of these; None where the mean does not move.
-    spread: covariance of a stochastic effect.
     contribute: what it adds to the Syncline of a stage.
+    spread: white noise along the motion, (n, 3, k): covariance spread spread' [m2] per row.
     applies: whether a stage can have it.
     tilted: acts by roll and pitch, which the simulator then draws over the horizon's tilt.
     transponder: as an effect of the position, acts on a later stage's transponder too, which has

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from syncline_design.effects.kinematics import shift_slope, shifted
 from syncline_design.effects.record import (
+    Array,
     Basis,
     Contribution,
-    Covariance,
     Departures,
     Effect,
     Parameter,
@@ -25,9 +25,9 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
     return shifted(sensor, values["std_s"] * rng.standard_normal(len(rows)))
 
 
-def _spread(rows: StageRows, values: Values, sensor: Target) -> Covariance:
+def _spread(rows: StageRows, values: Values, sensor: Target) -> Array:
     """Cov += std^2 V V' or W W' [m2]: rank one along the motion."""
-    return Covariance(directions=(values["std_s"] * shift_slope(rows, sensor))[:, :, None])
+    return (values["std_s"] * shift_slope(rows, sensor))[:, :, None]
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:

@@ -122,11 +122,6 @@ class Budget:
     ledger: tuple[LedgerTerm, ...]
     ledger_per_sensor: tuple[LedgerTerm, ...]
 
-    @property
-    def sensor_bound(self) -> bool:
-        """Whether sensor noise outweighs the sync error (tau below tau_crit)."""
-        return self.tau_s < self.tau_crit_s
-
     def total(self, model: SyncModelName) -> float:
         """Total error [m] under a sync model."""
         return self.total_m if model == "syncline" else self.total_per_sensor_m

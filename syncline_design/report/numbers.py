@@ -69,11 +69,6 @@ def angle(value: Any, digits: int = 4) -> str:
     return _shown(value, Dimension.ANGLE, digits)
 
 
-def angular_rate(value: Any, digits: int = 4) -> str:
-    """Radians per second, shown in degrees per second."""
-    return _shown(value, Dimension.ANGULAR_RATE, digits)
-
-
 def mass(value: Any, digits: int = 4) -> str:
     """Kilograms."""
     return _shown(value, Dimension.MASS, digits)

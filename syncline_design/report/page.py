@@ -15,7 +15,6 @@ if TYPE_CHECKING:
     from jinja2 import Environment
 
 _TEMPLATES: Final = "syncline_design.templates"
-MAX_BYTES: Final = 3_000_000
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 
 

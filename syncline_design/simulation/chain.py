@@ -127,12 +127,6 @@ class Noise:
     mu_ranging_s: Array
 
 
-def no_noise(rows: int) -> Noise:
-    """A draw without noise and without timestamp errors."""
-    vector, scalar = np.zeros((rows, 3)), np.zeros(rows)
-    return Noise(vector, vector, scalar, scalar, scalar, scalar, scalar, scalar)
-
-
 def stage_error(
     rows: StageRows,
     motion: Motion,

@@ -80,12 +80,6 @@ class Entry(Record):
     basis: Basis | None = None  # "assumption", or per figure: {cost: assumption}
     note: str = ""
 
-    def is_assumed(self, figure: str) -> bool:
-        """Whether a figure of this entry has no public source."""
-        if isinstance(self.basis, dict):
-            return figure in self.basis
-        return bool(self.basis == "assumption")
-
     @model_validator(mode="after")
     def _basis_names_figures(self) -> Entry:
         if isinstance(self.basis, dict):

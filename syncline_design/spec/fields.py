@@ -204,7 +204,6 @@ def _read_yes_no(value: Any) -> bool:
 YesNo = Annotated[
     bool, Reader(_read_yes_no, {"anyOf": [{"enum": ["yes", "no"]}, {"type": "boolean"}]})
 ]
-Length = Annotated[float, _figure(Dimension.LENGTH)]
 PositiveLength = Annotated[float, _figure(Dimension.LENGTH, 0.0, above=True)]
 NonNegativeLength = Annotated[float, _figure(Dimension.LENGTH, 0.0)]
 Time = Annotated[float, _figure(Dimension.TIME)]
@@ -213,7 +212,6 @@ NonNegativeTime = Annotated[float, _figure(Dimension.TIME, 0.0)]
 Speed = Annotated[float, _figure(Dimension.SPEED, 0.0)]
 AngularRate = Annotated[float, _figure(Dimension.ANGULAR_RATE, 0.0)]
 NonNegativeAngle = Annotated[float, _figure(Dimension.ANGLE, 0.0)]
-PositiveAngle = Annotated[float, _figure(Dimension.ANGLE, 0.0, above=True)]
 Mass = Annotated[Quantity, _figure(Dimension.MASS, 0.0)]
 Power = Annotated[Quantity, _figure(Dimension.POWER, 0.0)]
 Money = Annotated[Quantity, _figure(Dimension.MONEY, 0.0)]

@@ -92,15 +92,6 @@ def load_builtin() -> Catalog:
     return collection.catalog()
 
 
-def load_catalogs(builtin: bool = True) -> Collection:
-    """The shipped catalogs with the place and digest of every entry."""
-    collection = Collection()
-    if builtin:
-        add_builtin(collection)
-    _stop_at(collection.problems)
-    return collection
-
-
 def _stop_at(problems: list[Problem]) -> None:
     if problems:
         raise BadInput(tuple(problems))

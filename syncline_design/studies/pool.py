@@ -70,11 +70,6 @@ class Pool:
         self._false_starts = 0
         self.retried = 0
 
-    @property
-    def process_ids(self) -> list[int]:
-        """Process ids of the workers as they are now."""
-        return [worker.process.pid for worker in self._workers if worker.process.pid is not None]
-
     def run(self, indices: Iterable[int]) -> Iterator[Result]:
         """Records as they come in, in no particular order."""
         queue = deque(indices)

@@ -81,7 +81,6 @@ class Recheck:
 class _Chosen:
     """One role's entries: the sensor, its timestamp error, timeline and hardware."""
 
-    selection: RoleSelection
     sensor: Any
     error: Any
     method: Any  # None for an error given in place
@@ -195,9 +194,7 @@ def _chosen(
     tau = _bound(error, case.spec.coverage_factor)
     tau += Decimal(extra.get((name, picked.role), 0.0))
     host = stage.choice.vehicle or name
-    return _Chosen(
-        picked, sensor, error, method, "utc" if timeline == "utc" else f"host {host}", tau
-    )
+    return _Chosen(sensor, error, method, "utc" if timeline == "utc" else f"host {host}", tau)
 
 
 def _serves(by_method: Sequence[str], by_sensor: Sequence[str], primitive: str) -> bool:
