@@ -119,7 +119,7 @@ def test_nothing_departs_at_zero(effect: Effect, sensor: Target) -> None:
         return  # a convention has no zero; a factor's neutral value is 1, tails' is infinity
     state = rows()
     values = dict(values_of(effect, sensor))
-    if "time_constant_s" in values:
+    if effect.kind == "stochastic":
         values["time_constant_s"] = 1.0
     departed = effect.depart(state, values, sensor, np.random.default_rng(1))
     assert np.abs(error_of(state, departed)).max() < 1e-9
