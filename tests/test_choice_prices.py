@@ -29,6 +29,7 @@ from syncline_design.choice.variations import (
     with_figure,
     with_platform_figure,
 )
+from syncline_design.model.known import Known
 from syncline_design.model.quantity import Dimension
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load, load_text
@@ -120,10 +121,10 @@ def test_slack_of_errors_and_taus_by_the_recheck(tmp_path: Path) -> None:
         for share, passes in ((1.0 - 1e-6, True), (1.0 + 1e-6, False)):
             growth = row.fails_at * share - row.value
             if row.unit == "s":
-                found = recheck(loaded, selection, {("uav", role): growth})  # type: ignore[dict-item]
+                found = recheck(loaded, selection, Known({("uav", role): growth}))  # type: ignore[dict-item]
             else:
                 # An error of the same size from elsewhere: what a grown sensor error does to ACC.
-                found = recheck(loaded, selection, {}, [("grown", "uav", growth)])
+                found = recheck(loaded, selection, Known({}, (("grown", "uav", growth),)))
             assert found.passed is passes, (row, share)
 
 

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from syncline_design.model import syncline
 from syncline_design.model.budget import Budget, budget, differs, lever_arm_m
+from syncline_design.model.known import Known
 from syncline_design.model.pairing import largest
 from syncline_design.model.quantity import Dimension, parse_quantity
 from syncline_design.model.system import Platform, RoleName, Sensor, Stage, System
@@ -329,7 +330,7 @@ def test_three_stage_chain_agrees_with_the_obvious_implementation(system: System
 
 @given(chains())
 def test_ledgers_add_up_and_per_sensor_is_never_larger(system: System) -> None:
-    result = budget(system, systematic=[("bias", "stage0", 0.25)])
+    result = budget(system, Known({}, (("bias", "stage0", 0.25),)))
     for model in ("syncline", "per_sensor"):
         terms = result.ledger_of(model)  # type: ignore[arg-type]
         total = result.total(model)  # type: ignore[arg-type]
@@ -392,7 +393,7 @@ def test_faster_or_farther_is_never_better(system: System, key: str) -> None:
 @given(chains(), st.sampled_from(["position", "attitude", "ranging"]), st.floats(0.0, 0.1))
 def test_more_timestamp_error_is_never_better(system: System, role: RoleName, more: float) -> None:
     before = budget(system)
-    after = budget(system, {("stage0", role): more})
+    after = budget(system, Known({("stage0", role): more}))
     assert after.tau_s >= before.tau_s
     assert after.total_m >= before.total_m
     assert after.sync_ratio >= before.sync_ratio
@@ -586,10 +587,10 @@ def test_a_chain_that_makes_no_sense_is_refused(fault: str) -> None:
 def test_effects_on_unknown_stages_or_of_the_wrong_sign_are_refused() -> None:
     system = survey("small_sv")
     with pytest.raises(ValueError, match="do not exist"):
-        budget(system, {("vesel", "position"): 1e-3})
+        budget(system, Known({("vesel", "position"): 1e-3}))
     with pytest.raises(ValueError, match="do not exist"):
-        budget(system, systematic=[("bias", "ship", 1e-3)])
+        budget(system, Known({}, (("bias", "ship", 1e-3),)))
     with pytest.raises(ValueError, match="negative"):
-        budget(system, {("vessel", "position"): -1e-3})
+        budget(system, Known({("vessel", "position"): -1e-3}))
     with pytest.raises(ValueError, match="negative"):
-        budget(system, systematic=[("bias", "auv", -1e-3)])
+        budget(system, Known({}, (("bias", "auv", -1e-3),)))

@@ -21,6 +21,7 @@ from syncline_design.choice.problem import (
 from syncline_design.choice.table import Design, Option, Problem, with_limits
 from syncline_design.model import timing
 from syncline_design.model.budget import budget
+from syncline_design.model.known import Known
 from syncline_design.spec.case import Case
 from syncline_design.spec.exact import norm, square_root, tau_bound
 from syncline_design.spec.load import load, load_text
@@ -135,7 +136,9 @@ def test_money_is_converted_exactly() -> None:
 
 def test_known_effects_add_to_tau_and_to_the_total() -> None:
     plain = build_problem(loaded(USV))
-    extra = build_problem(loaded(USV), {("usv", "ranging"): 0.001}, [("boresight", "usv", 0.125)])
+    extra = build_problem(
+        loaded(USV), Known({("usv", "ranging"): 0.001}, (("boresight", "usv", 0.125),))
+    )
     one, other = by_role(plain)["ranging"][0], by_role(extra)["ranging"][0]
     assert other.tau() - one.tau() == Fraction(0.001)
     assert extra.fixed_error_m == 0.125

@@ -16,6 +16,7 @@ from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.front import front
 from syncline_design.choice.problem import build_problem, selection_of, sole_design
 from syncline_design.choice.ranked import iter_best
+from syncline_design.model.known import Known
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load, load_text
 from syncline_design.spec.selection import ClockSelection, Selection
@@ -204,7 +205,7 @@ def test_shared_hardware_and_effects_count() -> None:
     one = recheck(loaded, selected(loaded))
     role = ("vessel", "ranging")
     added = Fraction(0.25)
-    other = recheck(loaded, selected(loaded), {role: 1e-3}, [("boresight", "vessel", 0.25)])
+    other = recheck(loaded, selected(loaded), Known({role: 1e-3}, (("boresight", "vessel", 0.25),)))
     grown = other.sync_rate_mps * (other.tau_sys_s - one.tau_sys_s)
     assert abs(other.total_m - one.total_m - added - grown) < Fraction(1, 10**45)
     assert other.tau_sys_s > one.tau_sys_s

@@ -18,7 +18,7 @@ from scipy import stats
 from scipy.integrate import quad
 
 from syncline_design.effects import registry
-from syncline_design.effects.acting import contributions
+from syncline_design.effects.acting import known_of
 from syncline_design.effects.record import Array
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.known import EffectEntry
@@ -314,7 +314,7 @@ def test_a_late_ranging_sensor_is_late_for_the_stage_it_carries() -> None:
         settings = SimulationSettings(samples=500, envelope=envelope, trajectory=None)
         found = np.linalg.norm(sample_errors(chain, settings), axis=1)
         np.testing.assert_allclose(found, 0.4, rtol=1e-9)
-    assert contributions(chain)[0] == {("boat", "ranging"): 0.2}
+    assert known_of(chain).extra_tau_s == {("boat", "ranging"): 0.2}
 
 
 def test_along_a_file_time_counts_from_its_start(tmp_path: Path) -> None:

@@ -331,8 +331,11 @@ def test_settings_that_make_no_sense(changes: dict[str, object], says: str) -> N
     [
         (EffectEntry("gremlins", "position", "uav", ()), "effect: expected one of .*latency"),
         (EffectEntry("latency", "position", "usv", (("latency_s", 1.0),)), "stage: expected one"),
-        (EffectEntry("range_bias", "position", "uav", (("bias_m", 1.0),)), "acts on ranging"),
-        (EffectEntry("latency", "position", "uav", ()), "missing latency_s"),
+        (
+            EffectEntry("range_bias", "position", "uav", (("bias_m", 1.0),)),
+            "sensor: expected ranging, found position",
+        ),
+        (EffectEntry("latency", "position", "uav", ()), "parameters: missing parameter latency_s"),
         (
             EffectEntry("frame_convention", "attitude", "uav", (("convention", "upside_down"),)),
             "convention: expected one of .*, found upside_down",

@@ -54,7 +54,8 @@ def complaint(text: str) -> str:
 def test_shipped_specs_load(path: Path) -> None:
     spec = load(path)
     assert spec.spec.name
-    assert spec.place(("requirements", 0)).startswith(f"{path}:")
+    assert spec.position(("requirements", 0)) == spec.positions["requirements", 0]
+    assert spec.position(("requirements", 0, "nothing", 7)) == spec.positions["requirements", 0]
     assert len(spec.spec_sha256) == len(spec.catalogs_sha256) == 64
 
 

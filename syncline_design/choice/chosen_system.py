@@ -7,7 +7,6 @@ from dataclasses import replace
 
 from syncline_design.choice.table import Design, Option, Problem
 from syncline_design.model import timing
-from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import ROLES, UTC, Platform, RoleName, Sensor, Stage, System
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
@@ -22,10 +21,8 @@ from syncline_design.spec.catalog import (
 Vector = tuple[float, float, float]
 
 
-def system_of(
-    case: Case, problem: Problem, design: Design, effects: tuple[EffectEntry, ...] = ()
-) -> System:
-    """The system that a design of this problem is."""
+def system_of(case: Case, problem: Problem, design: Design) -> System:
+    """The system that a design of this problem is, with the known effects of its spec."""
     chosen = {
         (table.stage, table.role): table.options[place]
         for table, place in zip(problem.roles, design.options, strict=True)
@@ -40,7 +37,7 @@ def system_of(
         if clock is not None:
             offsets.append((host_timeline(vehicle.name), clock_error(clock)))
     factor = float(case.spec.coverage_factor)
-    return System(stages, factor, tuple(offsets), effects, case.spec.horizon.horizon())
+    return System(stages, factor, tuple(offsets), case.effects, case.spec.horizon.horizon())
 
 
 def host_timeline(vehicle: str) -> str:

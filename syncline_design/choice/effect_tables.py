@@ -18,10 +18,12 @@ from syncline_design.choice.table import Design, Problem, is_empty
 from syncline_design.effects import registry
 from syncline_design.effects.acting import known_of
 from syncline_design.model.budget import Budget, budget
-from syncline_design.model.known import EffectEntry
+from syncline_design.model.known import EffectEntry, Known
 from syncline_design.model.system import RoleName, Sensor, System
 from syncline_design.spec.case import Case
-from syncline_design.spec.known_effects import demand_budget, effect_entries
+from syncline_design.spec.load import BadInput
+from syncline_design.spec.yaml_text import KeyPath, show_path
+from syncline_design.spec.yaml_text import Problem as FileProblem
 
 Key = tuple[str, RoleName, str]  # stage, role, sensor
 Term = tuple[str, str, float]  # name, stage, value [m]
@@ -33,13 +35,12 @@ def problem_of(case: Case) -> Problem:
     A design's sums in these tables are those of its verification.
     """
     bare = build_problem(case)
-    effects = effect_entries(case)
-    if not effects:
+    if not case.effects:
         return bare
     demand_budget(case)
-    systems = _Systems(case, with_everything(bare), effects)
+    systems = _Systems(case, with_everything(bare))
     charges = _Charges()
-    for entry in effects:
+    for entry in case.effects:
         charges.add(systems, entry)
     taus = {key: known_of(systems.of(key)).extra_tau_s for key in systems}
     by_sensor = {
@@ -50,21 +51,41 @@ def problem_of(case: Case) -> Problem:
         )
         for key in systems
     }
-    return build_problem(case, systems.usual_tau_s(), charges.fixed, by_sensor)
+    known = Known(systems.usual_tau_s(), tuple(charges.fixed))
+    return build_problem(case, known, by_sensor)
+
+
+class NoBudget(BadInput):
+    """What no budget can hold, at its place in the spec; in a log it may have its place."""
+
+
+def demand_budget(case: Case) -> None:
+    """NoBudget where an effect has no place in a budget with its values."""
+    problems = []
+    for index, entry in enumerate(case.effects):
+        why = registry()[entry.effect].unbudgeted(dict(entry.parameters))  # type: ignore[arg-type]
+        if why:
+            path: KeyPath = ("effects", index, "parameters")
+            message, _, hint = why.partition("; ")
+            place = case.position(path)
+            problems.append(
+                FileProblem(str(case.path), *place, show_path(path), message, hint=hint)
+            )
+    if problems:
+        raise NoBudget(tuple(problems))
 
 
 def design_budget(case: Case, problem: Problem, design: Design) -> Budget:
     """The budget of one design with the spec's known effects, as its verification sees it."""
-    system = system_of(case, problem, design, effect_entries(case))
-    known = known_of(system)
-    return budget(system, known.extra_tau_s, known.systematic)
+    system = system_of(case, problem, design)
+    return budget(system, known_of(system))
 
 
 class _Systems:
     """Systems that differ from a first one in a single sensor."""
 
-    def __init__(self, case: Case, problem: Problem, effects: tuple[EffectEntry, ...]) -> None:
-        self.case, self.problem, self.effects = case, problem, effects
+    def __init__(self, case: Case, problem: Problem) -> None:
+        self.case, self.problem = case, problem
         filled = not is_empty(problem)
         self.first = Design((0,) * len(problem.roles), (0,) * len(problem.vehicles))
         self.places = dict(self._places()) if filled else {}
@@ -90,7 +111,7 @@ class _Systems:
                 role, place = self.places[key]
                 options[role] = place
             design = replace(self.first, options=tuple(options))
-            self.built[key] = system_of(self.case, self.problem, design, self.effects)
+            self.built[key] = system_of(self.case, self.problem, design)
         return self.built[key]
 
     def usual_tau_s(self) -> dict[tuple[str, RoleName], float]:

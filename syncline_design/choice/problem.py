@@ -39,6 +39,7 @@ from syncline_design.choice.table import (
     with_limits,
 )
 from syncline_design.machine.deadline import unhurried
+from syncline_design.model.known import NOTHING_KNOWN, Known
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import RoleName
 from syncline_design.spec.case import Candidate, Case, RoleCase, StageCase, usable_primitives
@@ -81,7 +82,6 @@ __all__ = [
 ]
 
 INLINE = "inline"
-NO_EXTRA: Mapping[tuple[str, RoleName], float] = {}
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,16 +99,12 @@ NO_SENSOR: BySensor = {}
 
 
 def build_problem(
-    case: Case,
-    extra_tau_s: Mapping[tuple[str, RoleName], float] = NO_EXTRA,
-    systematic: Sequence[tuple[str, str, float]] = (),
-    by_sensor: BySensor = NO_SENSOR,
+    case: Case, known: Known = NOTHING_KNOWN, by_sensor: BySensor = NO_SENSOR
 ) -> Problem:
     """Tables of everything a loaded spec leaves to choose.
 
-    extra_tau_s: what known effects add to the tau of (stage name, role) [s]; systematic: known
-    systematic errors as (term, stage name, value [m]), the same for every design; by_sensor: what
-    they add where it hangs on the sensor (its tau in place of extra_tau_s).
+    known: what effects add to every design; by_sensor: what they add where it hangs on the sensor
+    (its tau in place of that of `known`).
     """
     spec = case.spec
     motions = [_motion(stage) for stage in case.stages]
@@ -116,14 +112,14 @@ def build_problem(
     vehicles = list(dict.fromkeys(stage.vehicle_name for stage in spec.stages))
     tables = tuple(
         _role_table(
-            case, stage, role, motions[stage.index], limits.sync, vehicles, extra_tau_s, by_sensor
+            case, stage, role, motions[stage.index], limits.sync, vehicles, known, by_sensor
         )
         for stage in case.stages
         for role in stage.roles
     )
     vehicle_tables = tuple(_vehicle(case, name) for name in vehicles)
     rate = sum((motion.rate for motion in motions), Fraction(0))
-    fixed = sum((Fraction(value) for _, _, value in systematic), Fraction(0))
+    fixed = sum((Fraction(value) for _, _, value in known.systematic), Fraction(0))
     return Problem(
         roles=tables,
         pairs=_pairs(tables, motions),
@@ -224,11 +220,11 @@ def _role_table(
     motion: _Motion,
     sync_limit: float,
     vehicles: list[str],
-    extra_tau_s: Mapping[tuple[str, RoleName], float],
+    known: Known,
     by_sensor: BySensor,
 ) -> RoleTable:
     name = stage.choice.name
-    usual = SensorEffects(extra_tau_s.get((name, role.role), 0.0))
+    usual = SensorEffects(known.extra_tau_s.get((name, role.role), 0.0))
     effects = _EffectsOf(name, role.role, usual, by_sensor)
     options: list[Option] = []
     excluded: list[Excluded] = []

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from syncline_design.choice.effect_tables import NoBudget
 from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.records import Record, optional
@@ -15,7 +16,6 @@ from syncline_design.simulation.results import QuantileEstimate
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects_text
 from syncline_design.spec.effects_listed import EffectChoice
-from syncline_design.spec.known_effects import NoBudget
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.optimise import pinned_text
 from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite

@@ -14,7 +14,6 @@ from syncline_design.logs.log import Log
 from syncline_design.logs.reading import read_log
 from syncline_design.model.system import System
 from syncline_design.spec.case import Case
-from syncline_design.spec.known_effects import effect_entries
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import KeyPath, Problem
 
@@ -81,7 +80,7 @@ def pinned_system(case: Case) -> System:
             "optimize SPEC --write-design writes a pinned spec",
         )
     problem, design = found
-    return system_of(case, problem, design, effect_entries(case))
+    return system_of(case, problem, design)
 
 
 def known_effects(system: System) -> tuple[Acting, ...]:
@@ -119,10 +118,6 @@ def _demand_fit(case: Case, system: System, log: Log) -> None:
 def _refuse(
     case: Case, path: KeyPath, message: str, expected: str = "", hint: str = ""
 ) -> BadInput:
-    at = path
-    while at and at not in case.positions:
-        at = at[:-1]
-    line, column = case.positions.get(at, (1, 1))
     shown = ".".join(map(str, path))
-    problem = Problem(str(case.path), line, column, shown, message, expected, hint=hint)
+    problem = Problem(str(case.path), *case.position(path), shown, message, expected, hint=hint)
     return BadInput((problem,))

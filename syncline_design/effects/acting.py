@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import NoReturn
 
 import numpy as np
 
@@ -17,10 +18,10 @@ from syncline_design.effects.record import (
     StageRows,
     Values,
 )
-from syncline_design.model.known import EffectEntry
+from syncline_design.model.known import Known
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
-from syncline_design.model.system import RoleName, SimulationError, Stage, System
+from syncline_design.model.system import RoleName, SimulationError, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +41,9 @@ def by_stage(system: System) -> ByStage:
     if not system.effects:
         return {}
     known = registry()
-    stages = {stage.name: stage for stage in system.stages}
     found: dict[str, tuple[Acting, ...]] = {}
-    for number, entry in enumerate(system.effects):
-        _demand_entry(number, entry, known, stages)
-        values = dict(entry.parameters)
-        acting = Acting(known[entry.effect], entry.sensor, values)  # type: ignore[arg-type]
+    for entry in system.effects:
+        acting = Acting(known[entry.effect], entry.sensor, dict(entry.parameters))  # type: ignore[arg-type]
         found[entry.stage] = (*found.get(entry.stage, ()), acting)
     return found
 
@@ -55,39 +53,32 @@ def tilts(system: System) -> bool:
     return any(one.effect.tilted for acting in by_stage(system).values() for one in acting)
 
 
-def _demand_entry(
-    number: int, entry: EffectEntry, known: Mapping[str, Effect], stages: Mapping[str, Stage]
-) -> None:
-    path = f"effects[{number}]"
-    if entry.effect not in known:
-        raise SimulationError(
-            f"{path}.effect: expected one of {', '.join(known)}, found {entry.effect!r}"
-        )
-    if entry.stage not in stages:
-        raise SimulationError(
-            f"{path}.stage: expected one of {', '.join(sorted(stages))}, found {entry.stage!r}"
-        )
-    effect = known[entry.effect]
-    if entry.sensor not in effect.sensors:
-        expected = ", ".join(effect.sensors)
-        raise SimulationError(
-            f"{path}.sensor: {entry.effect} acts on {expected}, found {entry.sensor!r}"
-        )
-    nowhere = entry.sensor == "position" and stages[entry.stage].position is None
-    if nowhere and not effect.transponder:
-        raise SimulationError(f"{path}.sensor: stage {entry.stage} has no position sensor")
-    missing = {p.name for p in effect.parameters} - {name for name, _ in entry.parameters}
-    if missing:
-        raise SimulationError(f"{path}.parameters: missing {', '.join(sorted(missing))}")
-    values = dict(entry.parameters)
-    for parameter in effect.parameters:
-        value = values[parameter.name]
-        choices = parameter.choices.get(entry.sensor, ())
-        if choices and value not in choices:
-            raise SimulationError(
-                f"{path}.parameters.{parameter.name}: expected one of {', '.join(choices)}, "
-                f"found {value}"
-            )
+def demand_acting(system: System) -> None:
+    """Raise SimulationError unless every known effect of a system exists and fits where it acts.
+
+    Those of a spec were checked as it was read, by the same rules.
+    """
+    known = registry() if system.effects else {}
+    stages = {stage.name: stage for stage in system.stages}
+    for number, entry in enumerate(system.effects):
+        path = f"effects[{number}]"
+        if entry.effect not in known:
+            _refuse(f"{path}.effect", f"one of {', '.join(known)}", repr(entry.effect))
+        if entry.stage not in stages:
+            _refuse(f"{path}.stage", f"one of {', '.join(sorted(stages))}", repr(entry.stage))
+        effect = known[entry.effect]
+        for one in effect.misfits(entry.sensor, dict(entry.parameters)):
+            at = ".".join((path, *one.keys))
+            if not one.found:
+                raise SimulationError(f"{at}: {one.message}")
+            _refuse(at, one.expected, one.found)
+        nowhere = entry.sensor == "position" and stages[entry.stage].position is None
+        if nowhere and not effect.transponder:
+            raise SimulationError(f"{path}.sensor: stage {entry.stage} has no position sensor")
+
+
+def _refuse(path: str, expected: str, found: str) -> NoReturn:
+    raise SimulationError(f"{path}: expected {expected}, found {found}")
 
 
 def departures(
@@ -126,10 +117,8 @@ def stage_contributions(system: System, index: int) -> tuple[tuple[Acting, Contr
     )
 
 
-def contributions(
-    system: System,
-) -> tuple[dict[tuple[str, RoleName], float], tuple[tuple[str, str, float], ...]]:
-    """What the effects add to the budget: (tau [s] by stage and role, systematic terms [m])."""
+def known_of(system: System) -> Known:
+    """What a system's known effects add to its budget."""
     extra: dict[tuple[str, RoleName], float] = {}
     systematic: list[tuple[str, str, float]] = []
     for index, stage in enumerate(system.stages):
@@ -140,17 +129,4 @@ def contributions(
                 extra[key] = extra.get(key, 0.0) + added.tau_s
             if total := added.total_m(basis):
                 systematic.append((f"{one.effect.name} ({one.sensor})", stage.name, total))
-    return extra, tuple(systematic)
-
-
-@dataclass(frozen=True, slots=True)
-class Known:
-    """What effects add: tau [s] by (stage, role), and systematic terms (name, stage, value [m])."""
-
-    extra_tau_s: Mapping[tuple[str, RoleName], float] = field(default_factory=dict)
-    systematic: tuple[tuple[str, str, float], ...] = ()
-
-
-def known_of(system: System) -> Known:
-    """Contributions of a system's known effects."""
-    return Known(*contributions(system)) if system.effects else Known()
+    return Known(extra, tuple(systematic))

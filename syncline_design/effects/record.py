@@ -8,7 +8,7 @@ into errors; the linear sensitivity beside it is what the diagnosis screens with
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from typing import Literal
 
@@ -137,6 +137,19 @@ class Parameter:
         small = value <= self.above or (not self.signed and value < 0.0)
         return not (small or value > self.most or (self.whole and not value.is_integer()))
 
+    def choices_of(self, sensor: str) -> tuple[str, ...] | None:
+        """What a discrete parameter may be on a sensor; None where it does not act on it."""
+        return next((words for target, words in self.choices.items() if target == sensor), None)
+
+    def misfit(self, value: float | str, sensor: str) -> str | None:
+        """What is wrong with a value for this sensor."""
+        if isinstance(value, str) != bool(self.choices):
+            return "wrong kind of value"
+        if isinstance(value, str):
+            choices = self.choices_of(sensor)  # none: the sensor itself does not fit
+            return None if choices is None or value in choices else "not one of the choices"
+        return None if self.holds(float(value)) else "out of range"
+
     @property
     def domain(self) -> str:
         """The values that `holds` takes, in words."""
@@ -182,6 +195,21 @@ class Contribution:
         """Systematic term of the budget [m]: systematic + sight d + turn (d + |l_L - l_G|)."""
         d = basis.distance_m
         return self.systematic_m + self.sight_rad * d + self.turn_rad * (d + basis.arm_m)
+
+
+@dataclass(frozen=True, slots=True)
+class Misfit:
+    """What of an entry does not fit its effect: its keys, in words, what it says and could say."""
+
+    keys: tuple[str, ...]
+    message: str
+    found: str
+    known: tuple[str, ...]
+
+    @property
+    def expected(self) -> str:
+        """What it could say, in words."""
+        return f"one of {', '.join(self.known)}" if len(self.known) > 1 else self.known[0]
 
 
 Depart = Callable[[StageRows, Values, Target, Rng], Departures]
@@ -242,6 +270,22 @@ class Effect:
     accelerated: bool = False
     unbudgeted: Unbudgeted = always_budgeted
     by_heading: bool = False
+
+    def misfits(self, sensor: str, values: Mapping[str, float | str]) -> Iterator[Misfit]:
+        """Why the effect cannot act so on a sensor, with these parameters."""
+        if sensor not in self.sensors:
+            message = f"{self.name} does not act on this sensor"
+            yield Misfit(("sensor",), message, sensor, self.sensors)
+        names = tuple(parameter.name for parameter in self.parameters)
+        for name in values:
+            if name not in names:
+                yield Misfit(("parameters", name), "unknown parameter", name, names)
+        for one in self.parameters:
+            if one.name not in values:
+                yield Misfit(("parameters",), f"missing parameter {one.name}", "", names)
+            elif wrong := one.misfit(values[one.name], sensor):
+                wanted = one.choices_of(sensor) or (one.domain,)
+                yield Misfit(("parameters", one.name), wrong, str(values[one.name]), wanted)
 
     def slopes(self) -> tuple[Parameter, ...]:
         """The parameters that `sensitivity` has a column for."""

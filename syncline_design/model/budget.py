@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Literal
 
 from syncline_design.model import syncline
+from syncline_design.model.known import NOTHING_KNOWN, Known
 from syncline_design.model.pairing import (
-    ExtraTau,
     PairRow,
     distance_m,
     largest,
@@ -33,7 +32,6 @@ Systematic = Sequence[tuple[str, str, float]]  # (term, stage name, value [m])
 V_TAU = "v_max*tau"
 D_OMEGA_TAU = "d*omega_max*tau"
 LEVER_ARM_THRESHOLD = 1.10  # the lever arm is worth a warning when it changes a figure by > 10 %
-NO_EXTRA: ExtraTau = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,19 +133,17 @@ class Budget:
         return self.ledger if model == "syncline" else self.ledger_per_sensor
 
 
-def budget(system: System, extra_tau_s: ExtraTau = NO_EXTRA, systematic: Systematic = ()) -> Budget:
-    """The error budget of a system.
+def budget(system: System, known: Known = NOTHING_KNOWN) -> Budget:
+    """The error budget of a system with what known effects add.
 
-    extra_tau_s: what known effects add to the tau of (stage name, role) [s]; systematic: known
-    systematic errors as (term, stage name, value [m]), added to the total [eq:sensor_error_ub is
-    without them].  Raises ValueError for a chain that makes no sense.
+    Raises ValueError for a chain that makes no sense.
     """
-    _demand_chain(system, extra_tau_s, systematic)
-    pairs = pair_rows(system, extra_tau_s)
+    _demand_chain(system, known)
+    pairs = pair_rows(system, known)
     stages = tuple(_stage_row(stage, i == 0, pairs) for i, stage in enumerate(system.stages))
-    sensors = _sensor_rows(system, extra_tau_s)
+    sensors = _sensor_rows(system, known)
     sensor_error = math.fsum(row.sensor_error_m for row in sensors)
-    systematic_m = math.fsum(value for _, _, value in systematic)
+    systematic_m = math.fsum(value for _, _, value in known.systematic)
     rate = math.fsum(row.sync_rate_mps for row in stages)
     tau = largest(pair.tau_s for pair in pairs)
     tau_crit = syncline.tau_crit_s(sensor_error, rate)
@@ -155,8 +151,8 @@ def budget(system: System, extra_tau_s: ExtraTau = NO_EXTRA, systematic: Systema
     per_sensor = math.fsum(pair.sync_error_m for pair in pairs)
     error_m = sensor_error + systematic_m
     ledgers = (
-        _ledger(system, systematic, _sync_terms(pairs, tau)),
-        _ledger(system, systematic, _sync_terms(pairs, None)),
+        _ledger(system, known.systematic, _sync_terms(pairs, tau)),
+        _ledger(system, known.systematic, _sync_terms(pairs, None)),
     )
     ratio = _ratio(tau, tau_crit)
     return Budget(
@@ -198,7 +194,7 @@ def differs(paper: float, lever_arm: float) -> bool:
     return large > LEVER_ARM_THRESHOLD * small
 
 
-def _demand_chain(system: System, extra_tau_s: ExtraTau, systematic: Systematic) -> None:
+def _demand_chain(system: System, known: Known) -> None:
     names = [stage.name for stage in system.stages]
     if not names or len(set(names)) != len(names):
         raise ValueError(f"a system needs stages with different names, found {names}")
@@ -206,10 +202,13 @@ def _demand_chain(system: System, extra_tau_s: ExtraTau, systematic: Systematic)
         raise ValueError("in a chain every stage needs a ranging sensor")
     if any(stage.position is not None for stage in system.stages[1:]):
         raise ValueError("only the first stage of a chain has a position sensor")
-    unknown = {stage for stage, _ in extra_tau_s} | {stage for _, stage, _ in systematic}
+    unknown = {stage for stage, _ in known.extra_tau_s} | {
+        stage for _, stage, _ in known.systematic
+    }
     if unknown - set(names):
         raise ValueError(f"effects name stages that do not exist: {sorted(unknown - set(names))}")
-    if any(v < 0.0 for v in extra_tau_s.values()) or any(v < 0.0 for _, _, v in systematic):
+    added = (*known.extra_tau_s.values(), *(value for *_, value in known.systematic))
+    if any(value < 0.0 for value in added):
         raise ValueError("what an effect adds must not be negative")
 
 
@@ -225,20 +224,20 @@ def _enters(stage: Stage, sensor: Sensor) -> bool:
     return stage.ranging is not None or sensor.role == "position"
 
 
-def _sensor_rows(system: System, extra_tau_s: ExtraTau) -> tuple[SensorRow, ...]:
+def _sensor_rows(system: System, known: Known) -> tuple[SensorRow, ...]:
     return tuple(
-        _sensor_row(stage, sensor, i == 0, _own_tau_s(system, stage, sensor, extra_tau_s))
+        _sensor_row(stage, sensor, i == 0, _own_tau_s(system, stage, sensor, known))
         for i, stage in enumerate(system.stages)
         for sensor in stage.sensors()
     )
 
 
-def _own_tau_s(system: System, stage: Stage, sensor: Sensor, extra_tau_s: ExtraTau) -> float:
+def _own_tau_s(system: System, stage: Stage, sensor: Sensor, known: Known) -> float:
     """tau [s] of a sensor for its own tau_crit: against its timeline, where others share it.
 
     A stage without a ranging sensor is held against true time, so there the clock counts too.
     """
-    own = tau_s(system, stage, sensor, extra_tau_s)
+    own = tau_s(system, stage, sensor, known)
     return own if stage.ranging is not None else own + offset_s(system, sensor.timeline, UTC)
 
 

@@ -7,13 +7,12 @@ sensor measured, so what counts is each one's timestamp error relative to the ra
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from syncline_design.model import timing
+from syncline_design.model.known import Known
 from syncline_design.model.system import UTC, RoleName, Sensor, Stage, System
-
-ExtraTau = Mapping[tuple[str, RoleName], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,10 +50,10 @@ def distance_m(stage: Stage) -> float:
     return 0.0 if stage.ranging is None else float(stage.platform.distance_m)
 
 
-def tau_s(system: System, stage: Stage, sensor: Sensor, extra_tau_s: ExtraTau) -> float:
+def tau_s(system: System, stage: Stage, sensor: Sensor, known: Known) -> float:
     """Bound tau_i [s] of a sensor's timestamp error against its timeline, plus what is added."""
     own = timing.bound(sensor.timing, system.coverage_factor)
-    return own + extra_tau_s.get((stage.name, sensor.role), 0.0)
+    return own + known.extra_tau_s.get((stage.name, sensor.role), 0.0)
 
 
 def offset_s(system: System, first: str, second: str) -> float:
@@ -72,7 +71,7 @@ def offset_s(system: System, first: str, second: str) -> float:
     return math.fsum(bounds)
 
 
-def pair_rows(system: System, extra_tau_s: ExtraTau) -> tuple[PairRow, ...]:
+def pair_rows(system: System, known: Known) -> tuple[PairRow, ...]:
     """All pairs of the system, stage by stage: position, then attitude.
 
     In the first stage position and attitude against the ranging sensor; from the second stage on
@@ -84,7 +83,7 @@ def pair_rows(system: System, extra_tau_s: ExtraTau) -> tuple[PairRow, ...]:
     before: Stage | None = None
     for stage in system.stages:
         for role, owner, sensor, rate in _entering(stage, before):
-            rows.append(_pair_row(system, extra_tau_s, stage, role, (owner, sensor), rate))
+            rows.append(_pair_row(system, known, stage, role, (owner, sensor), rate))
         before = stage
     return tuple(rows)
 
@@ -108,7 +107,7 @@ def _entering(stage: Stage, before: Stage | None) -> list[tuple[RoleName, Stage,
 
 def _pair_row(
     system: System,
-    extra_tau_s: ExtraTau,
+    known: Known,
     stage: Stage,
     role: RoleName,
     measured_by: tuple[Stage, Sensor],
@@ -116,11 +115,11 @@ def _pair_row(
 ) -> PairRow:
     owner, sensor = measured_by
     reference = stage.ranging
-    relative = tau_s(system, owner, sensor, extra_tau_s)
+    relative = tau_s(system, owner, sensor, known)
     against, name = UTC, ""
     if reference is not None:
         against, name = reference.timeline, reference.id
-        relative += tau_s(system, stage, reference, extra_tau_s)
+        relative += tau_s(system, stage, reference, known)
     offset = offset_s(system, sensor.timeline, against)
     relative += offset
     return PairRow(

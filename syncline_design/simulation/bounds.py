@@ -9,16 +9,15 @@ what the budget charges for them.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from syncline_design.effects import acting as acting_effects
 from syncline_design.model.budget import budget
+from syncline_design.model.known import Known
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.system import RoleName, Stage, System
-
-ExtraTau = Mapping[tuple[str, RoleName], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,15 +125,15 @@ def pairwise_bounds(
     system: System, shifts_s: Sequence[tuple[float, float]]
 ) -> tuple[StageBound, ...]:
     """Each stage's bound at its largest shifts (of position, of attitude) plus what effects add."""
-    extra, _ = acting_effects.contributions(system)
+    known = acting_effects.known_of(system)
     tilt = system.horizon.tilt_rad
     return tuple(
-        stage_bound(stage, index == 0, shifts, tilt, _added(system, index, extra))
+        stage_bound(stage, index == 0, shifts, tilt, _added(system, index, known))
         for index, (stage, shifts) in enumerate(zip(system.stages, shifts_s, strict=True))
     )
 
 
-def _added(system: System, index: int, extra: ExtraTau) -> Added:
+def _added(system: System, index: int, known: Known) -> Added:
     """The effects of one stage, summed; scattered Euler angles apart from fixed turns.
 
     What moves the measured object at d moves it by a share sigma_r / d more with range noise.
@@ -150,12 +149,12 @@ def _added(system: System, index: int, extra: ExtraTau) -> Added:
             turn += what.turn_rad
         sight += what.sight_rad
         offset += what.systematic_m * (1.0 + stretched if one.sensor == "ranging" else 1.0)
-    position = pair_extra_s(system, index, "position", extra)
-    attitude = pair_extra_s(system, index, "attitude", extra)
+    position = pair_extra_s(system, index, "position", known)
+    attitude = pair_extra_s(system, index, "attitude", known)
     return Added(position, attitude, turn, euler, sight, offset)
 
 
-def pair_extra_s(system: System, index: int, role: RoleName, extra: ExtraTau) -> float:
+def pair_extra_s(system: System, index: int, role: RoleName, known: Known) -> float:
     """What known effects add [s] to a stage's position or attitude pair.
 
     Its own sensor's (from the second stage on, the position is the ranging of the stage before)
@@ -165,6 +164,7 @@ def pair_extra_s(system: System, index: int, role: RoleName, extra: ExtraTau) ->
     own: tuple[str, RoleName] = (stage.name, role)
     if role == "position" and index > 0:
         own = (system.stages[index - 1].name, "ranging")
+    extra = known.extra_tau_s
     reference = 0.0 if stage.ranging is None else extra.get((stage.name, "ranging"), 0.0)
     return extra.get(own, 0.0) + reference
 
@@ -175,14 +175,14 @@ def references(system: System, tau_s: float) -> tuple[float, float, float]:
     Known effects widen the pairs' shifts and add their systematic terms to all three; the
     Syncline is the paper's [eq:syncline], (sum of v + d w) tau + sensor errors.
     """
-    extra, systematic = acting_effects.contributions(system)
+    known = acting_effects.known_of(system)
     bounds = chain_bounds(system, tau_s)
     widest = max(
-        pair_extra_s(system, index, role, extra)
+        pair_extra_s(system, index, role, known)
         for index in range(len(system.stages))
         for role in ("position", "attitude")
     )
-    figures = budget(system, extra, systematic)
+    figures = budget(system, known)
     syncline = (
         figures.sensor_error_m + figures.systematic_m + figures.sync_rate_mps * (tau_s + widest)
     )

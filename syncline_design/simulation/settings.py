@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
+from syncline_design.effects.acting import demand_acting
 from syncline_design.machine.input_files import FileContent
 from syncline_design.model.system import Sensor, SimulationError, Stage, System
 from syncline_design.model.timing import Constant, Distribution, Empirical, Normal, Uniform
@@ -86,6 +87,7 @@ def demand_simulable(system: System) -> None:
         _demand_distribution(path, error.distribution)
         drifted = error.drifted_s
         _demand(0.0 <= drifted < math.inf, path, "a drift of 0 s or more", drifted)
+    demand_acting(system)
 
 
 def _demand_motion(stage: Stage) -> None:

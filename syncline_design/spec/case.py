@@ -14,7 +14,9 @@ from pathlib import Path
 from typing import Generic, TypeVar
 
 from syncline_design.machine.input_files import FileContent, FileRead
+from syncline_design.model.known import NOTHING_KNOWN as NOTHING_KNOWN
 from syncline_design.model.known import EffectEntry
+from syncline_design.model.known import Known as Known
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.catalog import (
     Catalog,
@@ -120,13 +122,10 @@ class Case:
         object.__setattr__(self, "hardware", _hardware(self, stages))
         object.__setattr__(self, "effects", _effects(self.spec))
 
-    def place(self, path: KeyPath) -> str:
-        """`file:line:column` of a key path, or of the nearest thing around it."""
-        for length in range(len(path), -1, -1):
-            if path[:length] in self.positions:
-                line, column = self.positions[path[:length]]
-                return f"{self.path}:{line}:{column}"
-        return str(self.path)
+    def position(self, path: KeyPath) -> Position:
+        """Line and column of a key path, or of the nearest thing around it."""
+        around = (path[:length] for length in range(len(path), -1, -1))
+        return next((self.positions[one] for one in around if one in self.positions), (1, 1))
 
     def limit(self, requirement: Requirement) -> Fraction:
         """A requirement's limit exactly, in SI or in the spec's currency."""

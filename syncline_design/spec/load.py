@@ -25,6 +25,7 @@ from syncline_design.spec.files import (
     inside_folder,
     problem_at,
 )
+from syncline_design.spec.known_effects import effect_problems
 from syncline_design.spec.references import currency_problems, misfits, missing_figures, unknown_ids
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate
@@ -126,6 +127,7 @@ def _complete(
     )  # fmt: skip
     _stop_at(misfits(document, case) + currency_problems(document, case))
     _stop_at(missing_figures(document, case))
+    _stop_at(list(effect_problems(document, spec)))
     return case
 
 

@@ -32,7 +32,6 @@ from syncline_design.model.timing import (
 from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.simulation.run import DEFAULT_CAP
 from syncline_design.spec.case import Case
-from syncline_design.spec.known_effects import effect_entries
 from syncline_design.spec.load import BadInput, Problem
 from syncline_design.spec.spec import Requirement
 
@@ -154,7 +153,7 @@ class _SpecJudge:
         """Whether a known effect changes the noise of a sensor."""
         from syncline_design.effects import registry
 
-        kinds = [registry()[one.effect].kind for one in effect_entries(self.case)]
+        kinds = [registry()[one.effect].kind for one in self.case.effects]
         return "stochastic" in kinds
 
     def judge(self, problem: DesignProblem, design: Design) -> Judgement:
@@ -170,7 +169,7 @@ class _SpecJudge:
 
     def _system(self, problem: DesignProblem, design: Design) -> System:
         """The design's system; an option whose error or tau was grown has its sensor's grown."""
-        system = system_of(self.case, problem, design, effect_entries(self.case))
+        system = system_of(self.case, problem, design)
         for table, place in zip(problem.roles, design.options, strict=True):
             option = table.options[place]
             error, tau = self.figures[table.stage_name, table.role, option.names]

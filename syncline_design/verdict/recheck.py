@@ -19,7 +19,7 @@ from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from typing import Any, Literal
 
-from syncline_design.spec.case import Case, RoleCase, StageCase
+from syncline_design.spec.case import NOTHING_KNOWN, Case, Known, RoleCase, StageCase
 from syncline_design.spec.selection import Role, RoleSelection, Selection
 from syncline_design.verdict.recheck_facts import impossible
 
@@ -28,7 +28,6 @@ IMPLIED_SYNC = "SYNC"
 IMPLIED_FACTS = "FACTS"  # fails where a chosen entry cannot work where it stands
 Kind = Literal["accuracy", "sync", "cost", "mass", "power", "feasible"]
 BUDGETS: tuple[Literal["cost", "mass", "power"], ...] = ("cost", "mass", "power")
-NO_EXTRA: Mapping[tuple[str, Role], float] = {}
 
 
 class NotADesign(ValueError):  # noqa: N818 - names a state of the input
@@ -91,25 +90,18 @@ class _Chosen:
 def recheck(
     case: Case,
     selection: Selection,
-    extra_tau_s: Mapping[tuple[str, Role], float] = NO_EXTRA,
-    systematic: Sequence[tuple[str, str, float]] = (),
+    known: Known = NOTHING_KNOWN,
 ) -> Recheck:
-    """Recompute every requirement of a selection.
+    """Recompute every requirement of a selection, with what known effects add.
 
-    extra_tau_s: what known effects add to tau of (stage, role) [s]; systematic: known systematic
-    errors (term, stage, value [m]).  Raises NotADesign where the spec does not allow a choice.
+    Raises NotADesign where the spec does not allow a choice.
     """
     with localcontext(Context(prec=DIGITS)):
-        return _recheck(case, selection, extra_tau_s, systematic)
+        return _recheck(case, selection, known)
 
 
-def _recheck(
-    case: Case,
-    selection: Selection,
-    extra: Mapping[tuple[str, Role], float],
-    systematic: Sequence[tuple[str, str, float]],
-) -> Recheck:
-    chosen = _all_chosen(case, selection, extra)
+def _recheck(case: Case, selection: Selection, known: Known) -> Recheck:
+    chosen = _all_chosen(case, selection, known)
     moves = {stage.choice.name: _moves(stage, chosen) for stage in case.stages}
     rate = sum((v + turning for v, turning, _ in moves.values()), Decimal(0))
     meets = list(_meetings(case, selection, chosen, moves))
@@ -119,7 +111,7 @@ def _recheck(
     sync_error = rate * tau_sys
     if case.spec.sync_model == "per_sensor":
         sync_error = sum((bound * speed for bound, speed in meets), Decimal(0))
-    total = sensor_error + sync_error + sum((Decimal(v) for *_, v in systematic), Decimal(0))
+    total = sensor_error + sync_error + sum((Decimal(v) for *_, v in known.systematic), Decimal(0))
     ratios = [_ratio(rate * tau_sys, sensor_error)]
     for (stage, role), one in chosen.items():
         ratios.append(_ratio(one.tau * _own_rate(role, moves[stage]), errors[stage, role]))
@@ -155,9 +147,7 @@ def _length(figures: Any, axes: int) -> Decimal:
     return sum((_decimal(f) ** 2 for f in figures), Decimal(0)).sqrt()
 
 
-def _all_chosen(
-    case: Case, selection: Selection, extra: Mapping[tuple[str, Role], float]
-) -> dict[tuple[str, Role], _Chosen]:
+def _all_chosen(case: Case, selection: Selection, known: Known) -> dict[tuple[str, Role], _Chosen]:
     """Entries of every role that the spec fills, in its order."""
     out: dict[tuple[str, Role], _Chosen] = {}
     for stage in case.stages:
@@ -166,7 +156,7 @@ def _all_chosen(
             picked = selection.role(name, role.role)
             if picked is None:
                 raise NotADesign(f"nothing is chosen for {role.role} of {name}")
-            out[name, role.role] = _chosen(case, stage, role, picked, extra)
+            out[name, role.role] = _chosen(case, stage, role, picked, known)
     return out
 
 
@@ -175,7 +165,7 @@ def _chosen(
     stage: StageCase,
     role: RoleCase,
     picked: RoleSelection,
-    extra: Mapping[tuple[str, Role], float],
+    known: Known,
 ) -> _Chosen:
     name, pinned = stage.choice.name, role.choice.primitive
     sensor = role.sensor(picked.sensor)
@@ -192,7 +182,7 @@ def _chosen(
             raise NotADesign(f"{picked.method} cannot stamp {picked.sensor} by {picked.primitive}")
         error, timeline = method.error, method.timeline
     tau = _bound(error, case.spec.coverage_factor)
-    tau += Decimal(extra.get((name, picked.role), 0.0))
+    tau += Decimal(known.extra_tau_s.get((name, picked.role), 0.0))
     host = stage.choice.vehicle or name
     return _Chosen(sensor, error, method, "utc" if timeline == "utc" else f"host {host}", tau)
 

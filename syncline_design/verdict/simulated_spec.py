@@ -10,7 +10,6 @@ from syncline_design.model.system import System
 from syncline_design.simulation import Simulation, SimulationError, simulate
 from syncline_design.simulation.results import SpecContent, SpecName
 from syncline_design.spec.case import Case
-from syncline_design.spec.known_effects import effect_entries
 from syncline_design.verdict.acceptance import refuse_trajectory, simulation_settings
 from syncline_design.verdict.verify import picked_design
 
@@ -28,7 +27,7 @@ def simulate_spec(
 ) -> SimulatedSpec:
     """Simulate a spec as its `monte_carlo` part says; samples and workers override."""
     in_force().doing("choosing")
-    system = system_of(case, *picked_design(case, seed), effect_entries(case))
+    system = system_of(case, *picked_design(case, seed))
     settings = replace(simulation_settings(case, seed), workers=workers)
     if samples is not None:
         settings = replace(settings, samples=samples)

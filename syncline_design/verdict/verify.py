@@ -21,7 +21,6 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
 from syncline_design.simulation import CrossCheck, Decision, SimulationError, cross_check, decide
 from syncline_design.spec.case import Case
-from syncline_design.spec.known_effects import effect_entries
 from syncline_design.spec.load import BadInput, Problem, load
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.spec import Requirement
@@ -294,10 +293,10 @@ def _passed_over(picked: Picked) -> Iterator[Caution]:
 
 def verify(case: Case, problem: DesignProblem, design: Design, settings: CheckSettings) -> Verified:
     """Budget, exact recheck, Monte Carlo and every requirement of one design."""
-    system = system_of(case, problem, design, effect_entries(case))
+    system = system_of(case, problem, design)
     known = known_of(system)
-    figures = budget(system, known.extra_tau_s, known.systematic)
-    exact = recheck(case, selection_of(problem, design), known.extra_tau_s, known.systematic)
+    figures = budget(system, known)
+    exact = recheck(case, selection_of(problem, design), known)
     found, trouble = _monte_carlo(case, system, settings)
     results = tuple(_results(case, system, exact, found, settings))
     simulated = None if found is None else found.monte_carlo
