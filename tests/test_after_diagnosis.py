@@ -16,9 +16,11 @@ import pytest
 
 from diagnosis_samples import diagnosis
 from syncline_design.comparison.meaning import DesignMeaning, format_duration, meaning
-from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
-from syncline_design.report.diagnosis_summary import meaning_text
-from syncline_design.report.pages import render_diagnosis
+from syncline_design.report import numbers
+from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.render_console import console
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
 from syncline_design.spec.load import load_text
 from syncline_design.spec.spec import EffectChoice
 
@@ -116,7 +118,7 @@ def test_a_drift_is_charged_for_the_stated_horizon(
     assert change["per_sensor_m"] == pytest.approx(V * 59e-6 * seconds, rel=1e-6)
     assert change["syncline_m"] == pytest.approx((V + D * W) * 59e-6 * seconds, rel=1e-6)
     assert words in found.horizon.text
-    assert words in meaning_text(found)
+    assert words in console(on_diagnosis(diagnosis(design=found)))
     assert found.horizon.duration_s == seconds
 
 
@@ -150,12 +152,13 @@ def test_a_finding_in_a_spec_reads_as_it_was_found(
 def test_page_and_markdown_show_all_three_beside_each_other() -> None:
     found = of("latency", {"latency_s": 0.045})
     data = diagnosis(design=found)
-    for text in (render_diagnosis(data), render_diagnosis_markdown(data)):
+    document = on_diagnosis(data)
+    for text in (html(document), markdown(document), console(document)):
         rows = re.sub(r"<[^>]+>|\\", " ", text).replace("\u00a0", " ")
         for one in found.figures:
             assert one.label.split(",")[0] in rows
-            for words in one.words():
-                assert words in rows
+            for value in (one.before_m, one.after_m):
+                assert numbers.length(value).replace("\u00a0", " ") in rows
         assert "Horizon: 1 h" in rows
 
 
@@ -202,4 +205,4 @@ def test_tails_that_no_budget_can_hold_are_said_and_not_charged() -> None:
     assert [one.after_m for one in found.figures] == [None, None, None]
     assert found.before.verdict == "meets"
     json.dumps(found.to_json(), allow_nan=False)
-    assert "Horizon: 1 h" in meaning_text(found)
+    assert "Horizon: 1 h" in console(on_diagnosis(diagnosis(design=found)))

@@ -6,6 +6,7 @@ Truth and Cramer-Rao bounds are the hidden world's own.
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from typing import Any
 import pytest
 from scipy.stats import chi2
 
-from diagnosis_samples import LATENCY
+from diagnosis_samples import LATENCY, diagnosis
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.diagnosis.candidates import candidates, directed_parts, signatures
 from syncline_design.diagnosis.expected_noise import structure_of
@@ -23,8 +24,10 @@ from syncline_design.diagnosis.result import Rival
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.diagnosis.trials import with_effect
-from syncline_design.report.diagnosis_summary import lookalike_lines
-from syncline_design.report.on_diagnosis import finding_words
+from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.render_console import console
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
 from syncline_design.spec.load import load
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario
 
@@ -169,14 +172,11 @@ def test_words_follow_the_sign_of_the_comparison() -> None:
     better = Rival("packetised_timestamps", "attitude", "rig", 0.97, -157.4, possible=False)
     as_well = Rival("latency", "attitude", "rig", 0.6, -0.8)
     worse = Rival("filter_lag", "position", "rig", 0.999, 31.6)
-    lines = lookalike_lines((better, as_well, worse))
-    assert lines == [
-        "   looks alike, fits worse: filter_lag (position) by 31.6 nat",
-        "   fits better, but only with impossible values: packetised_timestamps (attitude)"
-        " by 157 nat",
-        "   fits as well in its place: latency (attitude)",
-    ]
-    said = finding_words(replace(LATENCY, lookalikes=(better, as_well, worse))).lookalikes
-    assert "-157" not in said
-    assert "31.6 nat worse" in said
-    assert "157 nat better, but only with impossible values" in said
+    found = diagnosis(findings=(replace(LATENCY, lookalikes=(better, as_well, worse)),))
+    for render in (html, console, markdown):
+        told = re.sub(r"<[^>]+>|\\", "", render(on_diagnosis(found)))
+        said = " ".join(told.replace("\u00a0", " ").split())
+        assert "-157" not in said
+        assert "filter lag (position), 31.6 nat worse" in said
+        assert "157 nat better, but only with impossible values" in said
+        assert "latency (attitude), as well in its place" in said

@@ -25,9 +25,9 @@ from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
 from syncline_design.model.estimates import figure
-from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
-from syncline_design.report.diagnosis_summary import lookalike_lines, summary_text
-from syncline_design.report.on_diagnosis import finding_words
+from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.render_console import console
+from syncline_design.report.render_markdown import markdown
 from syncline_design.spec.load import load
 
 Array = NDArray[np.float64]
@@ -185,7 +185,8 @@ def test_at_best_is_what_the_effects_reach(tmp_path: Path) -> None:
     (others,) = found.findings
     assert {a.refitted for a in others.excluded} == {False}
     assert all(a.refitted for a in others.aliases + others.lookalikes)
-    assert "with the noise kept" in finding_words(others).excluded
+    told = " ".join(console(on_diagnosis(with_design(found, None))).split())
+    assert "with the noise kept" in told
     held_out = found.to_json()["gap"]["held_out"]
     assert held_out["fitted"]["rms_m"] == pytest.approx(rms_m(raw_error(columns, best_s)), rel=2e-3)
     assert held_out["after"]["rms_m"] >= 0.999 * held_out["fitted"]["rms_m"]
@@ -203,7 +204,9 @@ def test_more_noise_has_no_better_best(tmp_path: Path) -> None:
     held_out = found.to_json()["gap"]["held_out"]
     for part in ("before", "after", "fitted"):
         assert held_out[part]["rms_m"] == pytest.approx(rms_m(raw_error(columns)), rel=1e-3)
-    assert f"{figure(rms_m(raw_error(columns)), None, 'm')} at best" in summary_text(found)
+    best = figure(rms_m(raw_error(columns)), None, "m")
+    told = " ".join(console(on_diagnosis(with_design(found, None))).split())
+    assert f"RMS at best {best}" in told
 
 
 def test_what_contradicts_itself_need_not_leave_anything(tmp_path: Path) -> None:
@@ -217,8 +220,9 @@ def test_what_contradicts_itself_need_not_leave_anything(tmp_path: Path) -> None
     assert not data["sound"]
     assert not data["findings"]
     assert data["remaining"]["beyond_noise"] is False
-    text, page = summary_text(found), render_diagnosis_markdown(with_design(found, None))
-    assert "Where it remains" not in text
+    document = on_diagnosis(with_design(found, None))
+    text, page = console(document), markdown(document)
+    assert "still there" not in text
     assert "still there" not in page
     assert "contradict" in text
     assert "contradict" in page
@@ -228,12 +232,11 @@ def test_other_signatures_do_not_look_alike() -> None:
     """The console's words for two that fit worse: one along the named signature, one across it."""
     along = Rival("filter_lag", "position", "boat", 0.999, 31.6)
     across = Rival("flexure", "ranging", "boat", 0.0019, 7.2)
-    assert lookalike_lines((along, across)) == [
-        "   looks alike, fits worse: filter_lag (position) by 31.6 nat",
-        "   of another signature, fits worse in its place: flexure (ranging) by 7.2 nat",
-    ]
-    found = diagnosis(findings=(replace(LATENCY, lookalikes=(along,), excluded=()),))
-    assert "filter lag" in render_diagnosis_markdown(found)
+    found = diagnosis(findings=(replace(LATENCY, lookalikes=(along, across), excluded=()),))
+    for render in (console, markdown):
+        said = " ".join(re.sub(r"\\", "", render(on_diagnosis(found))).split())
+        assert "filter lag (position), 31.6 nat worse" in said
+        assert "flexure (ranging), of another signature, 7.2 nat worse" in said
 
 
 @pytest.mark.parametrize("offset_degps", [-2.0, 3.0])

@@ -15,7 +15,8 @@ from syncline_design.comparison.meaning import DiagnosisAndDesign, meaning, with
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.machine.records import read_as
 from syncline_design.report.diagnoses import render_diagnose
-from syncline_design.report.diagnosis_summary import summary_text
+from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.render_console import console
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
 from tests.world import WorldLog, hidden, make_log, scenario
@@ -91,9 +92,14 @@ def test_every_output_says_it(make: object) -> None:
     page = Page(render_diagnose("html", found))
     assert page.unbalanced == []
     texts = {"page": page.text, "markdown": render_diagnose("markdown", found),
-             "console": summary_text(found)}  # fmt: skip
+             "console": console(on_diagnosis(found))}  # fmt: skip
     for kind, text in texts.items():
-        said = text.replace("\u00a0", " ").replace("\u2212", "-").replace("\\", "")
+        said = (
+            text.replace("\u00a0", " ")
+            .replace("\u2212", "-")
+            .replace("\u00b5", "u")
+            .replace("\\", "")
+        )
         for finding in found.findings:
             for estimate in finding.parameters.values():
                 assert estimate.text in said, (kind, estimate)

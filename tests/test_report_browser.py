@@ -12,12 +12,10 @@ import pytest
 
 import report_samples as samples
 from diagnosis_samples import diagnosis
+from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_paper import on_paper
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
-from syncline_design.report.pages import (
-    render_diagnosis,
-)
 from syncline_design.report.render_html import html
 
 pytestmark = pytest.mark.browser
@@ -268,7 +266,7 @@ WIDE, NARROW = ("light", 1280), ("dark", 400)
         (lambda: html(on_verdicts([samples.fixed_wing(), samples.failing()])), NARROW),
         (lambda: html(on_paper(samples.reproduction())), NARROW),
         (lambda: html(samples.simulation()[0]), NARROW),
-        (lambda: render_diagnosis(diagnosis()), WIDE),
+        (lambda: html(on_diagnosis(diagnosis())), WIDE),
     ],
 )
 def test_axe_finds_nothing(

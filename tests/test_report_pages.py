@@ -21,12 +21,11 @@ from syncline_design.machine.records import with_texts
 from syncline_design.paper.figures import SimulatedPoint
 from syncline_design.paper.reproduce import reproduce
 from syncline_design.report import numbers
-from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
-from syncline_design.report.diagnosis_summary import summary_text
+from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_paper import on_paper
-from syncline_design.report.pages import render_diagnosis
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
 from syncline_design.report.text import visible
 
 
@@ -37,7 +36,7 @@ def hostile(text: str) -> DiagnosisAndDesign:
 
 
 def test_page_is_well_formed_and_fetches_nothing() -> None:
-    page = Page(render_diagnosis(diagnosis()))
+    page = Page(html(on_diagnosis(diagnosis())))
     assert page.unbalanced == []
     assert len(page.scripts) == 1
     ids = [found["id"] for _, found in page.tags if "id" in found]
@@ -47,17 +46,17 @@ def test_page_is_well_formed_and_fetches_nothing() -> None:
 
 
 def test_same_input_same_bytes() -> None:
-    assert render_diagnosis(diagnosis()) == render_diagnosis(diagnosis())
+    assert html(on_diagnosis(diagnosis())) == html(on_diagnosis(diagnosis()))
 
 
 def test_hostile_text_stays_text() -> None:
     text = "".join(samples.HOSTILE)
-    page = Page(render_diagnosis(hostile(text)))
+    page = Page(html(on_diagnosis(hostile(text))))
     assert len(page.scripts) == 1
     assert page.attribute("img", "src") == []
     assert page.unbalanced == []
     assert visible(text) in " ".join(page.texts)
-    assert "<img" not in render_diagnosis_markdown(hostile(text))
+    assert "<img" not in markdown(on_diagnosis(hostile(text)))
 
 
 BARE: tuple[dict[str, Any], ...] = (
@@ -72,8 +71,12 @@ BARE: tuple[dict[str, Any], ...] = (
 @pytest.mark.parametrize("bare", BARE)
 def test_any_part_may_be_empty(bare: dict[str, Any]) -> None:
     found = diagnosis(**bare)
-    assert Page(render_diagnosis(found)).unbalanced == []
-    for text in (render_diagnosis(found), render_diagnosis_markdown(found), summary_text(found)):
+    assert Page(html(on_diagnosis(found))).unbalanced == []
+    for text in (
+        html(on_diagnosis(found)),
+        markdown(on_diagnosis(found)),
+        console(on_diagnosis(found)),
+    ):
         assert "None" not in re.sub(r"<dd><code>None</code>", "", text)
 
 
@@ -130,7 +133,7 @@ def test_simulation_tells_ratio_reason_and_certificate() -> None:
 
 @pytest.fixture(scope="module")
 def diagnosed() -> Page:
-    return Page(render_diagnosis(diagnosis()))
+    return Page(html(on_diagnosis(diagnosis())))
 
 
 @pytest.mark.parametrize(
@@ -148,7 +151,7 @@ def diagnosed() -> Page:
         "Told apart on this log from filter lag (position), 141 nat worse",
         "boresight: the vehicle never tilted",
         "after, plus a placebo: boresight (ranging)",
-        "held-out regime, after",
+        "held-out regime (speed above 7 m/s), after",
         "ACC-1 now fails",
     ],
 )
@@ -158,10 +161,14 @@ def test_diagnosis_says(diagnosed: Page, words: str) -> None:
 
 @pytest.mark.parametrize(
     ("verdict", "words"),
-    [("agrees", "agree"), ("explained", "has a name"), ("unexplained", "remains unexplained")],
+    [
+        ("agrees", "nothing is missing"),
+        ("explained", "what remains is noise"),
+        ("unexplained", "no effect of the dictionary explains"),
+    ],
 )
 def test_diagnosis_verdicts(verdict: str, words: str) -> None:
-    assert words in Page(render_diagnosis(diagnosis(verdict=verdict))).text
+    assert words in Page(html(on_diagnosis(diagnosis(verdict=verdict)))).text
 
 
 @pytest.mark.parametrize(
@@ -201,13 +208,13 @@ def test_a_finding_reads_the_same_on_console_page_markdown_and_json(
     effect = replace(registry()["latency"], sentence="it is {latency_s}")
     figures = {"latency_s": estimate(value, uncertainty, unit)}
     found = finding(effect, "position", "uav", figures, "clear", 1.0, -5.0)
-    console = found.sentence.removeprefix("It is ")
-    assert found.to_json()["parameters"]["latency_s"]["text"] == console
+    printed = found.sentence.removeprefix("It is ")
+    assert found.to_json()["parameters"]["latency_s"]["text"] == printed
     data = diagnosis(findings=(found,))
-    typeset = console.replace("-", "\u2212").replace(" ", "\u00a0")
-    assert typeset in Page(render_diagnosis(data)).text
-    assert typeset in render_diagnosis_markdown(data).replace("\\", "")
-    body, _, shown = console.rpartition(" ")
+    typeset = printed.replace("-", "\u2212").replace(" ", "\u00a0")
+    assert typeset in Page(html(on_diagnosis(data))).text
+    assert typeset in markdown(on_diagnosis(data)).replace("\\", "")
+    body, _, shown = printed.rpartition(" ")
     size = {
         "cm": "1e-2", "ms": "1e-3", "ppm": "1e-6", "mm/(m/s2)": "1e-3",
         "deg": mpmath.pi / 180, "deg/h": mpmath.pi / 648000,
@@ -242,12 +249,12 @@ def test_a_page_says_fits_worse_only_of_what_does() -> None:
     """Each effect in the named one's place carries its own comparison, not a common heading."""
     alike = (
         Rival("packetised_timestamps", "attitude", "car", 0.99, -157.4, possible=False),
-        Rival("filter_lag", "position", "car", 0.99, 31.6, possible=True),
+        Rival("filter_lag", "position", "car", 0.999, 31.6, possible=True),
     )
     data = diagnosis(findings=(replace(LATENCY, lookalikes=alike),))
-    page = " ".join(Page(render_diagnosis(data)).text.split())
-    markdown = re.sub(r"\\(.)", r"\1", render_diagnosis_markdown(data))
-    for text in (page, markdown):
+    page = " ".join(Page(html(on_diagnosis(data))).text.split())
+    plain = re.sub(r"\\(.)", r"\1", markdown(on_diagnosis(data)))
+    for text in (page, plain):
         assert "fits worse" not in text
         assert "157 nat better, but only with impossible values" in text
         assert "filter lag (position), 31.6 nat worse" in text
@@ -259,9 +266,9 @@ def test_markdown_of_a_diagnosis_says_what_the_page_says_of_gap_and_log() -> Non
     own = diagnosis().log
     log = replace(own, fitted=2900, thinned=5000, notes=("heading_deg was read as yaw",))
     data = diagnosis(log=log)
-    text = re.sub(r"\\(.)", r"\1", render_diagnosis_markdown(data)).replace("\u00a0", " ")
+    text = re.sub(r"\\(.)", r"\1", markdown(on_diagnosis(data))).replace("\u00a0", " ")
     for words in (
-        "The spec's noise expects 2.17 cm", "Gap closed on held-out data: 98.1 %",
+        "The spec's noise expects** 2.17 cm", "Gap closed on held-out data** 98.1 %",
         "Log: 2 987 of 3 000 rows used, 2 900 fitted", "5 000 rows are between windows",
         "Left out: 13 (missing values)", "heading_deg was read as yaw",
     ):  # fmt: skip

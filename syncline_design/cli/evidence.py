@@ -91,8 +91,8 @@ def diagnose(
     from syncline_design.diagnosis import DiagnosisSettings
     from syncline_design.diagnosis import diagnose as diagnose_log
     from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
-    from syncline_design.report.diagnosis_summary import meaning_text, summary_text
-    from syncline_design.report.text import visible
+    from syncline_design.report.on_diagnosis import on_diagnosis
+    from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
 
     targets = output_targets(output, DIAGNOSE_FORMATS, [spec, *(log or ())], [write_spec])
@@ -104,9 +104,6 @@ def diagnose(
         found = diagnose_log(as_measured(case, seed), log or (), settings, progress)
         means = _meaning(case, found, seed, deadline)
     whole = with_design(found, None if means is None else means.design)
-    text = f"{visible(case.spec.name)} ({visible(spec)})\n\n{summary_text(found)}"
-    if means is not None:
-        text += f"\nWhat it means for the design:\n{meaning_text(means.design)}"
     if write_spec is not None and means is not None:
         from syncline_design.spec.edit import write_spec as write_checked
 
@@ -115,6 +112,7 @@ def diagnose(
     elif write_spec is not None:
         found_any = bool(found.effects_entries())
         say(f"{'the time was over' if found_any else 'nothing was found'}: no spec written")
+    text = console(on_diagnosis(whole))
     emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
     return found.exit_code
 

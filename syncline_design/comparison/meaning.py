@@ -47,10 +47,6 @@ class ErrorFigure(Record):
     before_interval_m: tuple[float | None, float | None] | None = optional()
     after_interval_m: tuple[float | None, float | None] | None = optional()
 
-    def words(self) -> tuple[str, str]:
-        """Both figures as the console prints them."""
-        return _length(self.before_m), _length(self.after_m)
-
 
 @dataclass(frozen=True, slots=True)
 class ChargedHorizon(Record):
@@ -213,10 +209,6 @@ def _quantile(verdict: Verdict) -> QuantileEstimate | None:
 
 def _ends(found: QuantileEstimate | None) -> tuple[float | None, float | None] | None:
     return None if found is None else (finite(found.low_m), finite(found.high_m))
-
-
-def _length(value_m: float | None) -> str:
-    return "-" if value_m is None else format_quantity(value_m, Dimension.LENGTH)
 
 
 def horizon_words(horizon: MissionHorizon, *, given: bool) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from syncline_design.comparison.meaning import DiagnosisAndDesign
 from syncline_design.report.formats import DIAGNOSE_FORMATS as DIAGNOSE_FORMATS
+from syncline_design.report.on_diagnosis import on_diagnosis
 
 
 def render_diagnose(name: str, found: DiagnosisAndDesign) -> str:
@@ -13,9 +14,9 @@ def render_diagnose(name: str, found: DiagnosisAndDesign) -> str:
 
         return json_text(found.to_json())
     if name == "markdown":
-        from syncline_design.report.diagnosis_markdown import render_diagnosis_markdown
+        from syncline_design.report.render_markdown import markdown
 
-        return render_diagnosis_markdown(found)
-    from syncline_design.report.on_diagnosis import render_diagnosis
+        return markdown(on_diagnosis(found))
+    from syncline_design.report.render_html import html
 
-    return render_diagnosis(found)
+    return html(on_diagnosis(found))

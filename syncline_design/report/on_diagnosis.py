@@ -1,22 +1,24 @@
-"""The page of `diagnose`: what is missing, how sure, what it explains, what remains."""
+"""What `diagnose` says: what is missing, how sure, what it explains, what remains."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, Final
+from functools import partial
+from typing import Final
 
 from syncline_design.comparison.meaning import DesignMeaning, DiagnosisAndDesign
+from syncline_design.diagnosis.identify import SAME
 from syncline_design.diagnosis.result import (
-    CovariateMap,
     Coverage,
     Diagnosis,
     Estimate,
     Finding,
     Fit,
     Gap,
+    HeldOut,
     LogRead,
+    Plots,
     Regime,
     Rival,
     WholeGap,
@@ -24,64 +26,186 @@ from syncline_design.diagnosis.result import (
 from syncline_design.machine.records import with_texts
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import figures_diagnosis as drawings
-from syncline_design.report import numbers, page
-from syncline_design.report.document import Outcome
-from syncline_design.report.svg import InlineFigure
+from syncline_design.report import numbers
+from syncline_design.report.document import (
+    Chart,
+    Document,
+    Facts,
+    Group,
+    Heading,
+    Items,
+    Node,
+    Outcome,
+    Text,
+    given,
+    provenance,
+    section,
+    show,
+)
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list, visible
 
 DIAGNOSES: Final[dict[str, Outcome]] = {
-    "agrees": Outcome("good", "\u2713", "Log and simulation agree"),
-    "explained": Outcome("warn", "!", "Something was missing, and it has a name"),
-    "unexplained": Outcome("bad", "?", "Something remains unexplained"),
-}
-_UNSOUND: Final = Outcome("bad", "!", "The log contradicts itself or the platform's limits")
-_CONTENTS: Final = (
-    ("findings", "Findings"),
-    ("gap", "Gap"),
-    ("residuals", "Residuals"),
-    ("where", "Where"),
-    ("design", "Design"),
-    ("log", "Log"),
-    ("provenance", "Provenance"),
+    "agrees": Outcome(
+        "good", "\u2713",
+        "Agrees: nothing is missing; what differs is the noise that the spec expects",
+    ),
+    "explained": Outcome(
+        "warn", "!", "Explained: what is missing was found, and what remains is noise"
+    ),
+    "unexplained": Outcome(
+        "bad", "?", "Unexplained: something remains that no effect of the dictionary explains"
+    ),
+}  # fmt: skip
+_UNSOUND: Final = Outcome(
+    "bad", "!", "Unexplained: the log contradicts itself or the limits of the spec's platform"
 )
+LARGE: Final = 1.25  # times the RMS that the spec's noise expects: said in the outcome
+NOWHERE: Final = "in no regime on average: it shows in how the errors vary, not in their mean"
+MOST_REGIMES: Final = 4  # told outside the page
 
 
-def render_diagnosis(found: DiagnosisAndDesign) -> str:
-    """The HTML page of one diagnosis."""
-    found = with_texts(found, visible)
-    drawn = _figures(found)
-    sections: dict[str, Any] = {
-        "findings": [finding_words(entry) for entry in found.findings],
-        "gap": [t for t in (gap_table(found.gap), _steps(found.steps)) if t is not None],
-        "residuals": "residuals" in drawn,
-        "where": where_lines(found),
-        "design": design_lines(found.design),
-        "log": _log_facts(found),
-        "provenance": _provenance(found),
-    }
-    return page.render_page(
-        "diagnosis.html.j2",
-        kind="Diagnosis",
-        name=name_of(found),
+def on_diagnosis(found: DiagnosisAndDesign) -> Document:
+    """A diagnosis, and what it means for the design, as a document."""
+    found = with_texts(found, visible)  # charts take texts as they are
+    return Document(
+        family="Diagnosis",
         outcome=outcome_of(found),
-        sentence=sentence_text(found),
-        facts=_facts(found),
-        contents=[(key, label) for key, label in _CONTENTS if sections[key]],
-        sections=sections,
-        figures={key: None if key not in drawn else page.trusted_svg(drawn[key].svg)
-                 for key in ("residuals", "gap", "where", "coverage")},
-        coverage=_coverage(found.plots.coverage),
-        meaning=meaning_table(found.design),
-        unseen=list(found.unseen),
-        rejected=_rejected(found.log),
-        remaining=remaining_text(found),
-    )  # fmt: skip
+        name=found.spec.name if found.spec is not None else "Measured log against simulation",
+        sentences=(sentence_text(found),),
+        facts=tuple(_facts(found)),
+        sections=(
+            *section("findings", "What is missing", _findings(found), "Findings"),
+            *section("gap", "How much of the gap is closed", _gap(found), "Gap"),
+            *section("residuals", "Residuals", _residuals(found.plots)),
+            *section("where", "Where they disagree", _where(found), "Where"),
+            *section("unseen", "What this log cannot show", _items(found.unseen), "Not shown"),
+            *section("design", "What it means for the design", _design(found.design), "Design"),
+            *section("log", "The log", _log(found), "Log"),
+            *provenance(_provenance(found)),
+        ),
+        source=found.spec.file if found.spec is not None else "",
+    )
 
 
-def name_of(found: Diagnosis) -> str:
-    """The spec's name; of a system in memory, what was done."""
-    return found.spec.name if found.spec is not None else "Measured log against simulation"
+def _items(lines: Sequence[str]) -> list[Node]:
+    return [Items(tuple(lines))] if lines else []
+
+
+def outcome_of(found: Diagnosis) -> Outcome:
+    """The verdict's words; a log that contradicts itself is said to, whatever was named."""
+    if not found.sound:
+        return _UNSOUND
+    known, times = DIAGNOSES[found.verdict], _times_expected(found.gap)
+    if found.verdict != "explained" or times <= LARGE:
+        return known
+    more = f"{known.word}, {times:.2g} times what the spec expects"
+    return Outcome(known.tone, known.mark, more)
+
+
+def _times_expected(gap: Gap) -> float:
+    """RMS after, over what the spec's noise gives; 0 where no rows were held out."""
+    if gap.held_out is None or gap.expected_rms_m is None:
+        return 0.0
+    return gap.held_out.after.rms_m / max(gap.expected_rms_m, 1e-300)
+
+
+def sentence_text(found: Diagnosis) -> str:
+    """What is wrong with the log first, then what was found in it."""
+    said = [_full_stop(check.message) for check in found.checks]
+    checks = [text[0].upper() + text[1:] for text in said]
+    if not found.sound:
+        checks.append("Mend that first: every figure below rests on it.")
+    return " ".join([*checks, _found_text(found)])
+
+
+def _found_text(found: Diagnosis) -> str:
+    if found.findings:
+        return " ".join(_full_stop(one.sentence) for one in found.findings)
+    if found.remaining.beyond_noise:
+        return "No effect of the dictionary explains what differs."
+    return "Nothing beyond the spec's own noise was found."
+
+
+def _facts(found: Diagnosis) -> list[tuple[str, str]]:
+    gap, log, facts = found.gap, found.log, []
+    if gap.held_out is not None:
+        scores = gap.held_out
+        facts.append(("RMS before", _length(scores.before.rms_m)))
+        facts.append(("RMS after", _length(scores.after.rms_m)))
+        facts.append(("RMS at best", _length(scores.fitted.rms_m)))
+        if closed := closed_text(gap, scores):
+            facts.insert(0, ("Gap closed on held-out data", closed))
+    if gap.expected_rms_m is not None:
+        facts.append(("The spec's noise expects", _length(gap.expected_rms_m)))
+    rows = f"{numbers.count(log.used)} of {numbers.count(log.rows)}"
+    return [*facts, ("Rows used", rows)]
+
+
+def closed_text(gap: Gap, scores: HeldOut) -> str:
+    """Which share of the gap is closed; in words where there is none to speak of."""
+    if gap.closed_fraction is not None:
+        return numbers.percent(gap.closed_fraction) if gap.closed_fraction > 0.0 else "nothing"
+    return "less than 2 % of it could be, too little for a share" if scores.slight else ""
+
+
+def _findings(found: Diagnosis) -> list[Node]:
+    nodes: list[Node] = [_finding(one) for one in found.findings]
+    remaining = found.remaining
+    if remaining.beyond_noise:
+        where = "; ".join(_regime_text(one) for one in remaining.where)
+        chance = f"Chance that noise does this: {remaining.p:.1g}."
+        words = f"Unexplained and still there: {where or NOWHERE}. {chance}"
+        nodes.append(Text(words, mark="?", tone="bad"))
+    return nodes
+
+
+def _finding(found: Finding) -> Node:
+    """One finding: its figures, how sure it is, what else it could be."""
+    facts = [(_spaced(split_suffix(n)[0]), _parameter_text(p)) for n, p in found.parameters.items()]
+    nodes: list[Node] = [
+        Heading(given(_spaced(found.effect)), given(f"{found.sensor}, {found.stage}")),
+        Text(_full_stop(found.sentence), reach="page"),
+        Facts(tuple(facts)),
+        Text(f"Evidence: {_full_stop(found.evidence)}"),
+    ]
+    if found.aliases:
+        names = sentence_list([_effect_text(one) for one in found.aliases])
+        apart = f"To separate them: {found.separated_by}."
+        words = f"This log cannot tell it apart from {names}. {apart}"
+        nodes.append(Text(words, mark="!", tone="warn"))
+    if found.lookalikes:
+        names = sentence_list([rival_text(one, alike=True) for one in found.lookalikes])
+        nodes.append(Text(f"In its place on this log: {names}.", quiet=True))
+    if found.excluded:
+        names = sentence_list([rival_text(one) for one in found.excluded])
+        nodes.append(Text(f"Told apart on this log from {names}.", quiet=True))
+    return Group(tuple(nodes), "article")
+
+
+def _spaced(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _full_stop(text: str) -> str:
+    return text if not text or text.endswith(".") else text + "."
+
+
+def _effect_text(one: Rival) -> str:
+    """`lever arm (position)`."""
+    return f"{_spaced(one.effect)} ({one.sensor})"
+
+
+def rival_text(one: Rival, *, alike: bool = False) -> str:
+    """Name and how much worse it fits; one that fits better says why it is not the name."""
+    if one.nats_worse >= 0.0:
+        kept = "" if one.refitted else " with the noise kept"
+        other = ", of another signature" if alike and one.cosine <= SAME else ""
+        return f"{_effect_text(one)}{other}, {one.nats_worse:.3g} nat worse{kept}"
+    if not one.possible:
+        better = f"{-one.nats_worse:.3g} nat better"
+        return f"{_effect_text(one)}, {better}, but only with impossible values"
+    return f"{_effect_text(one)}, as well in its place"
 
 
 def _parameter_text(shown: Estimate) -> str:
@@ -99,125 +223,51 @@ def _length(value_m: float) -> str:
     return numbers.with_uncertainty(value_m, None, "m")
 
 
-@dataclass(frozen=True, slots=True)
-class FindingWords:
-    """A finding as pages and Markdown say it."""
-
-    title: str
-    place: str
-    sentence: str
-    parameters: tuple[tuple[str, str], ...]
-    aliases: str
-    lookalikes: str
-    excluded: str
-    separated_by: str
-    evidence: str
-
-
-def finding_words(found: Finding) -> FindingWords:
-    """A finding's parts, lists joined."""
-    return FindingWords(
-        title=_spaced(found.effect),
-        place=f"{found.stage} {found.sensor}",
-        sentence=_full_stop(found.sentence),
-        parameters=tuple(
-            (_spaced(split_suffix(name)[0]), _parameter_text(one))
-            for name, one in found.parameters.items()
-        ),
-        aliases=sentence_list([_effect_text(one) for one in found.aliases]),
-        lookalikes=sentence_list([_excluded_text(one) for one in found.lookalikes]),
-        excluded=sentence_list([_excluded_text(one) for one in found.excluded]),
-        separated_by=found.separated_by,
-        evidence=found.evidence,
+def _gap(found: Diagnosis) -> list[Node]:
+    lead = (
+        "Judged on data that the fit did not see. At best is what the same effects reach when all "
+        "rows are fitted; RMS alone cannot show an effect on the noise itself, the likelihood "
+        "(NLL) and the coverage do."
     )
-
-
-def _spaced(name: str) -> str:
-    return name.replace("_", " ")
-
-
-def _full_stop(text: str) -> str:
-    return text if not text or text.endswith(".") else text + "."
-
-
-def _effect_text(one: Rival) -> str:
-    """`lever arm (position)`."""
-    return f"{_spaced(one.effect)} ({one.sensor})"
-
-
-def _excluded_text(one: Rival) -> str:
-    """Name and how much worse it fits; one that fits better says why it is not the name."""
-    if one.nats_worse >= 0.0:
-        kept = "" if one.refitted else " with the noise kept"
-        return f"{_effect_text(one)}, {one.nats_worse:.3g} nat worse{kept}"
-    if not one.possible:
-        better = f"{-one.nats_worse:.3g} nat better"
-        return f"{_effect_text(one)}, {better}, but only with impossible values"
-    return f"{_effect_text(one)}, as well in its place"
-
-
-def outcome_of(found: Diagnosis) -> Outcome:
-    """The verdict's words; a log that contradicts itself is said to, whatever was named."""
-    return DIAGNOSES[found.verdict] if found.sound else _UNSOUND
-
-
-def check_sentences(found: Diagnosis) -> list[str]:
-    """What is wrong with the log itself, or beyond the platform's limits."""
-    said = [_full_stop(check.message) for check in found.checks]
-    return [text[0].upper() + text[1:] for text in said]
-
-
-def sentence_text(found: Diagnosis) -> str:
-    """What is wrong with the log first, then what was found in it."""
-    return " ".join([*check_sentences(found), _found_text(found)])
-
-
-def _found_text(found: Diagnosis) -> str:
-    if found.findings:
-        return " ".join(_full_stop(one.sentence) for one in found.findings)
-    if found.remaining.beyond_noise:
-        return "No effect of the dictionary explains what differs."
-    return "Nothing beyond the spec's own noise was found."
-
-
-def _facts(found: Diagnosis) -> list[tuple[str, str]]:
-    gap, log, facts = found.gap, found.log, []
-    if gap.closed_fraction is not None:
-        facts.append(("Gap closed on held-out data", numbers.percent(gap.closed_fraction)))
-    if gap.held_out is not None:
-        scores = gap.held_out
-        facts.append(("RMS before", _length(scores.before.rms_m)))
-        facts.append(("RMS after", _length(scores.after.rms_m)))
-        facts.append(("RMS at best", _length(scores.fitted.rms_m)))
-    if gap.expected_rms_m is not None:
-        facts.append(("The spec's noise expects", _length(gap.expected_rms_m)))
-    rows = f"{numbers.count(log.used)} of {numbers.count(log.rows)}"
-    return [*facts, ("Rows used", rows)]
-
-
-def design_lines(design: DesignMeaning | None) -> list[str]:
-    """What the findings mean for the design, in words; the horizon last."""
-    return [] if design is None else [*design.text, design.horizon.text]
-
-
-def meaning_table(design: DesignMeaning | None) -> Table | None:
-    """The error without and with the findings, by model and simulated."""
-    if design is None:
-        return None
-    rows: list[tuple[Cell | str, ...]] = [
-        (
-            one.label,
-            *(Cell(numbers.length(value), value) for value in (one.before_m, one.after_m)),
-            _interval(one.after_interval_m),
-        )
-        for one in design.figures
+    tables = [*show(gap_table(found.gap)), *show(_steps(found.steps), reach="page")]
+    coverage = _coverage(found.plots.coverage)
+    fold = show(coverage, silent=True)
+    placebo = _placebo_text(found.gap)
+    return [
+        *([Text(lead)] if tables else []),
+        *_gap_chart(found),
+        *tables,
+        *([Text(placebo)] if placebo else []),
+        *_coverage_chart(found.plots),
+        *([Group(tuple(fold), "fold", summary=coverage.caption, reach="page")] if coverage else []),
     ]
-    heads = ("Error of the design", "Without #", "With the findings #", "95 % interval, with")
-    return table("The error without and with the findings", heads, rows)
 
 
-def _interval(ends: tuple[float | None, float | None] | None) -> str:
-    return " to ".join(numbers.length(end) for end in ends or ())
+def _placebo_text(gap: WholeGap) -> str:
+    """What an effect saves that was not chosen: next to nothing, if the choice is right."""
+    saved, placebo = gap.nll_saved_per_sample, gap.placebo
+    if placebo.nll_saved_per_sample is None or saved is None:
+        return ""
+    change = numbers.typeset(f"{placebo.nll_saved_per_sample.value - saved.value:+.4f} nat")
+    return f"Adding {placebo.added} as well, which was not chosen: {change} per sample."
+
+
+def _gap_chart(found: Diagnosis) -> list[Node]:
+    held_out = found.gap.held_out
+    steps = [drawings.Step(label, scores.rms_m) for label, scores in gap_steps(found.steps)]
+    if not steps or held_out is None:
+        return []
+    draw = partial(drawings.gap_staircase, steps, held_out.floor.rms_m)
+    return [Chart("gap", draw, "RMS of the residual on held-out data as effects are added.")]
+
+
+def _coverage_chart(plots: Plots) -> list[Node]:
+    rows = [(one.nominal, one.before, one.after) for one in plots.coverage]
+    caption = (
+        "Share of residuals inside the expected interval; on the dashed line the noise is as "
+        "stated."
+    )
+    return [Chart("coverage", partial(drawings.coverage, rows), caption)] if rows else []
 
 
 def _score_cells(scores: Fit) -> list[Cell]:
@@ -243,35 +293,15 @@ def gap_table(gap: WholeGap) -> Table | None:
             (Cell("held-out blocks, at best (fitted to all rows)"), *_score_cells(blocks.fitted)),
         ]
     if gap.regime.held_out is not None:
-        regime = gap.regime.held_out
+        regime, part = gap.regime.held_out, f"held-out regime ({gap.regime.held_rows})"
         rows += [
-            (Cell("held-out regime, before"), *_score_cells(regime.before)),
-            (Cell("held-out regime, after"), *_score_cells(regime.after)),
+            (Cell(f"{part}, before"), *_score_cells(regime.before)),
+            (Cell(f"{part}, after"), *_score_cells(regime.after)),
         ]
     if gap.placebo.held_out is not None:
         label = f"after, plus a placebo: {gap.placebo.added}"
         rows.append((Cell(label), *_score_cells(gap.placebo.held_out.after)))
     return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
-
-
-def gap_lines(gap: Gap) -> list[str]:
-    """What the spec's noise expects on the held-out blocks, and the share of the gap closed."""
-    lines = []
-    if gap.expected_rms_m is not None:
-        lines.append(f"The spec's noise expects {_length(gap.expected_rms_m)}.")
-    if gap.closed_fraction is not None:
-        lines.append(f"Gap closed on held-out data: {numbers.percent(gap.closed_fraction)}.")
-    return lines
-
-
-def log_lines(log: LogRead) -> list[str]:
-    """How many rows were read, used, fitted and left out, and how the log was read."""
-    used, rows = numbers.count(log.used), numbers.count(log.rows)
-    lines = [f"Log: {used} of {rows} rows used, {numbers.count(log.fitted)} fitted."]
-    if log.thinned:
-        lines.append(f"Too long to hold: {numbers.count(log.thinned)} rows are between windows.")
-    lines += [f"Left out: {numbers.count(n)} ({why})" for why, n in log.rejected.items()]
-    return [*lines, *log.notes]
 
 
 def gap_steps(steps: Sequence[Gap]) -> list[tuple[str, Fit]]:
@@ -287,9 +317,43 @@ def _steps(steps: Sequence[Gap]) -> Table | None:
     return table("Gap after each addition", heads, rows) if len(rows) > 2 else None
 
 
-def where_lines(found: Diagnosis) -> list[str]:
+def _residuals(plots: Plots) -> list[Node]:
+    found = plots.residuals
+    if len(found.time_s) < 2:
+        return []
+    axes = [
+        drawings.ResidualAxis(name, _floats(one.before), _floats(one.after), _floats(one.signature))
+        for name, one in found.axes.items()
+    ]
+    caption = (
+        "Measured minus simulated position, before and after the named effects were added, with "
+        "their own signature."
+    )
+    return [Chart("residuals", partial(drawings.residuals, found.time_s, axes), caption)]
+
+
+def _floats(values: Sequence[float | None]) -> tuple[float, ...]:
+    return tuple(math.nan if v is None else v for v in values)
+
+
+def _where(found: Diagnosis) -> list[Node]:
     """Where they disagreed most; of a log that agrees on average, where it still does."""
-    return [_regime_text(one) for one in found.where or found.remaining.where]
+    regimes = found.where or found.remaining.where
+    maps = [
+        drawings.WhereCells(
+            one.covariate, one.unit, tuple((c.low, c.high, abs(c.score)) for c in one.cells)
+        )
+        for one in found.plots.where_map[:6]
+    ]
+    caption = (
+        "Disagreement of each regime in standard errors; noise alone seldom exceeds 3 (dashed)."
+    )
+    lines = tuple(_regime_text(one) for one in regimes)
+    if not lines:
+        return []
+    short = Items(lines[:MOST_REGIMES], reach="text")
+    chart = [Chart("where", partial(drawings.where_map, maps), caption)] if maps else []
+    return [*chart, Items(lines, reach="page"), *([short] if found.findings else [])]
 
 
 def _regime_text(one: Regime) -> str:
@@ -299,12 +363,53 @@ def _regime_text(one: Regime) -> str:
     return f"{place}: mean {_length(one.mean_m)}, {abs(one.score):.3g} standard errors"
 
 
-def remaining_text(found: Diagnosis) -> str:
-    """What is more than noise; a log can be unexplained by what it contradicts alone."""
-    if not found.remaining.beyond_noise:
-        return ""
-    where = "; ".join(_regime_text(one) for one in found.remaining.where)
-    return "Unexplained and still there" + (f": {where}." if where else ".")
+def _design(design: DesignMeaning | None) -> list[Node]:
+    """What the findings mean for the design, in words and figures."""
+    if design is None:
+        return []
+    lines = (*design.text, design.horizon.text)
+    return [Items(tuple(line.strip() for line in lines)), *show(meaning_table(design))]
+
+
+def meaning_table(design: DesignMeaning) -> Table:
+    """The error without and with the findings, by model and simulated."""
+    rows: list[tuple[Cell | str, ...]] = [
+        (
+            one.label,
+            *(Cell(numbers.length(value), value) for value in (one.before_m, one.after_m)),
+            _interval(one.after_interval_m),
+        )
+        for one in design.figures
+    ]
+    heads = ("Error of the design", "Without #", "With the findings #", "95 % interval, with")
+    return table("The error without and with the findings", heads, rows)
+
+
+def _interval(ends: tuple[float | None, float | None] | None) -> str:
+    return " to ".join(numbers.length(end) for end in ends or ())
+
+
+def _log(found: Diagnosis) -> list[Node]:
+    return [
+        Facts(tuple(_log_facts(found)), reach="page"),
+        *show(_rejected(found.log), reach="page"),
+        Items(tuple(log_lines(found.log)), reach="text"),
+    ]
+
+
+def log_lines(log: LogRead) -> list[str]:
+    """How many rows were read, used, fitted and left out, and how the log was read."""
+    used, rows = numbers.count(log.used), numbers.count(log.rows)
+    lines = [f"Log: {used} of {rows} rows used, {numbers.count(log.fitted)} fitted."]
+    if log.thinned:
+        lines.append(f"Too long to hold: {numbers.count(log.thinned)} rows are between windows.")
+    lines += [f"Left out: {numbers.count(n)} ({why})" for why, n in log.rejected.items()]
+    varied = (
+        f"{_spaced(n)} {numbers.number(m.low, 3)} to {numbers.number(m.high, 3)} {m.unit}"
+        for n, m in log.motion.items()
+    )
+    motion = ["Varied: " + ", ".join(varied)] if log.motion else []
+    return [*lines, *motion, *log.notes]
 
 
 def _log_facts(found: Diagnosis) -> list[tuple[str, str]]:
@@ -346,33 +451,3 @@ def _provenance(found: Diagnosis) -> list[tuple[str, str]]:
     file = [] if found.spec is None else [("Spec file", found.spec.file)]
     known = found.provenance.to_json().items()
     return [*file, *((_spaced(key), str(value)) for key, value in known)]
-
-
-def _floats(values: Sequence[float | None]) -> tuple[float, ...]:
-    return tuple(math.nan if v is None else v for v in values)
-
-
-def _figures(found: Diagnosis) -> dict[str, InlineFigure]:
-    drawn: dict[str, InlineFigure] = {}
-    plots = found.plots
-    axes = [
-        drawings.ResidualAxis(name, _floats(one.before), _floats(one.after), _floats(one.signature))
-        for name, one in plots.residuals.axes.items()
-    ]
-    if len(plots.residuals.time_s) > 1:
-        drawn["residuals"] = drawings.residuals(plots.residuals.time_s, axes)
-    steps = [drawings.Step(label, scores.rms_m) for label, scores in gap_steps(found.steps)]
-    if steps and found.gap.held_out is not None:
-        drawn["gap"] = drawings.gap_staircase(steps, found.gap.held_out.floor.rms_m)
-    maps = [_where_cells(one) for one in plots.where_map]
-    if maps:
-        drawn["where"] = drawings.where_map(maps[:6])
-    rows = [(one.nominal, one.before, one.after) for one in plots.coverage]
-    if rows:
-        drawn["coverage"] = drawings.coverage(rows)
-    return drawn
-
-
-def _where_cells(one: CovariateMap) -> drawings.WhereCells:
-    cells = tuple((cell.low, cell.high, abs(cell.score)) for cell in one.cells)
-    return drawings.WhereCells(one.covariate, one.unit, cells)
