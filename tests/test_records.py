@@ -145,3 +145,11 @@ def test_a_figure_without_end_is_null_and_infinite_again_when_read() -> None:
     assert not validator.is_valid({"high_m": "far"})
     with pytest.raises(NotThisResultError, match="high_m"):
         read_as(Open, '{"high_m": "inf"}')
+
+
+@pytest.mark.parametrize("figure", ["1e999", "-1e999", "NaN", "Infinity", "1" + "0" * 400])
+def test_figures_that_json_cannot_hold_are_refused(figure: str) -> None:
+    text = json.dumps(PLAIN).replace("0.1", figure)
+    assert figure in text
+    with pytest.raises(NotThisResultError, match=r"changes\[0\]\.from: .*finite"):
+        read_as(Whole, text)

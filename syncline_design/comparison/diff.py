@@ -20,7 +20,7 @@ from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
 from syncline_design.spec.load import BadInput, catalogs_of, load_document, without_simulated
 from syncline_design.spec.yaml_text import Document, KeyPath, parse
-from syncline_design.verdict.tree import EXIT_CODES
+from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 Json = dict[str, Any]
@@ -35,7 +35,7 @@ class Side:
     """One of the two files: its verdict, and the spec where it is one."""
 
     file: str
-    verdict: Json
+    verdict: Verdict
     case: Case | None = None
     document: Document | None = None
 
@@ -55,7 +55,7 @@ def diff(old: str | Path, new: str | Path, settings: CheckSettings | None = None
         (before.file, after.file),
         tuple(cause for cause, _ in causes),
         changes(before.verdict, after.verdict),
-        EXIT_CODES[after.verdict["verdict"]],
+        after.verdict.exit_code,
     )
 
 
@@ -67,7 +67,7 @@ def read_side(path: Path, settings: CheckSettings) -> Side:
     if document.data is None:
         raise BadInput(document.problems)
     case = load_document(document, path, catalogs_of(document, path))
-    return Side(str(path), check_loaded(case, settings).to_json(), case, document)
+    return Side(str(path), check_loaded(case, settings), case, document)
 
 
 def _causes(before: Side, after: Side) -> Found:
@@ -150,32 +150,32 @@ def _text(value: Any) -> str | None:
     return None if value is _ABSENT else label(value)
 
 
-def _verdict_causes(old: Json, new: Json) -> Found:
+def _verdict_causes(old: Verdict, new: Verdict) -> Found:
     """What two verdicts say about their inputs: motion, models, limits."""
-    before, after = old.get("spec") or {}, new.get("spec") or {}
     for key in ("sync_model", "objective", "coverage_factor", "currency"):
-        if before.get(key) != after.get(key):
-            yield Cause(key, label(before.get(key)), label(after.get(key))), None
-    stages = {s["name"]: s["platform"] for s in before.get("stages") or ()}
-    for stage in after.get("stages") or ():
-        platform = stages.get(stage["name"], {})
-        for key, value in stage["platform"].items():
-            if platform.get(key) != value and key != "name":
-                one = label(platform[key]) if key in platform else None
-                yield Cause(f"stages[{stage['name']}].{key}", one, label(value)), None
-    limits = {r["id"]: r.get("limit") for r in old["requirements"]}
-    for row in new["requirements"]:
-        if row["id"] in limits and limits[row["id"]] != row.get("limit"):
-            key = f"requirements[{row['id']}].limit"
-            yield Cause(key, label(limits[row["id"]]), label(row.get("limit"))), None
+        yield from _one_cause(key, getattr(old.spec, key), getattr(new.spec, key))
+    stages = {stage.name: stage.platform.to_json() for stage in old.spec.stages}
+    for stage in new.spec.stages:
+        before = stages.get(stage.name, {})
+        for key, value in stage.platform.to_json().items():
+            if key != "name":
+                place = f"stages[{stage.name}].{key}"
+                yield from _one_cause(place, before.get(key, _ABSENT), value)
+    limits = {row.id: row.limit for row in old.requirements}
+    for row in new.requirements:
+        if row.id in limits:
+            yield from _one_cause(f"requirements[{row.id}].limit", limits[row.id], row.limit)
 
 
-def _provenance_causes(old: Json, new: Json) -> Found:
-    before, after = old.get("provenance") or {}, new.get("provenance") or {}
+def _provenance_causes(old: Verdict, new: Verdict) -> Found:
     words = {"version": "version", "catalogs_sha256": "catalogs (hash)", "seed": "seed"}
     for key, word in words.items():
-        if before.get(key) != after.get(key):
-            yield Cause(word, label(before.get(key)), label(after.get(key))), None
+        yield from _one_cause(word, getattr(old.provenance, key), getattr(new.provenance, key))
+
+
+def _one_cause(key: str, old: Any, new: Any) -> Found:
+    if not _same(old, new):
+        yield Cause(key, _text(old), _text(new)), None
 
 
 def _catalog_causes(old: Case, new: Case) -> Found:
@@ -224,8 +224,8 @@ def _tried(
         document = replace(before.document, data=data)
         path = before.case.path
         alone = load_document(document, path, catalogs_of(document, path))
-        verdict = check_loaded(without_simulated(alone), plain).to_json()
-        start = check_loaded(without_simulated(before.case), plain).to_json()
+        verdict = check_loaded(without_simulated(alone), plain)
+        start = check_loaded(without_simulated(before.case), plain)
     except Exception:  # a change that needs the others; the whole difference stands without it
         return cause
     if in_force().is_over:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
 
 from syncline_design.machine.records import Record
+from syncline_design.verdict.tree import RequirementResult, Status, Verdict, Word
 
-Json = Mapping[str, Any]
 SCHEMA = "syncline-design/diff/v1"
 
 
@@ -17,15 +16,15 @@ class Compared(Record):
     """One of the two files, and the verdict on it."""
 
     file: str
-    verdict: str
+    verdict: Word
 
 
 @dataclass(frozen=True, slots=True)
 class VerdictChange(Record):
     """The verdict before and now."""
 
-    old: str
-    new: str
+    old: Word
+    new: Word
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,11 +67,11 @@ class FigureChange(Record):
 class Standing(Record):
     """How one side stands to a requirement."""
 
-    status: str | None
+    status: Status
     value: float | None
-    limit: float | None
+    limit: float
     margin: float | None
-    unit: str | None
+    unit: str
     line: int | None
     column: int | None
 
@@ -82,8 +81,8 @@ class RequirementChange(Record):
     """A requirement before and now; None: not required."""
 
     id: str
-    kind: str | None
-    unit: str | None
+    kind: str
+    unit: str
     old: Standing | None
     new: Standing | None
 
@@ -142,45 +141,40 @@ def difference(
     )  # fmt: skip
 
 
-def changes(old: Json, new: Json) -> Changes:
+def changes(old: Verdict, new: Verdict) -> Changes:
     """Verdict, payload, sums, error and margins of two verdicts, side by side."""
-    currency = _currency(new)
-    sums = (("cost", (_currency(old), currency)), ("mass", ("kg", "kg")), ("power", ("W", "W")))
+    before, now = _sums(old), _sums(new)
     return Changes(
-        VerdictChange(old["verdict"], new["verdict"]),
-        currency,
+        VerdictChange(old.verdict, new.verdict),
+        new.spec.currency,
         tuple(_payload(old, new)),
-        tuple(_figure(name, units, _design(old, name), _design(new, name)) for name, units in sums),
-        _figure("error", ("m", "m"), _total(old), _total(new)),
+        tuple(_figure(name, before[name], now[name]) for name in before),
+        _figure("error", (_total(old), "m"), (_total(new), "m")),
         tuple(_requirements(old, new)),
     )
 
 
-def _currency(verdict: Json) -> str:
-    design, spec = verdict.get("design") or {}, verdict.get("spec") or {}
-    return str(design.get("currency") or spec.get("currency") or "EUR")
+Amount = tuple[float | None, str]  # with its unit
 
 
-def _design(verdict: Json, key: str) -> float | None:
-    value = (verdict.get("design") or {}).get(key)
-    return float(value) if isinstance(value, int | float) else None
+def _sums(verdict: Verdict) -> dict[str, Amount]:
+    design = verdict.design or dict.fromkeys(("cost", "mass", "power"))
+    units = {"cost": verdict.spec.currency, "mass": "kg", "power": "W"}
+    return {name: (design[name], unit) for name, unit in units.items()}
 
 
-def _total(verdict: Json) -> float | None:
-    value = (verdict.get("syncline") or {}).get("total_m")
-    return float(value) if isinstance(value, int | float) else None
+def _total(verdict: Verdict) -> float | None:
+    return None if verdict.syncline is None else verdict.syncline.total_m
 
 
-def _figure(
-    name: str, units: tuple[str, str], old: float | None, new: float | None
-) -> FigureChange:
+def _figure(name: str, old: Amount, new: Amount) -> FigureChange:
     """Both sides in their own units; amounts in different currencies have no difference."""
-    before, unit = units
-    change = None if old is None or new is None or before != unit else new - old
-    return FigureChange(name, unit, before, old, new, change)
+    (before, old_unit), (now, unit) = old, new
+    change = None if before is None or now is None or old_unit != unit else now - before
+    return FigureChange(name, unit, old_unit, before, now, change)
 
 
-def _payload(old: Json, new: Json) -> Iterator[RoleChange]:
+def _payload(old: Verdict, new: Verdict) -> Iterator[RoleChange]:
     """Roles whose sensor or timestamping is another one."""
     before, after = _picks(old), _picks(new)
     for role in dict.fromkeys((*before, *after)):
@@ -189,34 +183,27 @@ def _payload(old: Json, new: Json) -> Iterator[RoleChange]:
             yield RoleChange(role, one, other)
 
 
-def _picks(verdict: Json) -> dict[str, Pick]:
-    stages = (verdict.get("design") or {}).get("stages") or ()
+def _picks(verdict: Verdict) -> dict[str, Pick]:
     return {
         f"{stage['name']}.{role}": Pick(
-            entry.get("sensor"), entry.get("name"), entry.get("primitive"),
-            entry.get("timestamping"),
+            entry["sensor"], entry["name"], entry["primitive"], entry["timestamping"]
         )
-        for stage in stages
+        for stage in (verdict.design["stages"] if verdict.design is not None else ())
         for role, entry in stage["roles"].items()
-        if entry is not None
-    }  # fmt: skip
+    }
 
 
-def _requirements(old: Json, new: Json) -> Iterator[RequirementChange]:
-    before = {row["id"]: row for row in old["requirements"]}
-    after = {row["id"]: row for row in new["requirements"]}
-    for identity in dict.fromkeys((*before, *after)):
+def _requirements(old: Verdict, new: Verdict) -> Iterator[RequirementChange]:
+    before = {row.id: row for row in old.requirements}
+    after = {row.id: row for row in new.requirements}
+    for identity, either in {**before, **after}.items():
         one, other = before.get(identity), after.get(identity)
-        either = other or one or {}
         yield RequirementChange(
-            identity, either.get("kind"), either.get("unit"), _standing(one), _standing(other)
+            identity, either.kind, either.unit, _standing(one), _standing(other)
         )
 
 
-def _standing(row: Json | None) -> Standing | None:
+def _standing(row: RequirementResult | None) -> Standing | None:
     if row is None:
         return None
-    return Standing(
-        row.get("status"), row.get("value"), row.get("limit"), row.get("margin"),
-        row.get("unit"), row.get("line"), row.get("column"),
-    )  # fmt: skip
+    return Standing(row.status, row.value, row.limit, row.margin, row.unit, row.line, row.column)

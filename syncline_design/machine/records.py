@@ -35,7 +35,11 @@ class Record:
 
     __slots__ = ()
     # what pydantic reads when it makes a schema of a record, or a record of a file
-    __pydantic_config__: ClassVar[Json] = {"alias_generator": key_of, "strict": True}
+    __pydantic_config__: ClassVar[Json] = {
+        "alias_generator": key_of,
+        "strict": True,
+        "allow_inf_nan": False,
+    }
 
     def to_json(self) -> Json:
         """The record as plain data, ready for `json`."""
@@ -49,10 +53,10 @@ class _NullIsInfinite:
     def __get_pydantic_core_schema__(source: Any, handler: Any) -> Any:
         from pydantic_core import core_schema
 
-        def read(value: Any) -> Any:
-            return math.inf if value is None else value
+        def read(value: Any, finite: Callable[[Any], float]) -> float:
+            return math.inf if value is None else finite(value)
 
-        return core_schema.no_info_before_validator_function(read, handler(source))
+        return core_schema.no_info_wrap_validator_function(read, handler(source))
 
     @staticmethod
     def __get_pydantic_json_schema__(schema: Any, handler: Any) -> Json:

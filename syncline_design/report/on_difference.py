@@ -170,15 +170,18 @@ def _margins(data: Difference) -> Table | None:
 
 
 def _margin_row(entry: RequirementChange) -> tuple[Cell | str, ...]:
-    kind = str(entry.kind)
-    return Cell(entry.id), KINDS.get(kind, kind), _standing(entry.old), _standing(entry.new)
+    return (
+        Cell(entry.id),
+        KINDS.get(entry.kind, entry.kind),
+        _standing(entry.old),
+        _standing(entry.new),
+    )
 
 
 def _standing(row: Standing | None) -> Cell:
     """`0.29 m of 0.3 m` with the requirement's status as colour and symbol."""
     if row is None:
         return Cell("not required")
-    state = STATUSES.get(str(row.status), STATUSES["indeterminate"])
-    unit = row.unit or ""  # that side's own
-    shown = f"{numbers.in_unit(row.value, unit)} of {numbers.in_unit(row.limit, unit)}"
+    state = STATUSES[row.status]
+    shown = f"{numbers.in_unit(row.value, row.unit)} of {numbers.in_unit(row.limit, row.unit)}"
     return Cell(f"{shown}, {state.word}", row.value, state.tone, state.mark)

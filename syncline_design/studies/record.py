@@ -5,7 +5,6 @@ All that the tables and findings of a study need of a verdict, no more.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -79,8 +78,6 @@ class CaseRecord(Record):
     @property
     def is_believable(self) -> bool:
         """Whether the verdict follows from what the record says."""
-        if not all(_is_finite(row) for row in self.requirements):
-            return False
         return self.verdict != "meets" or (
             bool(self.requirements) and all(map(_holds, self.requirements))
         )
@@ -108,10 +105,6 @@ class CaseRecord(Record):
 def lost(reason: str) -> CaseRecord:
     """The record of a case that came to no verdict."""
     return CaseRecord(verdict="indeterminate", reason=reason)
-
-
-def _is_finite(row: RequirementResult) -> bool:
-    return math.isfinite(row.limit) and (row.value is None or math.isfinite(row.value))
 
 
 def _holds(row: RequirementResult) -> bool:
