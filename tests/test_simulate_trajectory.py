@@ -18,9 +18,8 @@ from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
 from syncline_design.report import numbers
-from syncline_design.report.on_simulation import on_simulation
+from syncline_design.report.on_simulation import CSV_HEADER, grid_csv, on_simulation
 from syncline_design.report.render_console import console
-from syncline_design.report.simulations import CSV_HEADER, grid_csv
 from syncline_design.simulation import (
     Simulation,
     SimulationError,

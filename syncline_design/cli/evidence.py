@@ -49,19 +49,19 @@ def simulate(
 ) -> int:
     """Simulate the nonlinear chain against the Syncline over a grid of tau."""
     deadline = deadline_of(time_limit)
-    from syncline_design.report.render_console import console
-    from syncline_design.report.simulations import (
+    from syncline_design.report.on_simulation import (
         SIMULATE_FORMATS,
+        on_simulation,
         render_simulate,
-        simulated_document,
     )
+    from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
     from syncline_design.verdict.simulated_spec import simulate_spec
 
     targets = output_targets(output, SIMULATE_FORMATS, [spec])
     with watched(deadline, targets, quiet=quiet):
         run = simulate_spec(load(spec), seed=seed, samples=samples, workers=workers)
-    text = console(simulated_document(run))
+    text = console(on_simulation(run.result, run.system))
     emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
     return 0
 

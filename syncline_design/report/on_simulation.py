@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from itertools import groupby
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from syncline_design.model.system import System
 from syncline_design.report import numbers
@@ -20,6 +20,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.formats import SIMULATE_FORMATS as SIMULATE_FORMATS
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -32,9 +33,12 @@ from syncline_design.report.simulated import (
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.simulation.comparison import CAUSES
 from syncline_design.simulation.results import ComparisonRow, Simulation
+from syncline_design.verdict.simulated_spec import SimulatedSpec
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
+
+CSV_HEADER: Final = "tau_s,worst_case_m,syncline_m,ratio,bound_m,gap,reason"
 
 
 def on_simulation(result: Simulation, system: System) -> Document:
@@ -149,3 +153,30 @@ def _errors(result: Simulation) -> list[Node]:
 def _effects(system: System) -> list[Node]:
     entries = [(code(e.effect), " of the ", given(e.sensor), " sensor") for e in system.effects]
     return [Items(tuple(entries))] if entries else []
+
+
+def render_simulate(name: str, run: SimulatedSpec) -> str:
+    """The text of one format; csv holds the comparison over tau."""
+    match name:
+        case "csv":
+            return grid_csv(run.result)
+        case "json":
+            from syncline_design.report.json_out import json_text
+
+            return json_text(run.result.to_json())
+        case "html":
+            from syncline_design.report.render_html import html
+
+            return html(on_simulation(run.result, run.system))
+        case _:
+            raise ValueError(f"unknown format {name}")
+
+
+def grid_csv(result: Simulation) -> str:
+    """The comparison over tau as CSV, one row per tau, numbers at full precision."""
+    lines = [CSV_HEADER]
+    for row in result.grid:
+        figures = (row.tau_s, row.worst_case_m, row.syncline_m, row.ratio, row.bound_m, row.gap)
+        reason = row.reason.replace('"', '""')
+        lines.append(",".join([*(repr(float(f)) for f in figures), f'"{reason}"']))
+    return "\n".join(lines) + "\n"
