@@ -9,13 +9,13 @@ import pytest
 from scipy.integrate import quad_vec
 from scipy.spatial.transform import Rotation
 
+from syncline_design.effects.kinematics import rotation_to_euler
 from syncline_design.effects.record import NOTHING, Departures, StageRows
 from syncline_design.simulation import kernel
 from syncline_design.simulation.chain import (
     ConstantTwist,
     Noise,
     rotation_exp,
-    rotation_to_euler,
     screw_displacement,
     stage_error,
 )

@@ -21,10 +21,12 @@ from syncline_design.diagnosis.noise import (
     precision,
     spec_bounds,
 )
+from syncline_design.diagnosis.scene import Acting, acting
 from syncline_design.diagnosis.scores import Gram, clean_threshold, log_p_of
 from syncline_design.diagnosis.tails import tails_of
 from syncline_design.diagnosis.trajectory import pieces
 from syncline_design.effects.kinematics import gauss_markov
+from syncline_design.effects.record import Target
 from syncline_design.model.estimates import figure
 
 Array = NDArray[np.float64]
@@ -247,13 +249,20 @@ def test_far_rows_are_tails_or_outliers_and_not_both(freedom: float, rate: float
         assert np.sqrt(fitted) == pytest.approx(np.sqrt(variance), rel=0.15)
 
 
+def late(seconds: float, sensor: Target = "position") -> Acting:
+    return acting("latency", sensor, 0, {"latency_s": seconds})
+
+
 def test_whole_seconds_are_a_slip_and_others_a_latency() -> None:
-    slip = whole_seconds(1.0005, 0.0001)
+    slip = whole_seconds(late(1.0005), 0.0001)
     assert slip is not None
+    assert slip.label == ("integer_second_slip", "position", 0)
     assert slip.values == {"seconds": 1.0}
-    assert whole_seconds(-17.9999, 0.001) is not None
-    assert whole_seconds(0.88, 0.03) is None
-    assert whole_seconds(0.0001, 0.001) is None
+    assert whole_seconds(late(-17.9999), 0.001) is not None
+    assert whole_seconds(late(0.88), 0.03) is None
+    assert whole_seconds(late(0.0001), 0.001) is None
+    assert whole_seconds(late(1.0, "attitude"), 0.001) is None
+    assert whole_seconds(acting("filter_lag", "position", 0, {"time_constant_s": 1.0}), 0.1) is None
 
 
 def test_splines_stop_at_gaps_and_hold_beyond_ends() -> None:

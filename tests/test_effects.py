@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import string
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -11,18 +14,25 @@ import pytest
 from numpy.typing import NDArray
 
 import syncline_design.effects as effects_package
+from syncline_design.comparison.meaning import meaning
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.effects import NOT_EFFECTS, registry
-from syncline_design.effects.frame_convention import conventions
-from syncline_design.effects.record import Basis, Departures, Effect, StageRows, Target
+from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
+from syncline_design.effects.record import (
+    OPENED,
+    SELDOM,
+    Basis,
+    Departures,
+    Effect,
+    StageRows,
+    Target,
+)
 from syncline_design.model.system import Platform, Sensor, Stage
 from syncline_design.model.timing import NO_ERROR
-from syncline_design.simulation.chain import (
-    ConstantTwist,
-    euler_to_rotation,
-    rotation_to_euler,
-    stage_error,
-)
+from syncline_design.simulation.chain import ConstantTwist, stage_error
+from syncline_design.spec.load import load
 from tests.simulation_systems import no_noise
+from tests.world import hidden, make_log, scenario
 
 Array = NDArray[np.float64]
 PAIRS = [(e, s) for e in registry().values() for s in e.sensors]
@@ -75,7 +85,7 @@ def values_of(effect: Effect, sensor: Target, size: float = 0.0) -> dict[str, fl
     values: dict[str, float] = {}
     for p in effect.parameters:
         if p.choices:
-            values[p.name] = conventions(sensor)[0]  # type: ignore[assignment]
+            values[p.name] = p.choices[sensor][0]  # type: ignore[assignment]
         else:
             values[p.name] = 3.0 if p.located else size * max(p.low, 1e-6)
     return values
@@ -115,7 +125,7 @@ def test_sensitivity_is_the_slope_of_the_exact_term(effect: Effect, sensor: Targ
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)
 def test_nothing_departs_at_zero(effect: Effect, sensor: Target) -> None:
-    if effect.kind == "discrete" or effect.name in {"noise_understated", "heavy_tails"}:
+    if effect.kind == "discrete" or effect.opens in OWN:
         return  # a convention has no zero; a factor's neutral value is 1, tails' is infinity
     state = rows()
     values = dict(values_of(effect, sensor))
@@ -155,8 +165,8 @@ def neutral(effect: Effect, size: float) -> dict[str, float]:
     return {}
 
 
-FACTORS = ("noise_understated", "heavy_tails")  # they change a sensor's own noise
-STOCHASTIC = [(e, s) for e, s in PAIRS if e.kind == "stochastic" and e.name not in FACTORS]
+OWN = ("factor", "tails")  # they change a sensor's own noise
+STOCHASTIC = [(e, s) for e, s in PAIRS if e.kind == "stochastic" and e.opens not in OWN]
 
 
 @pytest.mark.parametrize(("effect", "sensor"), STOCHASTIC, ids=lambda x: getattr(x, "name", x))
@@ -174,8 +184,8 @@ def test_what_is_drawn_has_the_stated_variance(effect: Effect, sensor: Target) -
     if effect.spread is not None:
         expected = (effect.spread(state, kept, sensor) ** 2).sum(axis=2)
     else:  # a process of std_m on each axis
-        axes = {"correlated_noise": (1.0, 1.0, 1.0), "height_drift": (0.0, 0.0, 1.0)}
-        expected = np.broadcast_to(np.square(axes[effect.name]) * kept["std_m"] ** 2, (ROWS, 3))
+        axes = {"slow": (1.0, 1.0, 1.0), "down": (0.0, 0.0, 1.0)}
+        expected = np.broadcast_to(np.square(axes[effect.opens]) * kept["std_m"] ** 2, (ROWS, 3))
     measured = sample.var(axis=0)
     assert np.all(np.abs(measured - expected) <= 5 * (2 / draws) ** 0.5 * expected + 1e-15)
 
@@ -205,3 +215,109 @@ def test_acoustic_effects_ask_for_acoustic_sensors() -> None:
     assert applies["sound_speed"](stage("mbes"), "ranging")
     assert not applies["turnaround_delay"](stage("mbes"), "ranging")
     assert not any(a(stage("lidar"), "ranging") for a in applies.values())
+
+
+@pytest.mark.parametrize("effect", registry().values(), ids=registry())
+def test_the_record_holds_what_a_diagnosis_needs(effect: Effect) -> None:
+    """What a stochastic effect sets free is what its covariance is; a discrete one is undone."""
+    assert (effect.opens != "") == (effect.kind == "stochastic")
+    assert (effect.undoing is not None) == (effect.kind == "discrete")
+    assert 0 < effect.rarity <= SELDOM
+    if effect.opens:
+        assert len(effect.parameters) == OPENED[effect.opens]
+    assert (effect.spread is not None) == (effect.opens == "size")
+
+
+def test_no_two_effects_are_equally_common() -> None:
+    known = [e.rarity for e in registry().values() if e.rarity != SELDOM]
+    assert len(known) == len(set(known)) >= 14
+
+
+DISCRETE = [e for e in registry().values() if e.undoing is not None]
+
+
+@pytest.mark.parametrize("effect", DISCRETE, ids=lambda e: e.name)
+def test_what_is_undone_is_what_departed(effect: Effect) -> None:
+    """Columns that depart by the effect are the true ones again; angles but for whole turns."""
+    assert effect.undoing is not None
+    (parameter,) = effect.parameters
+    assert set(effect.undoing.tried) == set(effect.sensors)
+    assert effect.undoing.instead_of in {"", *registry()}
+    if effect.undoing.mend is None:
+        assert effect.sensors == ("position",)  # stamps of other sensors are not paired anew
+        assert all(abs(float(v)) <= parameter.high for v in effect.undoing.tried["position"])
+        return
+    state = rows()
+    antenna = np.einsum("nij,j->ni", state.rotation, state.antenna_m)
+    true = {
+        "position": state.position_m + antenna,
+        "attitude": state.euler_rad,
+        "ranging": np.stack([state.azimuth_rad, state.elevation_rad], axis=-1),
+    }
+    for sensor, values in effect.undoing.tried.items():
+        assert values == parameter.choices[sensor]
+        for value in values:
+            gone = effect.depart(state, {parameter.name: value}, sensor, None)  # type: ignore[dict-item]
+            bearing = np.stack(np.broadcast_arrays(gone.azimuth_rad, gone.elevation_rad), axis=-1)
+            shifts = {
+                "position": gone.position_m, "attitude": gone.attitude_euler_rad,
+                "ranging": bearing,
+            }  # fmt: skip
+            found = effect.undoing.mend(true[sensor] + shifts[sensor], sensor, str(value))
+            off = found - true[sensor]
+            if sensor != "position":
+                off = np.angle(np.exp(1j * off))
+            assert np.abs(off).max() < 1e-9, (sensor, value)
+
+
+# Words of the model, of the paper and of the spec that are an effect's name as well.
+OTHER_MEANING = {"lever_arm"}
+
+
+def test_no_other_file_names_an_effect() -> None:
+    """What others need of an effect is in its record: adding one touches its file alone."""
+    package = Path(next(iter(effects_package.__path__))).parent
+    named = []
+    for path in sorted(package.rglob("*.py")):
+        if path.parent.name == "effects":
+            continue
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Constant) and node.value in registry():
+                named.append((path.name, node.lineno, node.value))
+            module = node.module if isinstance(node, ast.ImportFrom) else None
+            if module and module.rpartition(".")[2] in registry():
+                named.append((path.name, node.lineno, module))
+    assert [entry for entry in named if entry[2] not in OTHER_MEANING] == []
+
+
+@pytest.fixture
+def twin(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
+    """One more effect: a file beside the others, and nothing else."""
+    name = "late_report"
+    own = Path(next(iter(effects_package.__path__))) / "latency.py"
+    text = own.read_text(encoding="utf-8").replace('name="latency"', f'name="{name}"')
+    (tmp_path / f"{name}.py").write_text(text.replace("latency_s", "age_s"), encoding="utf-8")
+    monkeypatch.setattr(effects_package, "__path__", [*effects_package.__path__, str(tmp_path)])
+    registry.cache_clear()
+    yield name
+    monkeypatch.undo()
+    sys.modules.pop(f"{effects_package.__name__}.{name}", None)
+    registry.cache_clear()
+
+
+def test_a_new_effect_is_a_new_file(twin: str, tmp_path: Path) -> None:
+    """It is read in a spec, charged, simulated, found in a log and written back."""
+    log = make_log(
+        scenario("multirotor_lines", 31, 60.0, 5.0), (hidden("latency", "position", latency_s=0.1),)
+    )
+    spec, data = tmp_path / "spec.yaml", log.to_csv(tmp_path / "log.csv")
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    others = tuple(name for name in registry() if name not in (twin, "lever_arm"))
+    found = diagnose(spec, [data], DiagnosisSettings(exclude_effects=others))
+    assert [f.effect for f in found.findings] == [twin]
+    assert found.findings[0].parameters["age_s"].value == pytest.approx(0.1, abs=0.01)
+    means = meaning(load(spec), found.effects_entries())
+    assert means is not None
+    for figure in means.design.figures:
+        assert (figure.after_m or 0.0) > 2.0 * (figure.before_m or 0.0), figure
+    assert f"effect: {twin}" in means.spec_text

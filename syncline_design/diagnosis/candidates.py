@@ -16,26 +16,6 @@ STEP_TIMES = 24  # places along the log where a step is looked for at first
 EDGE = 0.15  # share of the rows at either end where a step is not looked for: it would be a latency
 
 
-# Where two effects fit equally well, the one that is met more often is named and the other listed
-# as its alias.  The order is ours, by judgement.
-COMMONEST = (
-    "latency",
-    "lever_arm",
-    "boresight",
-    "range_bias",
-    "heading_bias",
-    "datum_offset",
-    "range_scale",
-    "mounting",
-    "azimuth_bias",
-    "elevation_bias",
-    "sound_speed",
-    "turnaround_delay",
-    "timestamp_jitter",
-    "noise_understated",
-)
-
-
 @dataclass(frozen=True, slots=True)
 class Candidate:
     """An effect at one place of the system."""
@@ -113,10 +93,9 @@ def _is_noise_of_heading(view: Scene, effect: Effect, index: int) -> bool:
 
 
 def commonness(label: tuple[str, str, int]) -> tuple[int, int]:
-    """Place among the commonest; sensors in the order position, attitude, ranging, target."""
+    """How seldom it is met; sensors in the order position, attitude, ranging, target."""
     name, sensor, _ = label
-    place = COMMONEST.index(name) if name in COMMONEST else len(COMMONEST)
-    return place, ("position", "attitude", "ranging", "target").index(sensor)
+    return registry()[name].rarity, ("position", "attitude", "ranging", "target").index(sensor)
 
 
 def zero_values(effect: Effect, at: dict[str, float] | None = None) -> dict[str, float]:

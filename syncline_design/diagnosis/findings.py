@@ -129,37 +129,34 @@ def _stochastic(final: Settled, opened: Opened) -> Finding:
     data, model = final.data, final.model
     effect, label = opened.candidate.effect, opened.candidate.label
     stage = data.view.system.stages[label[2]]
-    units = {p.name: p.unit for p in effect.parameters}
     sensor = (stage.name, label[1])
     mean = next((k for k, a in enumerate(model.acting) if a.label == label), None)
     if mean is not None:
         at = sum(len(a.effect.slopes()) for a in model.acting[:mean])
-        name = effect.parameters[0].name
         spread = float(np.sqrt(max(model.covariance[at, at], 0.0)))
-        figures = {name: (float(model.acting[mean].values[name]), spread)}
+        figures = [(float(model.acting[mean].values[effect.parameters[0].name]), spread)]
     elif opened.what == "size":
         value = model.level.size[opened.directed]
-        spread = value * _log_spread(data, model, ("size", opened.directed, 0))
-        figures = {effect.parameters[0].name: (value, spread)}
+        figures = [(value, value * _log_spread(data, model, ("size", opened.directed, 0)))]
     elif opened.what == "tails":
         found = tails_in(data, model)
-        figures = {
-            "degrees_of_freedom": (found.degrees_of_freedom, found.freedom_uncertainty),
-            "outlier_rate": (found.outlier_rate, math.inf),
-        }
+        freedom = (found.degrees_of_freedom, found.freedom_uncertainty)
+        figures = [freedom, (found.outlier_rate, math.inf)]
     elif opened.what == "factor":
         index = [w.sensor for w in data.structure.white].index(sensor)
         value = model.level.factor[index]
-        figures = {"factor": (value, value * _log_spread(data, model, ("factor", index, 0)))}
+        figures = [(value, value * _log_spread(data, model, ("factor", index, 0)))]
     else:
         figures = _wander(data, model, sensor, opened.what)
-    shown = {name: estimate(v, s, units[name]) for name, (v, s) in figures.items()}
+    shown = {
+        p.name: estimate(v, s, p.unit) for p, (v, s) in zip(effect.parameters, figures, strict=True)
+    }
     return _finding(final, effect, label, shown)
 
 
 def _wander(
     data: Data, model: Model, sensor: tuple[str, str], what: str
-) -> dict[str, tuple[float, float]]:
+) -> list[tuple[float, float]]:
     """Standard deviation [m] (root mean square over the axes it is on) and time constant [s]."""
     index = [s.sensor for s in data.structure.slow].index(sensor)
     axes = [2] if what == "down" else [0, 1, 2]
@@ -170,10 +167,10 @@ def _wander(
     size = float(np.sqrt(np.mean(np.square(parts))))
     spreads = [0.5 * _log_spread(data, model, ("slow", index, k)) for k in axes]
     time_s = model.level.time_constant_s[index][axes[0]]
-    return {
-        "std_m": (size, size * float(np.mean(spreads)) / math.sqrt(len(axes))),
-        "time_constant_s": (time_s, time_s * _log_spread(data, model, ("time", index, axes[0]))),
-    }
+    return [
+        (size, size * float(np.mean(spreads)) / math.sqrt(len(axes))),
+        (time_s, time_s * _log_spread(data, model, ("time", index, axes[0]))),
+    ]
 
 
 def _log_spread(data: Data, model: Model, where: tuple[str, int, int]) -> float:

@@ -6,20 +6,18 @@ size of the error falls to a third or less and was far from noise before.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from syncline_design.diagnosis.scene import Acting, Scene, acting, scene
+from syncline_design.diagnosis.scene import Acting, Scene, scene
 from syncline_design.effects import registry
-from syncline_design.effects.frame_convention import conventions
-from syncline_design.effects.record import Array, Target
-from syncline_design.logs.log import GAP_FACTOR, Log, StageLog, Track
+from syncline_design.effects.record import Array, Effect
+from syncline_design.logs.log import GAP_FACTOR, Log, Track
 from syncline_design.logs.merging import hermite
 from syncline_design.logs.stamps import per_stamp
 from syncline_design.model.system import System
-from syncline_design.simulation.chain import euler_to_rotation, rotation_to_euler
 
 FALLS_TO = 1.0 / 3.0
 FAR_FROM_NOISE = 4.0  # times the expected size
@@ -29,9 +27,6 @@ LEAST_LEFT = 10  # rows
 WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
 SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of seconds
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
-SECONDS = tuple(k for k in range(-18, 19) if k)
-DEGREE = np.pi / 180.0
-
 
 Reread = Callable[[float], Log]
 
@@ -44,17 +39,31 @@ class Gross:
     falls_by: float  # usual size of the error before over after
 
 
-def undone(log: Log, sensor: Target, stage: int, convention: str) -> Log:
+def undone(log: Log, one: Acting) -> Log:
     """The log with a sensor's columns brought back to the package's conventions."""
-    old = log.stages[stage]
-    if sensor == "position" and old.antenna_m is not None:
-        new = replace(old, antenna_m=_position(old.antenna_m, convention))
-    elif sensor == "attitude":
-        new = replace(old, euler_rad=_attitude(old.euler_rad, convention))
+    undoing = one.effect.undoing
+    assert undoing is not None
+    assert undoing.mend is not None
+    old, convention = log.stages[one.stage], str(_value(one))
+    if one.sensor == "position":
+        if old.antenna_m is None:  # a later stage's place is the stage before's reading
+            return log
+        new = replace(old, antenna_m=undoing.mend(old.antenna_m, one.sensor, convention))
+    elif one.sensor == "attitude":
+        new = replace(old, euler_rad=undoing.mend(old.euler_rad, one.sensor, convention))
     else:
-        new = _ranging(old, convention)
-    stages = tuple(new if k == stage else s for k, s in enumerate(log.stages))
+        assert old.azimuth_rad is not None
+        assert old.elevation_rad is not None
+        held = np.stack([old.azimuth_rad, old.elevation_rad], axis=-1)
+        azimuth, elevation = undoing.mend(held, one.sensor, convention).T
+        new = replace(old, azimuth_rad=azimuth, elevation_rad=elevation)
+    stages = tuple(new if k == one.stage else s for k, s in enumerate(log.stages))
     return replace(log, stages=stages)
+
+
+def _value(one: Acting) -> str | float:
+    """The value of a discrete effect's one parameter."""
+    return one.values[one.effect.parameters[0].name]
 
 
 def unslipped(log: Log, seconds: float) -> Log:
@@ -90,42 +99,15 @@ def unslipped(log: Log, seconds: float) -> Log:
 
 def mended(log: Log, one: Acting, reread: Reread | None = None) -> Log:
     """The log with one gross fault undone."""
-    if one.effect.name == "integer_second_slip":
-        seconds = float(one.values["seconds"])
-        return unslipped(log, seconds) if reread is None else reread(seconds)
-    return undone(log, one.sensor, one.stage, str(one.values["convention"]))
+    if not _restamps(one):
+        return undone(log, one)
+    seconds = float(_value(one))
+    return unslipped(log, seconds) if reread is None else reread(seconds)
 
 
-def _position(antenna: Array, convention: str) -> Array:
-    flipped: Array = antenna * np.array([1.0, 1.0, -1.0])
-    return flipped[:, [1, 0, 2]] if convention == "enu" else flipped
-
-
-def _attitude(euler: Array, convention: str) -> Array:
-    roll, pitch, yaw = euler.T
-    if convention == "transposed":
-        return rotation_to_euler(np.swapaxes(euler_to_rotation(euler), 1, 2))
-    columns = {
-        "yaw_sign": (roll, pitch, -yaw),
-        "yaw_180": (roll, pitch, yaw - np.pi),
-        "enu": (roll, -pitch, 0.5 * np.pi - yaw),
-        "radians": (roll / DEGREE, pitch / DEGREE, yaw / DEGREE),
-        "degrees": (roll * DEGREE, pitch * DEGREE, yaw * DEGREE),
-    }[convention]
-    wrapped: Array = np.stack(columns, axis=-1)
-    return wrapped
-
-
-def _ranging(stage: StageLog, convention: str) -> StageLog:
-    azimuth, elevation = stage.azimuth_rad, stage.elevation_rad
-    assert azimuth is not None
-    assert elevation is not None
-    if convention == "azimuth_sign":
-        return replace(stage, azimuth_rad=-azimuth)
-    if convention == "elevation_sign":
-        return replace(stage, elevation_rad=-elevation)
-    factor = 1.0 / DEGREE if convention == "radians" else DEGREE
-    return replace(stage, azimuth_rad=azimuth * factor, elevation_rad=elevation * factor)
+def _restamps(one: Acting) -> bool:
+    """Whether it is undone by pairing rows anew, not by mending columns."""
+    return one.effect.undoing is not None and one.effect.undoing.mend is None
 
 
 def gross_faults(
@@ -162,18 +144,29 @@ def gross_faults(
 
 
 def _is_short_slip(one: Acting) -> bool:
-    return (
-        one.effect.name == "integer_second_slip" and abs(float(one.values["seconds"])) <= SHORT_SLIP
-    )
+    return _restamps(one) and abs(float(_value(one))) <= SHORT_SLIP
 
 
-def whole_seconds(latency_s: float, uncertainty_s: float) -> Acting | None:
+def whole_seconds(found: Acting, uncertainty: float) -> Acting | None:
     """The slip that a position latency of whole seconds is: two time scales, in practice."""
-    seconds = float(round(latency_s))
-    near = abs(latency_s - seconds) < max(3.0 * uncertainty_s, WHOLE_S)
-    if not seconds or not near:
+    slip = _instead_of(found)
+    if slip is None:
         return None
-    return acting("integer_second_slip", "position", 0, {"seconds": seconds})
+    value = float(_value(found))
+    whole = float(round(value))
+    if not whole or not abs(value - whole) < max(3.0 * uncertainty, WHOLE_S):
+        return None
+    return Acting(slip, found.sensor, found.stage, {slip.parameters[0].name: whole})
+
+
+def _instead_of(found: Acting) -> Effect | None:
+    """The discrete effect that a fitted one is at some of its values."""
+    for effect in registry().values():
+        undoing = effect.undoing
+        named = undoing is not None and undoing.instead_of == found.effect.name
+        if undoing is not None and named and found.sensor in undoing.tried:
+            return effect
+    return None
 
 
 Trials = list[tuple[Acting, Callable[[], Array]]]
@@ -187,34 +180,31 @@ def _trials(
     exclude: Sequence[str],
 ) -> Trials:
     """Every gross fault with a function that re-simulates the log under it."""
-    trials: Trials = []
+    faults = [e for e in registry().values() if e.undoing is not None and e.name not in exclude]
+    return [
+        (one, _resimulated(system, base, one))
+        for effect in faults
+        for one in _tried(system, log, effect)
+        if one.label not in taken
+    ]
+
+
+def _tried(system: System, log: Log, effect: Effect) -> Iterator[Acting]:
+    """A discrete effect with every value, at every sensor that a log of this kind holds."""
+    assert effect.undoing is not None
+    name = effect.parameters[0].name
     for k, stage in enumerate(system.stages):
-        sensors = (
-            ("position",) if log.kind == "position" else registry()["frame_convention"].sensors
-        )
-        for sensor in sensors:
-            if getattr(stage, sensor) is None:
-                continue
-            for convention in conventions(sensor):
-                values: dict[str, float] = {"convention": convention}  # type: ignore[dict-item]
-                one = acting("frame_convention", sensor, k, values)
-                if one.label not in taken:
-                    trials.append((one, _reread(system, base, sensor, k, convention)))
-    if ("integer_second_slip", "position", 0) not in taken:
-        for seconds in SECONDS:
-            one = acting("integer_second_slip", "position", 0, {"seconds": float(seconds)})
-            trials.append((one, _slipped(base, one)))
-    return [trial for trial in trials if trial[0].effect.name not in exclude]
+        for sensor, values in effect.undoing.tried.items():
+            held = log.kind != "position" or sensor == "position"
+            if held and effect.applies(stage, sensor):
+                # a convention's value is its name
+                yield from (Acting(effect, sensor, k, {name: v}) for v in values)  # type: ignore[dict-item]
 
 
-def _reread(
-    system: System, base: Scene, sensor: Target, stage: int, convention: str
-) -> Callable[[], Array]:
-    return lambda: scene(system, undone(base.log, sensor, stage, convention), base.known).error()
-
-
-def _slipped(base: Scene, one: Acting) -> Callable[[], Array]:
-    return lambda: base.error((one,))
+def _resimulated(system: System, base: Scene, one: Acting) -> Callable[[], Array]:
+    if _restamps(one):
+        return lambda: base.error((one,))
+    return lambda: scene(system, undone(base.log, one), base.known).error()
 
 
 def usual_size(error: Array) -> float:

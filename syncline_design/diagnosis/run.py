@@ -153,9 +153,11 @@ def _slip(result: SearchResult) -> Acting | None:
     """A position latency of whole seconds: the rows are paired anew, which is more exact."""
     at = 0
     for one in result.model.acting:
-        if one.label == ("latency", "position", 0):
+        if one.effect.slopes():
             spread = float(np.sqrt(max(result.model.covariance[at, at], 0.0)))
-            return whole_seconds(float(one.values["latency_s"]), spread)
+            slip = whole_seconds(one, spread)
+            if slip is not None:
+                return slip
         at += len(one.effect.slopes())
     return None
 

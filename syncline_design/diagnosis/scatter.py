@@ -38,32 +38,27 @@ def scatter_candidates(
 
 def _free_already(candidate: Candidate, model: Model) -> bool:
     """Whether the noise that an effect would free is free: heavy tails free their sensor's size."""
-    name, sensor, stage = candidate.label
-    return name == "noise_understated" and ("heavy_tails", sensor, stage) in model.labels
+    free = {(o.candidate.sensor, o.candidate.stage) for o in model.opened if o.what == "tails"}
+    return candidate.effect.opens == "factor" and (candidate.sensor, candidate.stage) in free
 
 
 def _put_in(data: Data, candidate: Candidate, model: Model) -> list[tuple[Opened, NoiseLevel]]:
     """Noise levels with a moderate, then a large share of a stochastic effect."""
-    level, name = model.level, candidate.effect.name
+    level, what = model.level, candidate.effect.opens
     sensor = (data.view.system.stages[candidate.stage].name, candidate.sensor)
-    if name == "noise_understated":
-        return [
-            (Opened(candidate, "factor"), _times_factor(data, level, sensor, k))
-            for k in (1.15, 2.0)
-        ]
-    if name in ("correlated_noise", "height_drift"):
-        what = "slow" if name == "correlated_noise" else "down"
-        return [
-            (Opened(candidate, what), _times_slow(data, level, sensor, what, k)) for k in (1.5, 6.0)
-        ]
-    if name == "timestamp_jitter":
-        index = directed_index(data, candidate)
-        unit = usual_noise_size(data, index)
-        return [
-            (Opened(candidate, "size", index), with_size(level, index, k * unit))
-            for k in (0.3, 1.0)
-        ]
-    return []
+    match what:
+        case "factor":
+            levels = [_times_factor(data, level, sensor, k) for k in (1.15, 2.0)]
+        case "slow" | "down":
+            levels = [_times_slow(data, level, sensor, what, k) for k in (1.5, 6.0)]
+        case "size":
+            index = directed_index(data, candidate)
+            unit = usual_noise_size(data, index)
+            sized = [with_size(level, index, k * unit) for k in (0.3, 1.0)]
+            return [(Opened(candidate, what, index), one) for one in sized]
+        case _:
+            return []
+    return [(Opened(candidate, what), one) for one in levels]
 
 
 def _times_factor(data: Data, level: NoiseLevel, sensor: tuple[str, str], by: float) -> NoiseLevel:

@@ -16,12 +16,12 @@ import numpy as np
 
 from syncline_design.diagnosis.trajectory import LoggedMotion, pieces
 from syncline_design.effects import registry
-from syncline_design.effects.kinematics import bearing, rotate
+from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, Departures, Effect, StageRows, Target
 from syncline_design.logs.log import Log, Rows, StageLog, Track
 from syncline_design.model import timing
 from syncline_design.model.system import Sensor, Stage, System
-from syncline_design.simulation.chain import euler_to_rotation, rotation_exp
+from syncline_design.simulation.chain import rotation_exp
 
 NO_LEVER = (0.0, 0.0, 0.0)
 

@@ -41,7 +41,6 @@ TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted
 WITHIN_NATS, WITHIN_SHARE = 12.0, 0.35  # how far behind the best a candidate may be to be fitted
 MEAN_SHARE = 0.6  # of the false-alarm rate for effects that move the mean
-WANDERING = frozenset({"correlated_noise", "height_drift"})
 WANDER_NATS = (
     15.0  # slow noise can take the shape of anything slow, so it has to be that much better
 )
@@ -187,12 +186,11 @@ class Search:
 
     def tails_trial(self, understated: Trial) -> list[Trial]:
         """Heavy tails, where the scatter is too large and Student's t describes it much better."""
-        name, sensor, _ = understated.candidate.label
-        tails = [c for c in self.candidates if c.effect.name == "heavy_tails"]
-        if (name, sensor) != ("noise_understated", "position") or not tails:
-            return []
-        model = understated.model
-        if tails[0].label in model.labels:
+        one, model = understated.candidate, understated.model
+        own = (one.sensor, one.stage)
+        tails = [c for c in self.candidates
+                 if c.effect.opens == "tails" and (c.sensor, c.stage) == own]  # fmt: skip
+        if one.effect.opens != "factor" or not tails or tails[0].label in model.labels:
             return []
         gain = tails_in(self.data, model).gain
         if gain < TAILS_NATS:
@@ -242,7 +240,7 @@ def preferred(trials: Sequence[Trial]) -> Trial | None:
     """The least likely by chance; among those that are as good, the commonest in practice."""
     if not trials:
         return None
-    lasting = [t for t in trials if t.candidate.effect.name not in WANDERING]
+    lasting = [t for t in trials if not t.candidate.effect.wanders]
     least = min(t.log_p for t in trials)
     if lasting and min(t.log_p for t in lasting) <= least + WANDER_NATS:
         trials, least = lasting, min(t.log_p for t in lasting)

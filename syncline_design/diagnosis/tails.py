@@ -10,8 +10,7 @@ import numpy as np
 from syncline_design.diagnosis.axes import Axes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import NoiseLevel, Structure, white_covariance
-from syncline_design.effects.heavy_tails import OUTLIER_FACTOR
-from syncline_design.effects.record import Array
+from syncline_design.effects.record import OUTLIER_FACTOR, Array
 
 FREEDOMS = np.geomspace(1.2, 30.0, 25)
 FAR = 5.0  # core standard deviations beyond which a row is taken for an outlier at first

@@ -49,4 +49,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=None,
     contribute=_contribute,
+    opens="slow",
 )

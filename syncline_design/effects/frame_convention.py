@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from syncline_design.effects.kinematics import rotate
+from syncline_design.effects.kinematics import euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import (
     Array,
     Basis,
@@ -18,6 +18,7 @@ from syncline_design.effects.record import (
     Rng,
     StageRows,
     Target,
+    Undoing,
     Values,
 )
 from syncline_design.model.system import Stage
@@ -66,17 +67,10 @@ def _attitude(rows: StageRows, convention: str) -> Departures:
     elif convention == "enu":
         held = np.stack([roll, -pitch, 0.5 * math.pi - yaw], axis=-1)
     elif convention == "transposed":
-        held = _euler(np.swapaxes(rows.rotation, 1, 2))
+        held = rotation_to_euler(np.swapaxes(rows.rotation, 1, 2))
     else:
         held = rows.euler_rad * _UNIT[convention]
     return Departures(attitude_euler_rad=held - rows.euler_rad)
-
-
-def _euler(rotation: Array) -> Array:
-    """Roll, pitch, yaw of R, (n, 3, 3) -> (n, 3)."""
-    pitch = -np.arcsin(np.clip(rotation[:, 2, 0], -1.0, 1.0))
-    roll = np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2])
-    return np.stack([roll, pitch, np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0])], axis=-1)
 
 
 def _ranging(rows: StageRows, convention: str) -> Departures:
@@ -90,6 +84,43 @@ def _ranging(rows: StageRows, convention: str) -> Departures:
 
 
 _UNIT = {"radians": math.pi / 180.0, "degrees": 180.0 / math.pi}
+
+
+def _mended(columns: Array, sensor: Target, convention: str) -> Array:
+    """The columns of a sensor brought back to the package's conventions."""
+    if sensor == "position":
+        flipped: Array = columns * np.array([1.0, 1.0, -1.0])
+        return flipped[:, [1, 0, 2]] if convention == "enu" else flipped
+    if sensor == "attitude":
+        return _mended_euler(columns, convention)
+    return _mended_bearing(columns, convention)
+
+
+def _mended_euler(euler: Array, convention: str) -> Array:
+    roll, pitch, yaw = euler.T
+    degree = _UNIT["radians"]
+    if convention == "transposed":
+        return rotation_to_euler(np.swapaxes(euler_to_rotation(euler), 1, 2))
+    columns = {
+        "yaw_sign": (roll, pitch, -yaw),
+        "yaw_180": (roll, pitch, yaw - math.pi),
+        "enu": (roll, -pitch, 0.5 * math.pi - yaw),
+        "radians": (roll / degree, pitch / degree, yaw / degree),
+        "degrees": (roll * degree, pitch * degree, yaw * degree),
+    }[convention]
+    return np.stack(columns, axis=-1)
+
+
+def _mended_bearing(bearing: Array, convention: str) -> Array:
+    degree = _UNIT["radians"]
+    factors = {
+        "azimuth_sign": (-1.0, 1.0),
+        "elevation_sign": (1.0, -1.0),
+        "radians": (1.0 / degree, 1.0 / degree),
+        "degrees": (degree, degree),
+    }
+    mended: Array = bearing * np.array(factors[convention])
+    return mended
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
@@ -118,4 +149,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=None,
     contribute=_contribute,
+    undoing=Undoing(CHOICES, _mended),
 )

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from syncline_design.effects.record import (
+    OUTLIER_FACTOR,
     Basis,
     Contribution,
     Departures,
@@ -18,8 +19,6 @@ from syncline_design.effects.record import (
     Values,
 )
 from syncline_design.model.system import Stage
-
-OUTLIER_FACTOR = 10.0  # an outlier's standard deviation over the spec's
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Departures:
@@ -80,4 +79,5 @@ EFFECT = Effect(
     sensitivity=None,
     contribute=_contribute,
     unbudgeted=_unbudgeted,
+    opens="tails",
 )

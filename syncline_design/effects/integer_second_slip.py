@@ -12,9 +12,12 @@ from syncline_design.effects.record import (
     Rng,
     StageRows,
     Target,
+    Undoing,
     Values,
 )
 from syncline_design.model.system import Stage
+
+MOST_S = 18  # GPS time less UTC
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
@@ -31,7 +34,7 @@ EFFECT = Effect(
     name="integer_second_slip",
     sensors=("position",),
     kind="discrete",
-    parameters=(Parameter("seconds", 1.0, 18.0, "s", whole=True),),
+    parameters=(Parameter("seconds", 1.0, float(MOST_S), "s", whole=True),),
     sentence="the position stamps are ahead by {seconds}, whole seconds",
     confused_with="a latency of the same size",
     separated_by="nothing needs to: a whole number of seconds is a matter of time scales",
@@ -39,4 +42,8 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=None,
     contribute=_contribute,
+    undoing=Undoing(
+        tried={"position": tuple(float(s) for s in range(-MOST_S, MOST_S + 1) if s)},
+        instead_of="latency",
+    ),
 )

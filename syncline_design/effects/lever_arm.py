@@ -56,4 +56,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     transponder=True,
+    rarity=20,
 )

@@ -56,4 +56,6 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=None,
     contribute=_contribute,
+    rarity=140,
+    opens="factor",
 )

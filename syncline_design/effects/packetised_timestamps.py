@@ -56,4 +56,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     spread=_spread,
+    opens="size",
 )

@@ -230,6 +230,29 @@ def everywhere(stage: Stage, sensor: Target) -> bool:
     return sensor == "target" or getattr(stage, sensor) is not None
 
 
+Opening = Literal["", "factor", "slow", "down", "size", "tails"]
+# Figures that each opening fits, in the order of the effect's parameters.
+OPENED: Mapping[Opening, int] = {"factor": 1, "slow": 2, "down": 2, "size": 1, "tails": 2}
+OUTLIER_FACTOR = 10.0  # what opens tails has outliers of so many times the spec's deviation
+SELDOM = 1000
+
+
+@dataclass(frozen=True, slots=True)
+class Undoing:
+    """How a log is searched for a discrete effect, and freed of it.
+
+    tried: by sensor, the values of its one parameter, in this order.
+    mend: a sensor's columns as they should be, of the columns, the sensor and the value: antenna
+    in NED (n, 3), or roll, pitch, yaw (n, 3), or azimuth, elevation (n, 2); None: the positions'
+    stamps are ahead by the value [s], and rows are paired anew.
+    instead_of: the effect that at such a value is this one, a latency of whole seconds.
+    """
+
+    tried: Mapping[Target, tuple[str | float, ...]]
+    mend: Callable[[Array, Target, str], Array] | None = None
+    instead_of: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class Effect:
     """One physical effect.
@@ -249,6 +272,12 @@ class Effect:
     unbudgeted: why the Syncline cannot charge it with these values, and the way out; "" if it can.
     by_heading: its size follows the heading; a log shows it only where the heading varies by far
     more than its own noise, which otherwise passes for it (errors in variables).
+    rarity: where two effects fit a log equally well, the one that is met more often is named, the
+    one of the lower figure, and the other listed as its alias; the order is ours, by judgement.
+    opens: which of a log's noise a stochastic one sets free: the "factor" of its sensor, the "slow"
+    noise of its sensor or its "down" part alone, the "size" of its own scatter, the "tails".
+    undoing: a discrete one's.
+    bounded_by_k: charged with k times its standard deviation, k the coverage factor.
     sentence: for people, a format string over {sensor} and the parameters.
     """
 
@@ -270,6 +299,15 @@ class Effect:
     accelerated: bool = False
     unbudgeted: Unbudgeted = always_budgeted
     by_heading: bool = False
+    rarity: int = SELDOM
+    opens: Opening = ""
+    undoing: Undoing | None = None
+    bounded_by_k: bool = False
+
+    @property
+    def wanders(self) -> bool:
+        """Whether it is noise that is correlated in time."""
+        return self.opens in ("slow", "down")
 
     def misfits(self, sensor: str, values: Mapping[str, float | str]) -> Iterator[Misfit]:
         """Why the effect cannot act so on a sensor, with these parameters."""

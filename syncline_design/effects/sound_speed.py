@@ -83,4 +83,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     applies=_applies,
+    rarity=110,
 )

@@ -48,4 +48,7 @@ EFFECT = Effect(
     sensitivity=None,
     contribute=_contribute,
     spread=_spread,
+    rarity=130,
+    opens="size",
+    bounded_by_k=True,
 )

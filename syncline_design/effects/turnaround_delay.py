@@ -53,4 +53,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     applies=_applies,
+    rarity=120,
 )

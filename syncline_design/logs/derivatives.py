@@ -6,10 +6,10 @@ import itertools
 
 import numpy as np
 
+from syncline_design.effects.kinematics import euler_to_rotation
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.logs.stamps import Index, groups, per_stamp, starts
-from syncline_design.simulation.chain import euler_to_rotation
 
 WINDOW_S = 1.0  # a parabola is fitted over this long, or five stamps
 LEAST_WINDOW = 5

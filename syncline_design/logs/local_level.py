@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import ATTITUDE, TIME, VELOCITY
 from syncline_design.logs.log import Track
-from syncline_design.simulation.chain import euler_to_rotation, rotation_to_euler
 
 WORTH_SAYING_RAD = np.radians(0.001)
 

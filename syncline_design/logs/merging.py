@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import (
     ATTITUDE,
@@ -25,7 +26,6 @@ from syncline_design.logs.log import Track
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.tables import Table
 from syncline_design.logs.twins import one_a_stamp, without_twins
-from syncline_design.simulation.chain import euler_to_rotation, rotation_to_euler
 
 Index = NDArray[np.intp]
 TURNING = ("yaw_rad", "azimuth_rad", "longitude_rad")  # where 180 deg and -180 deg are neighbours

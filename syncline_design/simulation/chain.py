@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from syncline_design.effects.kinematics import bearing, rotate
+from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import NOTHING, Array, Departures, StageRows
 
 
@@ -81,31 +81,6 @@ class ConstantTwist:
     def rotation(self, shift_s: Array) -> Array:
         turned: Array = self.attitude @ rotation_exp(self.rate_radps * shift_s[:, None])
         return turned
-
-
-def euler_to_rotation(euler_rad: Array) -> Array:
-    """R_nb of (roll, pitch, yaw), (n, 3) -> (n, 3, 3); the paper's eq. R_nb."""
-    (sr, sp, sy), (cr, cp, cy) = np.sin(euler_rad).T, np.cos(euler_rad).T
-    rows = [
-        [cp * cy, -cr * sy + sr * sp * cy, sr * sy + cr * sp * cy],
-        [cp * sy, cr * cy + sr * sp * sy, -sr * cy + cr * sp * sy],
-        [-sp, sr * cp, cr * cp],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
-
-
-def rotation_to_euler(rotation: Array) -> Array:
-    """(roll, pitch, yaw) of R_nb, (n, 3, 3) -> (n, 3); at gimbal lock roll is taken as 0."""
-    sp = np.clip(-rotation[:, 2, 0], -1.0, 1.0)
-    cp = np.hypot(rotation[:, 2, 1], rotation[:, 2, 2])
-    locked = cp < 1e-9
-    roll = np.where(locked, 0.0, np.arctan2(rotation[:, 2, 1], rotation[:, 2, 2]))
-    yaw = np.where(
-        locked,
-        np.arctan2(-rotation[:, 0, 1], rotation[:, 1, 1]),
-        np.arctan2(rotation[:, 1, 0], rotation[:, 0, 0]),
-    )
-    return np.stack([roll, np.arctan2(sp, cp), yaw], axis=-1)
 
 
 @dataclass(frozen=True, slots=True)

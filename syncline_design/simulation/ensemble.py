@@ -10,8 +10,6 @@ from syncline_design.model.system import System
 from syncline_design.simulation.draws import entering
 from syncline_design.simulation.results import Ensemble
 
-SLOW = ("correlated_noise", "height_drift")  # correlated in time: one stationary draw a sample
-
 
 def ensemble_of(
     system: System, envelope: str, of_a_file: bool = False, outside: tuple[str, ...] = ()
@@ -29,7 +27,7 @@ def ensemble_of(
             if of_a_file
             else _over_the_horizon(system, envelope)
         )
-    if any(one.effect.name in SLOW for one in acting):
+    if any(one.effect.wanders for one in acting):  # one stationary draw a sample
         drawn.append("slow noise, at its stationary size")
     constants = _constants(system)
     told = (

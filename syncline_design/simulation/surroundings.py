@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from syncline_design.effects.kinematics import bearing, rotate
+from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.model.horizon import Horizon
-from syncline_design.simulation.chain import ConstantTwist, Noise, euler_to_rotation
+from syncline_design.simulation.chain import ConstantTwist, Noise
 from syncline_design.simulation.draws import RandomSource, angle
 from syncline_design.simulation.kernel import Draw, noise_rows
 

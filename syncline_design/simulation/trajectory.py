@@ -23,16 +23,12 @@ from pathlib import Path
 import numpy as np
 
 from syncline_design.effects import acting as acting_effects
-from syncline_design.effects.kinematics import bearing, rotate
+from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.machine.input_files import FileContent, UnsuitableError, read_plain
 from syncline_design.model.system import Platform, SimulationError, Stage, System
 from syncline_design.simulation import known_effects
-from syncline_design.simulation.chain import (
-    Noise,
-    euler_to_rotation,
-    rotation_to_euler,
-)
+from syncline_design.simulation.chain import Noise
 from syncline_design.simulation.draws import (
     RandomSource,
     Shifts,

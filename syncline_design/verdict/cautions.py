@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 
+from syncline_design.effects import registry
 from syncline_design.model.budget import differs
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
@@ -126,7 +127,7 @@ def _coverage(verified: Verified) -> Iterator[Caution]:
     errors = [s.timing for stage in system.stages for s in stage.sensors()]
     errors += [offset for _, offset in system.clock_offsets]
     normal = any(isinstance(e.distribution, Normal) and e.distribution.std_s > 0.0 for e in errors)
-    jitter = any(entry.effect == "timestamp_jitter" for entry in system.effects)
+    jitter = any(registry()[entry.effect].bounded_by_k for entry in system.effects)
     k = system.coverage_factor
     if k < LEAST_COVERAGE and (normal or jitter):
         yield Caution(
