@@ -23,7 +23,7 @@ def main() -> None:
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if browser is None:
         raise SystemExit("no Chromium on this machine; the pictures stay as they are")
-    page = render_checks("html", [check_file(SPEC, CheckSettings()).to_json()])
+    page = render_checks("html", [check_file(SPEC, CheckSettings())])
     plot = re.search(r'<svg[^>]*"fig-syncline-title.*?</svg>', page, re.DOTALL)
     style = re.search(r"<style.*?</style>", page, re.DOTALL)
     if plot is None or style is None:

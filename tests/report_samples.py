@@ -1,19 +1,23 @@
-"""Hand-made verdicts for tests of the outputs; the figures follow from plain sums written here."""
+"""Verdicts made by hand for tests of the outputs; figures follow from plain sums written here."""
 
 from __future__ import annotations
 
+import collections.abc
 import copy
 import functools
 import itertools
 import math
+import types
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_args, get_origin, get_type_hints
 
+from syncline_design.machine.records import Record
 from syncline_design.paper.reproduce import Reproduction, reproduce
 from syncline_design.report.document import Document
 from syncline_design.report.on_simulation import on_simulation
 from syncline_design.simulation import Simulation, SimulationSettings, simulate
 from syncline_design.simulation.results import SpecName
+from syncline_design.verdict.tree import FileProblem, Refused, RequirementResult, Verdict
 from tests.simulation_systems import fixed_wing as fixed_wing_system
 
 HOSTILE = (
@@ -49,8 +53,8 @@ def role(sensor: str, name: str, primitive: str, tau: float, crit: float, error:
     }
 
 
-def fixed_wing() -> dict[str, Any]:
-    """One stage, everything present, meets."""
+def _fixed_wing() -> dict[str, Any]:
+    """Its plain data."""
     v, omega, d = 21.0, math.radians(77.9), 100.0
     rate = v + d * omega
     sigma_att = math.radians(math.hypot(0.008, 0.008, 0.03))
@@ -96,6 +100,7 @@ def fixed_wing() -> dict[str, Any]:
                 }
             ],
         },
+        "horizon": {"duration_s": 3600.0, "extent_m": 1000.0, "tilt_rad": math.radians(10.0)},
         "requirements": [
             requirement("ACC-1", "accuracy", total, 0.30, "m", 8),
             requirement("SYNC-1", "sync", 0.16, 1.0, "", 9),
@@ -131,20 +136,30 @@ def fixed_wing() -> dict[str, Any]:
         "assumptions": [
             {
                 "entry": "riegl_vux1uav",
+                "section": "sensors",
                 "figure": "cost",
                 "value": "30000 EUR",
                 "note": "no public price",
             },
         ],
         "sources": [
-            {"entry": "uav_fixed_wing", "source": "Jellum et al., arXiv:2209.01136v2, table 2"},
-            {"entry": "sbg_apogee", "source": "Jellum et al., arXiv:2209.01136v2, table 3"},
+            {
+                "entry": "uav_fixed_wing",
+                "section": "platforms",
+                "source": "Jellum et al., arXiv:2209.01136v2, table 2",
+            },
+            {
+                "entry": "sbg_apogee",
+                "section": "sensors",
+                "source": "Jellum et al., arXiv:2209.01136v2, table 3",
+            },
         ],
         "effects": [
             {
                 "effect": "latency",
                 "sensor": "position",
                 "stage": "uav",
+                "parameters": {"latency_s": 0.002},
                 "sentence": "The position data are 2 ms older than their stamp.",
             },
         ],
@@ -154,6 +169,7 @@ def fixed_wing() -> dict[str, Any]:
             "version": "0.1.0",
             "spec_sha256": "a" * 64,
             "catalogs_sha256": "b" * 64,
+            "files": [],
             "seed": 1,
             "python": "3.11.2",
             "numpy": "2.0.0",
@@ -186,12 +202,12 @@ def syncline_section(
     rate = v + d * omega
     sensor_error = sum(errors.values())
     terms = [
-        ("sigma_p", errors["position"], "sensor", "sigma_p"),
-        ("sigma_Theta*d", errors["attitude"], "sensor", "sigma_Theta d"),
-        ("sigma_r", 0.01, "sensor", "sigma_r"),
-        ("sigma_u*d", errors["ranging"] - 0.01, "sensor", "sigma_u d"),
-        ("v_max*tau", v * tau, "sync", "v_max tau"),
-        ("d*omega_max*tau", d * omega * tau, "sync", "d omega_max tau"),
+        ("sigma_p", errors["position"], "sensor"),
+        ("sigma_Theta*d", errors["attitude"], "sensor"),
+        ("sigma_r", 0.01, "sensor"),
+        ("sigma_u*d", errors["ranging"] - 0.01, "sensor"),
+        ("v_max*tau", v * tau, "sync"),
+        ("d*omega_max*tau", d * omega * tau, "sync"),
     ]
     total = sensor_error + rate * tau
     lever_rate = rate + omega
@@ -212,12 +228,14 @@ def syncline_section(
             "tau_crit_s": sensor_error / lever_rate,
             "total_m": sensor_error + lever_rate * tau,
             "sync_rate_mps": lever_rate,
+            "differs": False,
         },
         "stages": [
             {
                 "name": "uav",
                 "sensor_error_m": sensor_error,
                 "sync_rate_mps": rate,
+                "tau_s": tau,
                 "tau_crit_s": sensor_error / rate,
             }
         ],
@@ -227,10 +245,9 @@ def syncline_section(
                 "stage": "uav",
                 "value_m": value,
                 "kind": kind,
-                "symbol": symbol,
                 "share": value / total,
             }
-            for term, value, kind, symbol in terms
+            for term, value, kind in terms
         ],
     }
 
@@ -239,29 +256,42 @@ def monte_carlo_section(total: float) -> dict[str, Any]:
     edges = [0.005 * i for i in range(25)]
     middles = [0.5 * (a + b) for a, b in itertools.pairwise(edges)]
     density = [m * math.exp(-((m / 0.03) ** 2)) for m in middles]
-    grid = [
-        {
-            "tau_s": 10.0**e,
-            "worst_case_m": 0.094 + 140 * 10.0**e,
-            "syncline_m": 0.098 + 157 * 10.0**e,
-        }
-        for e in range(-7, 0)
-    ]
-    for point in grid:
-        point["ratio"] = point["worst_case_m"] / point["syncline_m"]
+    envelope = {"shift_s": 20e-6, "tilt_rad": math.radians(10.0), "sensors": "one sigma"}
+    worst = 0.97 * total
     return {
         "samples": 200_000,
         "seed": 1,
         "envelope": "limits",
+        "estimator": "plain",
+        "effective_samples": 200_000,
+        "confidence": 0.95,
+        "ensemble": {
+            "over": "over_missions",
+            "mission_constants": [],
+            "per_sample": ["noise"],
+            "outside": [],
+            "text": "every sample is a mission of its own",
+        },
         "quantiles": {
             "0.5": {"value_m": 0.031, "low_m": 0.0309, "high_m": 0.0311},
             "0.95": {"value_m": 0.071, "low_m": 0.0705, "high_m": 0.0714},
             "0.997": {"value_m": 0.094, "low_m": 0.093, "high_m": 0.0954},
         },
-        "probability_within_target": {"value": 1.0, "low": 0.99998, "high": 1.0},
-        "worst_case": {"value_m": 0.97 * total, "ratio_to_syncline": 0.97},
+        "probability_within_target": {"target_m": 0.30, "value": 1.0, "low": 0.99998, "high": 1.0},
+        "worst_case": {
+            "tau_s": 20e-6,
+            "value_m": worst,
+            "syncline_m": total,
+            "ratio_to_syncline": 0.97,
+            "bound_m": total,
+            "certificate": {
+                "gap": 0.03,
+                "triangle_m": total,
+                "envelope": envelope,
+                "text": "with every sensor at one sigma nothing exceeds the bound",
+            },
+        },
         "histogram": {"edges_m": edges, "density": density},
-        "grid": grid,
     }
 
 
@@ -320,22 +350,70 @@ def choice_section(total: float) -> dict[str, Any]:
     }
 
 
-def failing() -> dict[str, Any]:
+def typed(kind: Any, data: Any) -> Any:
+    """Plain data as the records of a type; a key too many or too few is an error."""
+    if data is None:
+        return None
+    if isinstance(kind, types.UnionType):
+        return typed(next(arg for arg in get_args(kind) if arg is not type(None)), data)
+    if get_origin(kind) is tuple:
+        return tuple(typed(get_args(kind)[0], entry) for entry in data)
+    if get_origin(kind) is collections.abc.Mapping:
+        return {key: typed(get_args(kind)[1], entry) for key, entry in data.items()}
+    if not (isinstance(kind, type) and issubclass(kind, Record)):
+        return data
+    hints = get_type_hints(kind)
+    return kind(**{key: typed(hints[key], entry) for key, entry in data.items()})
+
+
+def fixed_wing() -> Verdict:
+    """One stage, everything present, meets."""
+    found: Verdict = typed(Verdict, _fixed_wing())
+    return found
+
+
+def with_requirement(verdict: Verdict, place: int, **changes: Any) -> Verdict:
+    """A verdict with one of its requirements changed."""
+    rows = list(verdict.requirements)
+    rows[place] = replace(rows[place], **changes)
+    return replace(verdict, requirements=tuple(rows))
+
+
+def failing() -> Verdict:
     """The same system held to 5 cm: accuracy fails."""
-    verdict = fixed_wing()
-    verdict["verdict"] = "fails"
-    total = verdict["syncline"]["total_m"]
-    verdict["requirements"][0] = requirement("ACC-1", "accuracy", total, 0.05, "m", 8)
-    return verdict
+    verdict = replace(fixed_wing(), verdict="fails")
+    assert verdict.syncline is not None
+    row = requirement("ACC-1", "accuracy", verdict.syncline.total_m, 0.05, "m", 8)
+    return with_requirement(verdict, 0, **row)
 
 
-def infeasible() -> dict[str, Any]:
+INFEASIBILITY: dict[str, Any] = {
+    "roles_without_options": [
+        {"stage": "uav", "role": "attitude", "nearest": "sbg_ellipse with gpio",
+         "misses_by": 1.8,
+         "text": "No option for uav attitude: the nearest, sbg_ellipse stamped by gpio, has 1.8 "
+                 "times the timestamp error that it may have"},
+    ],
+    "conflict": {
+        "requirements": [{"id": "ACC-1", "line": 8}, {"id": "COST-1", "line": 10}],
+        "minimal": True,
+    },
+    "fixes": [
+        {"kind": "requirement", "requirement": "ACC-1", "from": 0.05, "to": 0.098,
+         "text": "ACC-1 from 5 cm to 9.8 cm", "proven": True},
+        {"text": "COST-1 by 3 400 EUR"},
+    ],
+    "text": [
+        "No design meets this spec.",
+        "  No option for uav attitude: the nearest, sbg_ellipse stamped by gpio, has 1.8 times the "
+        "timestamp error that it may have",
+    ],
+}  # fmt: skip
+
+
+def infeasible() -> Verdict:
     """No design at all."""
-    verdict = fixed_wing()
-    for key in ("design", "syncline", "monte_carlo", "choice"):
-        verdict[key] = None
-    verdict["verdict"] = "infeasible"
-    verdict["requirements"] = [
+    rows = [
         requirement("ACC-1", "accuracy", 1.0, 0.05, "m", 8)
         | {"status": "fail", "value": None, "margin": None, "note": "part of the conflict"},
         requirement("COST-1", "cost", 1.0, 9_000.0, "EUR", 10)
@@ -343,79 +421,82 @@ def infeasible() -> dict[str, Any]:
         requirement("SYNC-1", "sync", 0.5, 1.0, "1", 9)
         | {"status": "indeterminate", "value": None, "margin": None},
     ]
-    verdict["infeasibility"] = {
-        "text": [
-            "No design meets this spec.",
-            "  No option for attitude of uav: the nearest, sbg_ellipse stamped by gpio, has 1.8 "
-            "times the timestamp error that its own tau_crit allows.",
-        ],
-        "roles_without_options": [
-            {"stage": "uav", "role": "attitude", "nearest": "sbg_ellipse with gpio",
-             "misses_by": 1.8},
-        ],
-        "conflict": {
-            "requirements": [{"id": "ACC-1", "line": 8}, {"id": "COST-1", "line": 10}],
-            "minimal": True,
-        },
-        "fixes": [
-            {"kind": "requirement", "requirement": "ACC-1", "from": 0.05, "to": 0.098,
-             "text": "ACC-1 from 5 cm to 9.8 cm", "proven": True},
-            {"text": "COST-1 by 3 400 EUR"},
-        ],
-    }  # fmt: skip
-    return verdict
+    return replace(
+        fixed_wing(),
+        verdict="infeasible",
+        requirements=typed(tuple[RequirementResult, ...], rows),
+        infeasibility=copy.deepcopy(INFEASIBILITY),
+        design=None,
+        syncline=None,
+        monte_carlo=None,
+        choice=None,
+    )
 
 
-def two_stages() -> dict[str, Any]:
+def two_stages() -> Verdict:
     """A chain of two stages, with an unlimited tau_crit and missing optional parts."""
-    verdict = copy.deepcopy(fixed_wing())
-    second = copy.deepcopy(verdict["design"]["stages"][0])
+    plain = _fixed_wing()
+    second = copy.deepcopy(plain["design"]["stages"][0])
     second["name"] = second["vehicle"] = "auv"
     del second["roles"]["position"]
     second["roles"]["attitude"]["tau_crit_s"] = None
-    verdict["design"]["stages"].append(second)
-    stage = copy.deepcopy(verdict["spec"]["stages"][0]) | {"name": "auv", "vehicle": "auv"}
-    verdict["spec"]["stages"].append(stage)
+    plain["design"]["stages"].append(second)
+    stage = copy.deepcopy(plain["spec"]["stages"][0]) | {"name": "auv", "vehicle": "auv"}
+    plain["spec"]["stages"].append(stage)
     for key in ("monte_carlo", "choice", "effects", "assumptions"):
-        verdict[key] = None
-    return verdict
+        plain[key] = None
+    found: Verdict = typed(Verdict, plain)
+    return found
 
 
-def with_hostile_text(text: str) -> dict[str, Any]:
+def with_hostile_text(text: str) -> Verdict:
     """Every free text of a verdict replaced by one hostile string."""
-    verdict = fixed_wing()
-    verdict["spec"]["name"] = text
-    verdict["spec"]["file"] = "specs/x.yaml"
-    verdict["spec"]["stages"][0]["name"] = text
-    verdict["spec"]["stages"][0]["platform"]["name"] = text
-    for row in verdict["requirements"]:
+    plain = _fixed_wing()
+    plain["spec"]["name"] = text
+    plain["spec"]["file"] = "specs/x.yaml"
+    plain["spec"]["stages"][0]["name"] = text
+    plain["spec"]["stages"][0]["platform"]["name"] = text
+    for row in plain["requirements"]:
         row["id"] = row["id"] + text
         row["note"] = text
         row["status"] = "fail"
-    verdict["verdict"] = "fails"
-    stage = verdict["design"]["stages"][0]
+    plain["verdict"] = "fails"
+    stage = plain["design"]["stages"][0]
     stage["name"] = text
     for entry in stage["roles"].values():
         entry["name"] = entry["sensor"] = entry["timestamping_name"] = text
-    for term in verdict["syncline"]["ledger"]:
+    for term in plain["syncline"]["ledger"]:
         term["term"] = term["stage"] = text
     for key, fields in (("warnings", ("message",)), ("effects", ("sentence",))):
-        for entry in verdict[key]:
+        for entry in plain[key]:
             for field in fields:
                 entry[field] = text
-    for entry in verdict["assumptions"] + verdict["sources"]:
+    for entry in plain["assumptions"] + plain["sources"]:
         for field in entry:
             entry[field] = text
-    for entry in verdict["choice"]["front"] + verdict["choice"]["excluded"]:
+    for entry in plain["choice"]["front"] + plain["choice"]["excluded"]:
         for field, value in entry.items():
             if isinstance(value, str):
                 entry[field] = text
-    verdict["infeasibility"] = {
+    plain["infeasibility"] = {
         "roles_without_options": [],
         "conflict": None,
         "fixes": [{"text": text}],
     }
-    return verdict
+    found: Verdict = typed(Verdict, plain)
+    return found
+
+
+REFUSED = Refused(
+    file="specs/bad.yaml",
+    problems=(
+        FileProblem(
+            "specs/bad.yaml", 3, 7, "stages[0].platform",
+            "unknown id uav_fixd_wing; did you mean uav_fixed_wing?",
+        ),
+    ),
+    text="specs/bad.yaml:3:7: stages[0].platform: unknown id uav_fixd_wing",
+)  # fmt: skip
 
 
 @functools.cache

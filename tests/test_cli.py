@@ -139,7 +139,7 @@ def test_a_pinned_check_imports_nothing_heavy() -> None:
         "import sys; from pathlib import Path; from syncline_design.verdict.verify import *; "
         "from syncline_design.report.on_verdict import on_verdict; "
         "from syncline_design.report.render_console import console; "
-        "console(on_verdict(check_file(Path('specs/usv_mapping.yaml')).to_json())); "
+        "console(on_verdict(check_file(Path('specs/usv_mapping.yaml')))); "
         f"print(sorted({HEAVY} & set(sys.modules)))"
     )
     done = subprocess.run(

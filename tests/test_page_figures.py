@@ -33,8 +33,8 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "deg": math.pi / 180.0, "mdeg": math
 @pytest.mark.parametrize("name", ["car_mapping", "rov_relay", "subsea_survey_small_sv"])
 def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
     """Every role, every shared piece and every clock: to the cent."""
-    verdict = check_file(ROOT / "specs" / f"{name}.yaml", PLAIN).to_json()
-    assert any(clock["cost"] for clock in verdict["design"]["clocks"])
+    verdict = check_file(ROOT / "specs" / f"{name}.yaml", PLAIN)
+    assert any(clock["cost"] for clock in verdict.design["clocks"])
     cells: list[str] = []
     text = html(on_verdict(verdict))
     for caption in ("Payload and timestamping", "Shared hardware and clocks"):
@@ -45,14 +45,14 @@ def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
         assert body.count("<tr>") == len(amounts), "a row without a cost"
         cells += amounts
     total = sum(float(cell.replace("\u00a0", "")) for cell in cells)
-    assert total == pytest.approx(verdict["design"]["cost"], abs=0.005)
+    assert total == pytest.approx(verdict.design["cost"], abs=0.005)
 
 
 @pytest.mark.parametrize("method", ["front", "milp", "enumerate"])
 def test_the_page_says_in_words_how_the_choice_was_proven(method: Any) -> None:
     words = {"front": "Pareto front", "milp": "integer program", "enumerate": "enumeration of all"}
-    verdict = check_file(MULTIROTOR, CheckSettings(method=method, monte_carlo=False)).to_json()
-    assert verdict["choice"]["proof"]["method"] == method
+    verdict = check_file(MULTIROTOR, CheckSettings(method=method, monte_carlo=False))
+    assert verdict.choice["proof"]["method"] == method
     sentence = re.search(r"Found by [^<]*", Page(html(on_verdict(verdict))).text)
     assert sentence is not None
     assert words[method] in sentence[0]
@@ -62,7 +62,7 @@ def test_the_page_says_in_words_how_the_choice_was_proven(method: Any) -> None:
 
 def test_a_datasheet_figure_reads_as_it_was_written() -> None:
     loaded = load_text(MULTIROTOR.read_text("utf-8"), MULTIROTOR)
-    found = optimize(loaded, OptimizeSettings())
+    found = optimize(loaded, OptimizeSettings(report=True))
     entries = optimisation_json(found)["measure_next"]
     assert {entry["value_text"] for entry in entries} >= {"2 cm", "0.2 deg"}
     console, page = optimisation_text(found), Page(render_optimize("html", found)).text
@@ -95,9 +95,7 @@ def test_a_figure_in_the_unit_of_another(written: str, value_si: float, shown: s
 
 @pytest.fixture(scope="module")
 def simulated_page() -> str:
-    page = html(
-        on_verdict(check_file(ROOT / "specs" / "usv_mapping.yaml", CheckSettings()).to_json())
-    )
+    page = html(on_verdict(check_file(ROOT / "specs" / "usv_mapping.yaml", CheckSettings())))
     return re.sub(r"[\u00a0\u202f\u2009]", " ", page)
 
 

@@ -142,15 +142,16 @@ def test_slider_recolours_the_verdict(browser: Any, report: Path) -> None:
 
 def test_sliders_agree_with_the_model(browser: Any, report: Path) -> None:
     """Error at tau = 1 ms, and the target at which the verdict turns, from plain sums."""
-    verdict = samples.fixed_wing()["syncline"]
-    error = verdict["sensor_error_m"] + 1e-3 * verdict["sync_rate_mps"]
+    syncline = samples.fixed_wing().syncline
+    assert syncline is not None
+    error = syncline.sensor_error_m + 1e-3 * syncline.sync_rate_mps
     with Opened(browser, report) as opened:
         page = opened.page
         move(page, "#tau-slider", -3.0)
         assert f"{error * 1000:.4g}\u00a0mm" in page.inner_text("#explorer-verdict")
         assert page.inner_text("#tau-value") == "1\u00a0ms"
         page.click("#explorer-reset")
-        total = verdict["total_m"]
+        total = syncline.total_m
         for factor, word in ((1.001, "would meet"), (0.999, "would not meet")):
             page.evaluate("() => 0")
             move(page, "#target-slider", page.evaluate("v => Math.log10(v)", total * factor))

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import re
+from dataclasses import replace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -19,20 +20,8 @@ from syncline_design.report.ci import findings
 from syncline_design.report.json_out import json_text
 from syncline_design.report.sarif import artifact_uri
 from syncline_design.report.text import markdown_safe, spreadsheet_safe, visible
+from syncline_design.verdict.tree import Checked, Verdict, WaiverResult
 
-REFUSED: dict[str, Any] = {
-    "verdict": "refused",
-    "file": "specs/bad.yaml",
-    "problems": [
-        {
-            "file": "specs/bad.yaml",
-            "line": 3,
-            "column": 7,
-            "path": "stages[0].platform",
-            "message": "unknown id uav_fixd_wing; did you mean uav_fixed_wing?",
-        }
-    ],
-}
 TEXT_FORMATS = [name for name in CHECK_FORMATS if name != "html"]
 
 # The objects of SARIF 2.1.0 that this tool writes, typed from the standard (OASIS, sections 3.11
@@ -103,13 +92,19 @@ SARIF_SCHEMA = _closed(
 )
 
 
-def sarif_of(*verdicts: dict[str, Any]) -> dict[str, Any]:
+def sarif_of(*verdicts: Checked) -> dict[str, Any]:
     log: dict[str, Any] = json.loads(render_checks("sarif", verdicts))
     jsonschema.Draft7Validator(SARIF_SCHEMA).validate(log)
     return log
 
 
-def junit_of(*verdicts: dict[str, Any]) -> ElementTree.Element:
+def undecided(verdict: Verdict) -> Verdict:
+    """The same with every requirement open."""
+    rows = [replace(row, status="indeterminate") for row in verdict.requirements]
+    return replace(verdict, requirements=tuple(rows))
+
+
+def junit_of(*verdicts: Checked) -> ElementTree.Element:
     """Parse and hold against what CI readers count on: totals that add up, places, messages."""
     root = ElementTree.fromstring(render_checks("junit", verdicts).encode())
     assert root.tag == "testsuites"
@@ -128,12 +123,14 @@ def junit_of(*verdicts: dict[str, Any]) -> ElementTree.Element:
 
 def test_json_is_the_verdict_itself() -> None:
     verdict = samples.fixed_wing()
-    assert json.loads(render_checks("json", [verdict])) == verdict
+    assert json.loads(render_checks("json", [verdict])) == verdict.to_json()
 
 
 def test_json_of_several_keeps_each() -> None:
     verdicts = [samples.fixed_wing(), samples.failing()]
-    assert json.loads(render_checks("json", verdicts))["verdicts"] == verdicts
+    assert json.loads(render_checks("json", verdicts))["verdicts"] == [
+        verdict.to_json() for verdict in verdicts
+    ]
 
 
 def test_json_has_no_infinity() -> None:
@@ -170,35 +167,31 @@ def test_junit_of_an_infeasible_spec_fails_the_conflicting_requirements() -> Non
 
 
 def test_junit_of_an_infeasible_spec_without_a_conflict_still_fails() -> None:
-    verdict = samples.infeasible()
-    verdict["infeasibility"]["conflict"] = None
-    for row in verdict["requirements"]:
-        row["status"] = "indeterminate"
-    root = junit_of(verdict)
+    verdict = undecided(samples.infeasible())
+    why = samples.INFEASIBILITY | {"conflict": None}
+    root = junit_of(replace(verdict, infeasibility=why))
     assert root.attrib["failures"] == "1"
     assert root.attrib["skipped"] == "3"
 
 
 def test_junit_of_no_verdict_errs() -> None:
-    verdict = samples.infeasible() | {"verdict": "indeterminate", "infeasibility": None}
-    for row in verdict["requirements"]:
-        row["status"] = "indeterminate"
+    verdict = undecided(samples.infeasible())
+    verdict = replace(verdict, verdict="indeterminate", infeasibility=None)
     assert junit_of(verdict).attrib["errors"] == "1"
 
 
 def test_undecided_monte_carlo_errs() -> None:
-    verdict = samples.fixed_wing() | {"verdict": "indeterminate"}
-    verdict["requirements"][4]["status"] = "indeterminate"
+    verdict = replace(samples.fixed_wing(), verdict="indeterminate")
+    verdict = samples.with_requirement(verdict, 4, status="indeterminate")
     root = junit_of(verdict)
     names = [c.attrib["name"] for c in root.iter("testcase") if c.find("error") is not None]
     assert "MC-1 monte_carlo" in names
 
 
-def waived() -> dict[str, Any]:
-    verdict = samples.failing()
-    verdict["verdict"] = "meets"
-    verdict["requirements"][0]["waiver"] = {"reason": "prototype", "expires": "2027-01-31"}
-    return verdict
+def waived(until: str = "2027-01-31", *, expired: bool = False) -> Verdict:
+    waiver = WaiverResult("prototype", until, expired)
+    verdict = samples.with_requirement(samples.failing(), 0, waiver=waiver)
+    return verdict if expired else replace(verdict, verdict="meets")
 
 
 def test_a_waived_requirement_is_skipped_with_its_reason() -> None:
@@ -214,13 +207,7 @@ def test_a_waived_requirement_is_skipped_with_its_reason() -> None:
 
 
 def test_an_expired_waiver_does_not_help() -> None:
-    verdict = samples.failing()
-    verdict["requirements"][0]["waiver"] = {
-        "reason": "prototype",
-        "expires": "2020-01-31",
-        "expired": True,
-    }
-    assert junit_of(verdict).attrib["failures"] == "1"
+    assert junit_of(waived("2020-01-31", expired=True)).attrib["failures"] == "1"
 
 
 def test_sarif_points_at_the_specs_line() -> None:
@@ -239,8 +226,8 @@ def test_sarif_of_a_passing_spec_has_no_error() -> None:
 
 
 def test_sarif_fingerprint_survives_a_change_of_figures() -> None:
-    first, second = samples.failing(), samples.failing()
-    second["requirements"][0]["value"] = 0.0612
+    first = samples.failing()
+    second = samples.with_requirement(first, 0, value=0.0612)
     prints = [
         [r["partialFingerprints"] for r in sarif_of(v)["runs"][0]["results"]]
         for v in (first, second)
@@ -261,15 +248,15 @@ def test_sarif_uri(path: str, uri: str) -> None:
 
 
 def test_refused_spec_reaches_every_ci_format() -> None:
-    (result,) = sarif_of(REFUSED)["runs"][0]["results"]
+    (result,) = sarif_of(samples.REFUSED)["runs"][0]["results"]
     assert result["locations"][0]["physicalLocation"]["region"]["startLine"] == 3
     assert "did you mean uav_fixed_wing" in result["message"]["text"]
-    root = junit_of(REFUSED)
+    root = junit_of(samples.REFUSED)
     assert root.attrib["failures"] == "1"
-    first = render_checks("github", [REFUSED]).splitlines()[0]
+    first = render_checks("github", [samples.REFUSED]).splitlines()[0]
     assert first.startswith("::error file=specs/bad.yaml,line=3,col=7,title=spec::")
-    assert "did you mean" in render_checks("markdown", [REFUSED])
-    assert "uav\\_fixd\\_wing" in render_checks("markdown", [REFUSED])
+    assert "did you mean" in render_checks("markdown", [samples.REFUSED])
+    assert "uav\\_fixd\\_wing" in render_checks("markdown", [samples.REFUSED])
 
 
 COMMAND = re.compile(r"::(error|warning|notice) file=[^:]*,line=\d+(,col=\d+)?,title=[^:]*::.*")
@@ -334,7 +321,7 @@ def test_hostile_text_is_no_formula_in_csv(text: str) -> None:
 def test_csv_keeps_figures_exactly() -> None:
     verdict = samples.fixed_wing()
     rows = list(csv.DictReader(io.StringIO(render_checks("csv", [verdict]), newline="")))
-    assert [float(row["value"]) for row in rows] == [r["value"] for r in verdict["requirements"]]
+    assert [float(row["value"]) for row in rows] == [r.value for r in verdict.requirements]
     assert rows[0]["requirement"] == "ACC-1"
 
 
@@ -380,13 +367,16 @@ def test_visible_keeps_ordinary_text() -> None:
 
 @pytest.mark.parametrize("name", TEXT_FORMATS)
 def test_same_input_same_bytes(name: str) -> None:
-    verdicts = [samples.fixed_wing(), samples.infeasible(), samples.two_stages(), REFUSED]
+    verdicts = [samples.fixed_wing(), samples.infeasible(), samples.two_stages(), samples.REFUSED]
     assert render_checks(name, verdicts) == render_checks(name, verdicts)
 
 
 @pytest.mark.parametrize("name", TEXT_FORMATS)
 def test_a_bare_verdict_is_enough(name: str) -> None:
-    verdict = {"schema": "syncline-design/verdict/v1", "verdict": "indeterminate", "spec": None}
+    full = samples.fixed_wing()
+    verdict = Verdict(
+        verdict="indeterminate", spec=full.spec, horizon=full.horizon, provenance=full.provenance
+    )
     assert render_checks(name, [verdict])
 
 
@@ -401,10 +391,11 @@ def test_unknown_format_is_refused() -> None:
 
 
 def test_one_remedy_is_not_offered_as_a_choice() -> None:
-    verdict = samples.infeasible()
-    fixes = verdict["infeasibility"]["fixes"]
+    fixes = samples.INFEASIBILITY["fixes"]
     for count, lead in ((1, "This would do: "), (3, "Any one of these would do: ")):
-        verdict["infeasibility"]["fixes"] = [dict(fixes[0], text=f"way {k}") for k in range(count)]
+        ways_out = [dict(fixes[0], text=f"way {k}") for k in range(count)]
+        why = samples.INFEASIBILITY | {"fixes": ways_out}
+        verdict = replace(samples.infeasible(), infeasibility=why)
         ways = "; ".join(f"way {k}" for k in range(count))
         said = [finding.message for finding in findings(verdict) if "would do" in finding.message]
         assert said

@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import base64
-import copy
 import hashlib
 import re
 import subprocess
 import sys
-from typing import Any
+from dataclasses import fields, replace
+from typing import Any, get_args, get_type_hints
 from xml.etree import ElementTree
 
 import pytest
 
 import report_samples as samples
 from html_page import Page
+from syncline_design.machine.records import Record
 from syncline_design.paper.errata import ERRATA
 from syncline_design.report import errata, figures
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
 from syncline_design.report.text import visible
+from syncline_design.verdict.tree import FileProblem, Refused
 
 
 @pytest.fixture(scope="module")
@@ -123,36 +125,42 @@ def test_missing_parts_are_left_out() -> None:
     assert "unlimited" in page.text
 
 
+def _optional(record: Record) -> list[str]:
+    """Fields that may be None."""
+    hints = get_type_hints(type(record))
+    return [f.name for f in fields(record) if type(None) in get_args(hints[f.name])]  # type: ignore[arg-type]
+
+
 @pytest.mark.parametrize("start", range(5))
-def test_any_part_may_be_missing_or_null(start: int) -> None:
-    """Every key once null, once absent, a fifth of them at a time."""
-    keys = sorted(samples.fixed_wing())[start::5]
-    without = {k: v for k, v in samples.fixed_wing().items() if k not in keys}
-    for verdict in (without, without | dict.fromkeys(keys)):
-        assert Page(html(on_verdict(verdict))).unbalanced == []
-
-
-def _leaves(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    if isinstance(value, dict):
-        return [p for k, v in value.items() for p in [(*path, k), *_leaves(v, (*path, k))]]
-    if isinstance(value, list) and value and isinstance(value[0], dict):
-        return [p for i, v in enumerate(value) for p in _leaves(v, (*path, i))]
-    return []
-
-
-def test_any_optional_leaf_may_be_null() -> None:
-    """Every key below the first level set to null in one of seven passes: never a crash."""
+def test_any_part_may_be_missing(start: int) -> None:
+    """Every part that may be None, a fifth of them at a time, and all lists empty."""
     full = samples.fixed_wing()
-    paths = [path for path in _leaves(full) if len(path) > 1]
-    for start in range(7):
-        verdict = copy.deepcopy(full)
-        for path in paths[start::7]:
-            holder: Any = verdict
-            for step in path[:-1]:
-                holder = holder[step] if holder is not None else None
-            if holder is not None:
-                holder[path[-1]] = None
+    without: dict[str, Any] = dict.fromkeys(_optional(full)[start::5])
+    assert without
+    empty: dict[str, Any] = {"requirements": (), "warnings": ()}
+    for verdict in (replace(full, **without), replace(full, **without, **empty)):
         assert Page(html(on_verdict(verdict))).unbalanced == []
+
+
+def _bare(value: Any) -> Any:
+    """A record in which everything that may be None is."""
+    if isinstance(value, tuple):
+        return tuple(_bare(entry) for entry in value)
+    if not isinstance(value, Record):
+        return value
+    kept = {f.name: _bare(getattr(value, f.name)) for f in fields(value)}  # type: ignore[arg-type]
+    return type(value)(**kept | dict.fromkeys(_optional(value)))
+
+
+def test_every_optional_figure_may_be_unknown() -> None:
+    """Below the first level: never a crash."""
+    full = samples.fixed_wing()
+    parts = {f.name: _bare(getattr(full, f.name)) for f in fields(full)}
+    assert parts["syncline"].tau_crit_s is None
+    assert parts["requirements"][0].margin is None
+    page = Page(html(on_verdict(replace(full, **parts))))
+    assert page.unbalanced == []
+    assert "unlimited" in page.text
 
 
 def test_errata_follow_the_design() -> None:
@@ -160,8 +168,9 @@ def test_errata_follow_the_design() -> None:
     assert set(errata.NEEDED) | {"lever_arm"} <= {entry.id for entry in ERRATA}
     assert any("45 sqrt(3)" in text for text in errata.relevant(verdict))
     assert not any("1.4127 m" in text for text in errata.relevant(verdict))
-    verdict["spec"]["stages"][0]["platform"]["id"] = "auv_printed"
-    found = errata.relevant(verdict)
+    (stage,) = verdict.spec.stages
+    stage = replace(stage, platform=replace(stage.platform, id="auv_printed"))
+    found = errata.relevant(replace(verdict, spec=replace(verdict.spec, stages=(stage,))))
     assert any("1.4127 m" in text for text in found)
     assert not any("45 sqrt(3)" in text for text in found)
 
@@ -231,12 +240,12 @@ def test_same_bytes_in_another_process() -> None:
 
 def test_size_is_far_below_three_megabytes() -> None:
     verdict = samples.fixed_wing()
-    entry = verdict["choice"]["excluded"][0]
-    verdict["choice"]["excluded"] = [dict(entry, sensor=f"sensor_{i}") for i in range(2000)]
-    verdict["choice"]["front"] = [
-        {"cost": 1000.0 + i, "error_m": 1.0 / (i + 1), "design": "x" * 80} for i in range(500)
-    ]
-    assert len(html(on_verdict(verdict)).encode()) < 3_000_000
+    assert verdict.choice is not None
+    entry = verdict.choice["excluded"][0]
+    front = [{"cost": 1000.0 + i, "error_m": 1.0 / (i + 1), "design": "x" * 80} for i in range(500)]
+    excluded = [dict(entry, sensor=f"sensor_{i}") for i in range(2000)]
+    long = replace(verdict, choice={**verdict.choice, "excluded": excluded, "front": front})
+    assert len(html(on_verdict(long)).encode()) < 3_000_000
 
 
 def test_importing_the_report_package_loads_nothing_heavy() -> None:
@@ -253,11 +262,8 @@ def test_importing_the_report_package_loads_nothing_heavy() -> None:
 
 
 def test_several_verdicts_get_an_overview() -> None:
-    refused = {
-        "verdict": "refused",
-        "file": "bad.yaml",
-        "problems": [{"line": 2, "column": 1, "path": "stages", "message": "missing key"}],
-    }
+    problem = FileProblem("bad.yaml", 2, 1, "stages", "missing key")
+    refused = Refused(file="bad.yaml", problems=(problem,), text="bad.yaml:2:1: missing key")
     page = Page(html(on_verdicts([samples.fixed_wing(), samples.infeasible(), refused])))
     assert "1 of 3 specs meet every requirement" in page.text
     assert "missing key" in page.text

@@ -12,6 +12,7 @@ from syncline_design.report.checks import render_checks
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import load
+from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEC = """\
@@ -54,16 +55,14 @@ def write(
     (folder / "line.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def check(
-    folder: Path, effects: str = "[]", trajectory: str = "{file: line.csv}"
-) -> dict[str, Any]:
+def check(folder: Path, effects: str = "[]", trajectory: str = "{file: line.csv}") -> Verdict:
     spec = folder / "line.yaml"
     spec.write_text(SPEC.format(effects=effects, trajectory=trajectory), encoding="utf-8")
-    return check_loaded(load(spec), CheckSettings()).to_json()
+    return check_loaded(load(spec), CheckSettings())
 
 
-def said(verdict: dict[str, Any]) -> str:
-    return " ".join(w["message"] for w in verdict["warnings"] if w["code"] == CODE)
+def said(verdict: Verdict) -> str:
+    return " ".join(w.message for w in verdict.warnings if w.code == CODE)
 
 
 @pytest.mark.parametrize(
@@ -96,9 +95,9 @@ def test_a_long_file_exceeds_its_own_bound_and_every_format_says_why(tmp_path: P
     """10 m/s for 2 h: grid errors of 2e-4 times 0 .. 72 km; median 7.2 m, the budget's 2.8 m."""
     write(tmp_path, 7200.0, 10.0, 0.0, 0.0, "")
     found = check(tmp_path, GRID)
-    assert found["verdict"] == "meets"
-    assert found["monte_carlo"]["quantiles"]["0.5"]["value_m"] == pytest.approx(7.2, rel=0.05)
-    assert found["monte_carlo"]["worst_case"]["bound_m"] < 4.0
+    assert found.verdict == "meets"
+    assert found.monte_carlo.quantiles["0.5"].value_m == pytest.approx(7.2, rel=0.05)
+    assert found.monte_carlo.worst_case.bound_m < 4.0
     for form in ("json", "html", "junit", "sarif", "github", "markdown"):
         assert CODE in render_checks(form, [found])
     shown = " ".join(console(on_verdict(found), colour=False).split())
@@ -153,6 +152,6 @@ def test_accelerations_along_a_coarse_file_are_those_of_the_path(
             north, east = 60.0 * np.sin(turn), -60.0 * np.cos(turn)
             file.write(f"{t},{north:.6f},{east:.6f},0,0,0,{np.degrees(turn):.6f}\n")
     effect = "[{effect: flexure, sensor: ranging, parameters: {x: 0, y: 0.1, z: 0}}]"
-    spread = check(tmp_path, effect)["monte_carlo"]["quantiles"]
-    assert spread["0.5"]["value_m"] == pytest.approx(1.0 / 6.0, rel=0.03)
-    assert spread["0.997"]["value_m"] < 0.1667 + 0.06  # noise of 1 cm an axis
+    spread = check(tmp_path, effect).monte_carlo.quantiles
+    assert spread["0.5"].value_m == pytest.approx(1.0 / 6.0, rel=0.03)
+    assert spread["0.997"].value_m < 0.1667 + 0.06  # noise of 1 cm an axis

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 import math
-from typing import Any
 
 import pytest
 
@@ -13,6 +12,7 @@ from syncline_design.report.checks import render_checks
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import load_text
+from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEC = """\
@@ -42,9 +42,9 @@ stages:
 WORST = "worst-case-above-limit"
 
 
-def verdict(limit: str, more: str = "") -> dict[str, Any]:
+def verdict(limit: str, more: str = "") -> Verdict:
     text = SPEC.format(limit=limit, more=more)
-    return check_loaded(load_text(text, "boat.yaml"), CheckSettings()).to_json()
+    return check_loaded(load_text(text, "boat.yaml"), CheckSettings())
 
 
 def worst_by_hand_m() -> float:
@@ -60,21 +60,21 @@ def worst_by_hand_m() -> float:
 
 def test_a_design_that_meets_while_its_worst_case_does_not_is_warned_of() -> None:
     found = verdict("0.80 m")
-    assert found["verdict"] == "meets"
-    assert found["syncline"]["total_m"] < 0.80 < worst_by_hand_m()
-    (warned,) = [w for w in found["warnings"] if w["code"] == WORST]
-    assert warned["requirement"] == "NEAR"
-    certified = found["figures"]["worst_case_1sigma_m"]
+    assert found.verdict == "meets"
+    assert found.syncline.total_m < 0.80 < worst_by_hand_m()
+    (warned,) = [w for w in found.warnings if w.code == WORST]
+    assert warned.requirement == "NEAR"
+    certified = found.figures.worst_case_1sigma_m
     assert worst_by_hand_m() < certified < 1.02 * worst_by_hand_m()  # Euler noise at its own pitch
-    assert found["figures"]["syncline_m"] == pytest.approx(found["syncline"]["total_m"])
-    assert f"certified worst case is {certified:.3f} m" in warned["message"]
+    assert found.figures.syncline_m == pytest.approx(found.syncline.total_m)
+    assert f"certified worst case is {certified:.3f} m" in warned.message
 
 
 def test_no_warning_above_the_worst_case_nor_where_the_limit_is_missed() -> None:
     for limit, word in (("1.9 m", "meets"), ("0.2 m", "fails")):
         found = verdict(limit)
-        assert found["verdict"] == word
-        assert not [w for w in found["warnings"] if w["code"] == WORST]
+        assert found.verdict == word
+        assert not [w for w in found.warnings if w.code == WORST]
 
 
 def test_noise_that_is_known_to_be_larger_counts_in_the_worst_case() -> None:
@@ -83,9 +83,9 @@ def test_noise_that_is_known_to_be_larger_counts_in_the_worst_case() -> None:
     known = "effects: [{effect: noise_understated, sensor: position, parameters: {factor: 3}}]"
     for limit, warns in ((true - 0.03, True), (true + 0.03, False)):
         found = verdict(f"{limit} m", known)
-        assert found["verdict"] == "meets"
+        assert found.verdict == "meets"
         assert limit > worst_by_hand_m()
-        assert [w["requirement"] for w in found["warnings"] if w["code"] == WORST] == (
+        assert [w.requirement for w in found.warnings if w.code == WORST] == (
             ["NEAR"] if warns else []
         )
         headline = console(on_verdict(found), colour=False).splitlines()[0]
@@ -95,21 +95,21 @@ def test_noise_that_is_known_to_be_larger_counts_in_the_worst_case() -> None:
 def test_a_waived_limit_does_not_hide_that_a_kept_one_is_exceeded() -> None:
     kept = "  - {id: KEPT, kind: accuracy, limit: 0.9 m}"
     found = verdict("0.2 m, waiver: {reason: trial, expires: 2999-01-01}", kept)
-    assert found["verdict"] == "meets"
+    assert found.verdict == "meets"
     assert 0.9 < worst_by_hand_m() < 2.0
-    assert [w["requirement"] for w in found["warnings"] if w["code"] == WORST] == ["KEPT"]
+    assert [w.requirement for w in found.warnings if w.code == WORST] == ["KEPT"]
 
 
 def test_warnings_say_what_they_are_about() -> None:
     more = "  - {id: LOW, kind: sync, limit: 0.0001, waiver: {reason: trial, expires: 2999-01-01}}"
-    for warned in verdict("0.80 m", more)["warnings"]:
-        assert warned["code"]
-        assert warned["message"]
-        if warned["code"] == "assumption":
-            assert warned["entry"]
-            assert warned["key"]
-        if warned["code"] == "waiver":
-            assert warned["requirement"] == "LOW"
+    for warned in verdict("0.80 m", more).warnings:
+        assert warned.code
+        assert warned.message
+        if warned.code == "assumption":
+            assert warned.entry
+            assert warned.key
+        if warned.code == "waiver":
+            assert warned.requirement == "LOW"
 
 
 @pytest.mark.parametrize("form", ["json", "html", "junit", "sarif", "github", "markdown", "csv"])
@@ -118,7 +118,7 @@ def test_every_format_shows_the_warning(form: str) -> None:
     shown = render_checks(form, [found])
     assert WORST in shown
     if form not in ("csv", "json"):
-        assert f"worst case is {found['figures']['worst_case_1sigma_m']:.3f} m" in shown
+        assert f"worst case is {found.figures.worst_case_1sigma_m:.3f} m" in shown
 
 
 def test_the_console_shows_warning_horizon_envelope_and_ensemble() -> None:
@@ -131,7 +131,7 @@ def test_the_console_shows_warning_horizon_envelope_and_ensemble() -> None:
 HEAD = "exceeds the limit of NEAR (worst-case-above-limit)"
 
 
-def headlines(found: dict[str, Any]) -> dict[str, str]:
+def headlines(found: Verdict) -> dict[str, str]:
     """The line of each format that gives the verdict, alone and beside another spec's."""
     shown = {form: render_checks(form, [found]) for form in ("markdown", "junit", "github")}
     page = render_checks("html", [found])
@@ -174,8 +174,8 @@ def test_a_bound_that_normal_errors_often_exceed_is_told_of(factor: float, where
     if where == "jitter":
         text += "effects:\n  - {effect: timestamp_jitter, sensor: attitude, "
         text += "parameters: {std_s: 1 us}}\n"
-    found = check_loaded(load_text(text, "boat.yaml"), CheckSettings(monte_carlo=False)).to_json()
-    told = [one["message"] for one in found["warnings"] if one["code"] == "coverage-factor"]
+    found = check_loaded(load_text(text, "boat.yaml"), CheckSettings(monte_carlo=False))
+    told = [one.message for one in found.warnings if one.code == "coverage-factor"]
     assert len(told) == (where != "nowhere" and factor in EXCEEDED)
     assert all(f"{EXCEEDED[factor]} of normal timestamp errors" in words for words in told)
 
@@ -219,11 +219,11 @@ def test_timelines_that_differ_between_stages_of_one_vehicle_are_told_of(
     text = CHAIN_OF_ONE_VEHICLE.format(*stamps)
     if clock:
         text = text.replace("    vehicle: ship\n", "    vehicle: ship\n    clock: ntp_internet\n")
-    found = check_loaded(load_text(text, "ship.yaml"), CheckSettings(monte_carlo=False)).to_json()
-    codes = [one["code"] for one in found["warnings"]]
+    found = check_loaded(load_text(text, "ship.yaml"), CheckSettings(monte_carlo=False))
+    codes = [one.code for one in found.warnings]
     assert ("common-clock" in codes) == (told and not clock)
     offset = 0.005 if told and clock else 0.0  # ntp_internet: within 5 ms
-    assert found["syncline"]["tau_s"] == pytest.approx(0.002 + offset, rel=1e-12)
+    assert found.syncline.tau_s == pytest.approx(0.002 + offset, rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -249,5 +249,5 @@ def test_console_and_csv_tell_a_waived_requirement_from_a_failed_one(
     assert rows["FAR"]["waiver"] == ""
 
 
-def csv_of(found: dict[str, Any]) -> str:
+def csv_of(found: Verdict) -> str:
     return render_checks("csv", [found])

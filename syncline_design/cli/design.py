@@ -65,15 +65,14 @@ def check(
         say(verdict.text)
     if refused:  # no file is written; what goes to standard output may say so
         targets = [target for target in targets if target.path == STDOUT]
-    plain = [verdict.to_json() for verdict in verdicts]
-    text = "\n".join(console(on_verdict(v)) for v in plain if v["verdict"] != "refused")
+    text = "\n".join(console(on_verdict(v)) for v in verdicts if not isinstance(v, Refused))
     if len(found.files) != 1 or any(path.is_dir() for path in spec):
-        summary = summary_line(plain)
+        summary = summary_line(verdicts)
         text = f"{text}\n{summary}\n" if text else f"{summary}\n"
     if found.skipped and not quiet:
         say(skipped_text(found.skipped))
     try:
-        emit(text, targets, lambda name: render_checks(name, plain), quiet=quiet)
+        emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
     except OutputError as error:
         if len(refused) < len(verdicts):
             raise

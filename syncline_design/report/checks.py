@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from syncline_design.report.formats import CHECK_FORMATS as CHECK_FORMATS
 
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import Checked
 
-def render_checks(name: str, verdicts: Sequence[dict[str, Any]]) -> str:
-    """The text of one format for these verdicts (schema syncline-design/verdict/v1).
 
-    A file that could not be read may stand among them as {"verdict": "refused", "file": ...,
-    "problems": [{"file", "line", "column", "path", "message"}]}.
-    """
+def render_checks(name: str, verdicts: Sequence[Checked]) -> str:
+    """The text of one format for these verdicts; files that were refused may stand among them."""
     return _renderer(name)(verdicts)
 
 
-def _renderer(name: str) -> Callable[[Sequence[dict[str, Any]]], str]:
+def _renderer(name: str) -> Callable[[Sequence[Checked]], str]:
     """Each format's module loads only when it is asked for."""
     match name:
         case "json":
@@ -39,14 +38,14 @@ def _renderer(name: str) -> Callable[[Sequence[dict[str, Any]]], str]:
     return render
 
 
-def _page(verdicts: Sequence[dict[str, Any]]) -> str:
+def _page(verdicts: Sequence[Checked]) -> str:
     from syncline_design.report.on_verdicts import on_verdicts
     from syncline_design.report.render_html import html
 
     return html(on_verdicts(verdicts))
 
 
-def _markdown(verdicts: Sequence[dict[str, Any]]) -> str:
+def _markdown(verdicts: Sequence[Checked]) -> str:
     """Every verdict in full, one after the other."""
     from syncline_design.report.on_verdict import on_verdict
     from syncline_design.report.render_markdown import markdown

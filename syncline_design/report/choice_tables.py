@@ -11,9 +11,10 @@ from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_tables import currency_of
 from syncline_design.report.verdict_words import Json, items, named, part
 from syncline_design.report.words import KINDS, PRIMITIVES
+from syncline_design.verdict.tree import Verdict
 
 
-def choice_tables(verdict: Json) -> list[Table]:
+def choice_tables(verdict: Verdict) -> list[Table]:
     """Every table of the choice that has rows."""
     found = (
         priced(verdict, "front", "Pareto front: cost against error"),
@@ -26,11 +27,11 @@ def choice_tables(verdict: Json) -> list[Table]:
     return [entry for entry in found if entry is not None]
 
 
-def staircase(verdict: Json) -> Table | None:
+def staircase(verdict: Verdict) -> Table | None:
     """What each accuracy costs: a row per step of the exact front."""
     currency = currency_of(verdict)
     rows = []
-    for entry in items(part(verdict, "choice"), "staircase"):
+    for entry in items(verdict.choice, "staircase"):
         tight, loose = entry.get("tightest_m"), entry.get("looser_than_m")
         below = f" to below {numbers.length(loose)}" if loose is not None else " and looser"
         rows.append((
@@ -42,10 +43,10 @@ def staircase(verdict: Json) -> Table | None:
     return table("Price staircase of accuracy", heads, rows) if rows else None
 
 
-def slack(verdict: Json) -> Table | None:
+def slack(verdict: Verdict) -> Table | None:
     """How far each term may grow before the verdict or the payload changes."""
     rows = []
-    for entry in items(part(verdict, "choice"), "slack") or items(verdict, "slack"):
+    for entry in items(verdict.choice, "slack"):
         unit = str(entry.get("unit") or "")
         breaks = KINDS.get(str(entry.get("limited_by")), "")
         rows.append((
@@ -72,9 +73,8 @@ def _threshold(entry: Json, key: str, what: str, unit: str) -> Cell:
     return Cell(f"not up to {numbers.si_quantity(searched, unit)}", None)
 
 
-def measure_next(verdict: Json) -> Table | None:
+def measure_next(verdict: Verdict) -> Table | None:
     """Datasheet figures that alone would flip the choice."""
-    source = part(verdict, "choice") if part(verdict, "choice").get("measure_next") else verdict
     rows = [
         (
             str(entry.get("figure")),
@@ -84,7 +84,7 @@ def measure_next(verdict: Json) -> Table | None:
             else "datasheet tolerance",
             str(entry.get("becomes") or ""),
         )
-        for entry in items(source, "measure_next")
+        for entry in items(verdict.choice, "measure_next")
     ]  # fmt: skip
     heads = ("Figure", "Now #", "Flips at #", "Range", "The choice becomes")
     return table("What to measure next", heads, rows) if rows else None
@@ -96,9 +96,9 @@ def _written(entry: Json, key: str) -> str:
     return str(text) if text else numbers.number(entry.get(key))
 
 
-def tolerance_sentence(verdict: Json) -> str:
+def tolerance_sentence(verdict: Verdict) -> str:
     """Whether the design passes always, sometimes or never within the datasheet tolerances."""
-    found = part(part(verdict, "choice"), "tolerances") or part(verdict, "tolerances")
+    found = part(verdict.choice, "tolerances")
     if not found or not found.get("figures"):
         return ""
     text = f"Within the datasheet tolerances the design {found.get('passes')} passes"
@@ -109,21 +109,20 @@ def tolerance_sentence(verdict: Json) -> str:
     return f"{text}; {sentence_list(deciding)} {verb}."
 
 
-def is_chosen(verdict: Json, entry: Json) -> bool:
+def is_chosen(verdict: Verdict, entry: Json) -> bool:
     """Whether a point of the front is the chosen design: same price, same error."""
-    cost = numbers.finite(part(verdict, "design").get("cost"))
-    total = numbers.finite(part(verdict, "syncline").get("total_m"))
+    cost = (verdict.design or {}).get("cost")
     error = numbers.finite(entry.get("error_m"))
-    if cost is None or total is None or error is None or entry.get("cost") != cost:
+    if cost is None or verdict.syncline is None or error is None or entry.get("cost") != cost:
         return False
-    return math.isclose(error, total, rel_tol=1e-6)
+    return math.isclose(error, verdict.syncline.total_m, rel_tol=1e-6)
 
 
-def priced(verdict: Json, key: str, caption: str) -> Table | None:
+def priced(verdict: Verdict, key: str, caption: str) -> Table | None:
     """A list of designs with price and error: the front, the next best."""
     currency = currency_of(verdict)
     rows = []
-    for entry in items(part(verdict, "choice"), key):
+    for entry in items(verdict.choice, key):
         error = entry.get("error_m")
         shown: tuple[str, Tone] = ("\u25c6", "good") if is_chosen(verdict, entry) else ("", "")
         rows.append((
@@ -147,7 +146,7 @@ def design_text(design: object) -> str:
     return ", ".join(names)
 
 
-def excluded(verdict: Json) -> Table | None:
+def excluded(verdict: Verdict) -> Table | None:
     """Options ruled out before the choice, with the reason."""
     rows = [
         (
@@ -157,7 +156,7 @@ def excluded(verdict: Json) -> Table | None:
             Cell(str(entry.get("method") or "\u2013"), code=True),
             str(entry.get("reason")),
         )
-        for entry in items(part(verdict, "choice"), "excluded")
+        for entry in items(verdict.choice, "excluded")
     ]
     heads = ("Role", "Sensor", "Primitive", "Timestamping", "Reason")
     return table("Options ruled out", heads, rows) if rows else None

@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 from syncline_design.report import numbers
 from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_words import (
-    Json,
-    design_sentence,
-    is_waived,
     items,
     kind_text,
     margin_text,
+    obstacle_sentence,
     outcome,
     part,
     requirement_name,
-    value_text,
     waiver_text,
+)
+from syncline_design.verdict.tree import (
+    Caution,
+    Checked,
+    FileProblem,
+    Refused,
+    RequirementResult,
+    Verdict,
 )
 
 Level = Literal["pass", "fail", "undecided", "not_reached", "waived", "warning"]
@@ -41,30 +46,14 @@ class Finding:
     justification: str = ""
 
 
-def spec_file(verdict: Json) -> str:
-    """The path the user gave."""
-    return str(part(verdict, "spec").get("file") or verdict.get("file") or "spec.yaml")
-
-
-def spec_name(verdict: Json) -> str:
-    """The system's name, or its file where it could not be read."""
-    return str(part(verdict, "spec").get("name") or spec_file(verdict))
-
-
-def findings(verdict: Json) -> list[Finding]:
+def findings(verdict: Checked) -> list[Finding]:
     """Every requirement, problem, reason of infeasibility and warning of a verdict."""
-    file = spec_file(verdict)
-    found = [_problem(entry, file) for entry in items(verdict, "problems")]
-    rows = items(verdict, "requirements")
-    found += [_requirement(row, file, verdict, _conflict_of(row, verdict)) for row in rows]
-    if verdict.get("verdict") in ("infeasible", "indeterminate") and not found_failure(found):
-        found.insert(0, _no_design(verdict, file))
-    found += [
-        Finding("warning", str(entry.get("code") or "warning"), "", file,
-                *_about(entry, rows), str(entry.get("message")))
-        for entry in items(verdict, "warnings")
-    ]  # fmt: skip
-    return found
+    if isinstance(verdict, Refused):
+        return [_problem(entry) for entry in verdict.problems]
+    found = [_requirement(row, verdict) for row in verdict.requirements]
+    if verdict.verdict in ("infeasible", "indeterminate") and not found_failure(found):
+        found.insert(0, _no_design(verdict))
+    return found + [_warning(entry, verdict) for entry in verdict.warnings]
 
 
 def found_failure(found: list[Finding]) -> bool:
@@ -72,101 +61,85 @@ def found_failure(found: list[Finding]) -> bool:
     return any(finding.level == "fail" for finding in found)
 
 
-def _place(entry: Json, key: str) -> int:
-    value = numbers.finite(entry.get(key))
-    return 1 if value is None or value < 1 else int(value)
+def _warning(entry: Caution, verdict: Verdict) -> Finding:
+    """At the requirement that it is about, else at the top."""
+    places = {row.id: (row.line or 1, row.column or 1) for row in verdict.requirements}
+    place = places.get(entry.requirement or "", (1, 1))
+    return Finding("warning", entry.code, "", verdict.file, *place, entry.message)
 
 
-def _about(entry: Json, requirements: list[Json]) -> tuple[int, int]:
-    """Line and column of a warning: its own, else those of the requirement it is about."""
-    named = entry.get("requirement")
-    at = next((row for row in requirements if named and row.get("id") == named), entry)
-    at = entry if entry.get("line") is not None else at
-    return _place(at, "line"), _place(at, "column")
+def _problem(entry: FileProblem) -> Finding:
+    message = (f"{entry.path}: " if entry.path else "") + entry.message
+    place = (max(entry.line, 1), max(entry.column, 1))
+    return Finding("fail", "spec", "", entry.file, *place, message)
 
 
-def _problem(entry: Json, file: str) -> Finding:
-    path = entry.get("path")
-    message = (f"{path}: " if path else "") + str(entry.get("message"))
-    return Finding("fail", "spec", "", str(entry.get("file") or file), _place(entry, "line"),
-                   _place(entry, "column"), message)  # fmt: skip
-
-
-def _requirement(row: Json, file: str, verdict: Json, conflict: list[str]) -> Finding:
-    levels: dict[str, Level] = {"pass": "pass", "fail": "fail"}
-    level = levels.get(str(row.get("status")), "undecided")
-    message = requirement_sentence(row)
-    if level == "fail" and is_waived(row):
+def _requirement(row: RequirementResult, verdict: Verdict) -> Finding:
+    levels: dict[str, Level] = {"pass": "pass", "fail": "fail", "indeterminate": "undecided"}
+    level, message = levels[row.status], requirement_sentence(row)
+    conflict = _conflict_of(row, verdict)
+    if level == "fail" and row.is_waived:
         level = "waived"
-    elif level != "pass" and not part(verdict, "design") and str(row.get("id")) in conflict:
-        others = [name for name in conflict if name != str(row.get("id"))]
+    elif level != "pass" and verdict.design is None and row.id in conflict:
+        others = [name for name in conflict if name != row.id]
         level, message = "fail", _conflict_text(row, others, verdict)
-    elif level == "undecided" and not part(verdict, "design"):
+    elif level == "undecided" and verdict.design is None:
         level = "not_reached"
-    return Finding(level, str(row.get("kind")), str(row.get("id")), file, _place(row, "line"),
-                   _place(row, "column"), message, waiver_text(row))  # fmt: skip
+    place = (row.line or 1, row.column or 1)
+    return Finding(level, row.kind, row.id, verdict.file, *place, message, waiver_text(row))
 
 
-def _conflict_of(row: Json, verdict: Json) -> list[str]:
+def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:
     """Ids of the conflict that a requirement is part of; empty where it is in none."""
-    why = part(verdict, "infeasibility")
-    further = why.get("further_conflicts")
-    conflicts = [items(part(why, "conflict"), "requirements")]
-    conflicts += further if isinstance(further, list) else []
-    for members in conflicts:
+    why = verdict.infeasibility or {}
+    further = why.get("further_conflicts") or ()
+    for members in (items(part(why, "conflict"), "requirements"), *further):
         ids = [requirement_name(entry) for entry in members]
-        if str(row.get("id")) in ids:
+        if row.id in ids:
             return ids
     return []
 
 
-def _conflict_text(row: Json, others: list[str], verdict: Json) -> str:
-    limit = f"{row.get('id')}: {kind_text(row)} limited to {value_text(row, 'limit')}"
+def _conflict_text(row: RequirementResult, others: list[str], verdict: Verdict) -> str:
+    limit = f"{row.id}: {kind_text(row)} limited to {numbers.in_unit(row.limit, row.unit)}"
     with_others = f" together with {sentence_list(others)}" if others else ""
     return f"{limit} cannot be met{with_others}.{_fixes(verdict)}"
 
 
-def _fixes(verdict: Json) -> str:
-    texts = [str(entry.get("text")) for entry in items(part(verdict, "infeasibility"), "fixes")]
+def _fixes(verdict: Verdict) -> str:
+    texts = [str(entry.get("text")) for entry in items(verdict.infeasibility, "fixes")]
     if texts:
         lead = "This" if len(texts) == 1 else "Any one of these"
         return f" {lead} would do: {'; '.join(texts)}."
-    joint = part(verdict, "infeasibility").get("joint_fixes")
+    joint = (verdict.infeasibility or {}).get("joint_fixes")
     sets = [" and ".join(str(f.get("text")) for f in fixes) for fixes in joint or ()]
     return f" Together these would do: {'; or '.join(sets)}." if sets else ""
 
 
-def requirement_sentence(row: Json) -> str:
+def requirement_sentence(row: RequirementResult) -> str:
     """`ACC-1: Syncline error 93.9 mm exceeds its limit 50 mm (87.8 % over)`."""
-    status = str(row.get("status"))
-    limit = value_text(row, "limit")
-    if row.get("kind") == "feasible" and status == "fail":
-        return f"{row.get('id')}: this payload cannot exist; {row.get('note')}"
-    if numbers.finite(row.get("value")) is None:
-        text = f"{row.get('id')}: {kind_text(row)} limited to {limit}; no value"
+    limit = numbers.in_unit(row.limit, row.unit)
+    if row.kind == "feasible" and row.status == "fail":
+        return f"{row.id}: this payload cannot exist; {row.note}"
+    if row.value is None:
+        text = f"{row.id}: {kind_text(row)} limited to {limit}; no value"
     else:
-        verb = {"pass": "keeps", "fail": "does not keep"}.get(status, "is undecided against")
+        verbs = {"pass": "keeps", "fail": "does not keep", "indeterminate": "is undecided against"}
+        value = numbers.in_unit(row.value, row.unit)
         text = (
-            f"{row.get('id')}: {kind_text(row)} {value_text(row, 'value')} {verb} its limit "
-            f"{limit} ({margin_text(row)})"
+            f"{row.id}: {kind_text(row)} {value} {verbs[row.status]} its limit {limit} "
+            f"({margin_text(row)})"
         )
-    return text + (f"; {row['note']}" if row.get("note") else "")
+    return text + (f"; {row.note}" if row.note else "")
 
 
-def _no_design(verdict: Json, file: str) -> Finding:
-    word = str(verdict.get("verdict"))
-    level: Level = "fail" if word == "infeasible" else "undecided"
-    return Finding(level, word, "", file, 1, 1, no_design_text(verdict))
+def _no_design(verdict: Verdict) -> Finding:
+    level: Level = "fail" if verdict.verdict == "infeasible" else "undecided"
+    text = f"{outcome(verdict).word}. {obstacle_sentence(verdict.infeasibility)}{_fixes(verdict)}"
+    return Finding(level, verdict.verdict, "", verdict.file, 1, 1, text)
 
 
-def no_design_text(verdict: Json) -> str:
-    """Why there is no design, and what would give one."""
-    text = f"{outcome(verdict).word}. {design_sentence({**verdict, 'design': None})}"
-    reason = verdict.get("reason")
-    return text + (f" {reason}" if reason else "") + _fixes(verdict)
-
-
-def all_findings(verdicts: list[Any]) -> Iterator[Finding]:
+def all_findings(verdicts: Iterable[Checked]) -> Iterator[Finding]:
     """Findings of several verdicts, in their order."""
     for verdict in verdicts:
         yield from findings(verdict)

@@ -7,10 +7,10 @@ import io
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from syncline_design.report.ci import spec_file, spec_name
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import spreadsheet_safe
-from syncline_design.report.verdict_words import Json, items, waiver_text
+from syncline_design.report.verdict_words import waiver_text
+from syncline_design.verdict.tree import Checked, Refused, RequirementResult, Verdict
 
 _COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value", "limit", "unit",
             "margin", "line", "warnings", "waiver")  # fmt: skip
@@ -38,20 +38,22 @@ def _cell(value: Any) -> Any:
     return spreadsheet_safe(value)
 
 
-def render_csv(verdicts: Sequence[Json]) -> str:
+def render_csv(verdicts: Sequence[Checked]) -> str:
     """A row per requirement of every spec; a spec without any still gets its row."""
     rows: list[dict[str, Any]] = []
     for verdict in verdicts:
-        head = {"spec": spec_name(verdict), "file": spec_file(verdict),
-                "verdict": verdict.get("verdict")}  # fmt: skip
-        found = items(verdict, "requirements")
-        rows += [{**row, **head, **_about(verdict, row)} for row in found] or [head]
+        head = {"spec": verdict.name, "file": verdict.file, "verdict": verdict.verdict}
+        found = (
+            []
+            if isinstance(verdict, Refused)
+            else [{**head, **_about(verdict, row)} for row in verdict.requirements]
+        )
+        rows += found or [head]
     return csv_text(_COLUMNS, rows)
 
 
-def _about(verdict: Json, row: Json) -> dict[str, Any]:
-    """A requirement's id, the codes of the warnings about it, and what its waiver does."""
-    name = row.get("id")
-    found = [w for w in items(verdict, "warnings") if name and w.get("requirement") == name]
-    codes = " ".join(str(w.get("code")) for w in found)
-    return {"requirement": name, "warnings": codes, "waiver": waiver_text(row)}
+def _about(verdict: Verdict, row: RequirementResult) -> dict[str, Any]:
+    """A requirement, the codes of the warnings about it, and what its waiver does."""
+    codes = " ".join(w.code for w in verdict.warnings if w.requirement == row.id)
+    told = {"requirement": row.id, "warnings": codes, "waiver": waiver_text(row)}
+    return row.to_json() | told

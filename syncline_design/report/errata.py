@@ -6,7 +6,7 @@ from typing import Final
 
 from syncline_design.paper.errata import ERRATA
 from syncline_design.report.verdict_tables import roles
-from syncline_design.report.verdict_words import Json, items, part
+from syncline_design.verdict.tree import Verdict
 
 # erratum -> catalog entries that must all be in the design for it to matter
 NEEDED: Final[dict[str, frozenset[str]]] = {
@@ -17,15 +17,13 @@ NEEDED: Final[dict[str, frozenset[str]]] = {
 }
 
 
-def relevant(verdict: Json) -> list[str]:
+def relevant(verdict: Verdict) -> list[str]:
     """Reasons of the errata that touch this verdict's platforms, sensors or lever arms."""
     present = {str(entry.get("sensor")) for _, _, entry in roles(verdict)}
-    for stage in items(part(verdict, "spec"), "stages"):
-        present.add(str(part(stage, "platform").get("id")).replace("auv_printed", "auv"))
-    with_lever_arm = bool(part(part(verdict, "syncline"), "lever_arm"))
+    present |= {s.platform.id.replace("auv_printed", "auv") for s in verdict.spec.stages}
     return [
         f"{erratum.where[:1].upper()}{erratum.where[1:]}: {erratum.reason}"
         for erratum in ERRATA
         if (erratum.id in NEEDED and present >= NEEDED[erratum.id])
-        or (erratum.id == "lever_arm" and with_lever_arm)
+        or (erratum.id == "lever_arm" and verdict.syncline is not None)
     ]

@@ -9,20 +9,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from syncline_design.report.ci import SILENT, Finding, all_findings, spec_file, spec_name
+from syncline_design.report.ci import SILENT, Finding, all_findings
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import Json, design_sentence, outcome
+from syncline_design.report.verdict_words import design_sentence, outcome
+from syncline_design.verdict.tree import Checked
 
 _COMMANDS = {"fail": "error", "undecided": "error", "waived": "warning", "warning": "warning"}
 
 
-def render_github(verdicts: Sequence[Json]) -> str:
+def render_github(verdicts: Sequence[Checked]) -> str:
     """One command per finding that is no pass, then a notice with each spec's outcome."""
-    lines = [github_command(f) for f in all_findings(list(verdicts)) if f.level not in SILENT]
+    lines = [github_command(f) for f in all_findings(verdicts) if f.level not in SILENT]
     for verdict in verdicts:
         text = f"{outcome(verdict).word}. {design_sentence(verdict)}"
-        place = f"file={_property(PurePath(spec_file(verdict)).as_posix())},line=1"
-        lines.append(f"::notice {place},title={_property(spec_name(verdict))}::{_data(text)}")
+        place = f"file={_property(PurePath(verdict.file).as_posix())},line=1"
+        lines.append(f"::notice {place},title={_property(verdict.name)}::{_data(text)}")
     return "\n".join(lines) + "\n"
 
 

@@ -5,7 +5,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import Checked
 
 SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
 
@@ -25,8 +28,7 @@ def _finite(value: Any) -> Any:
     return value
 
 
-def verdicts_json(verdicts: Sequence[Mapping[str, Any]]) -> str:
+def verdicts_json(verdicts: Sequence[Checked]) -> str:
     """One verdict as it is; several under `verdicts`."""
-    if len(verdicts) == 1:
-        return json_text(verdicts[0])
-    return json_text({"schema": SEVERAL_SCHEMA, "verdicts": list(verdicts)})
+    plain = [verdict.to_json() for verdict in verdicts]
+    return json_text(plain[0] if len(plain) == 1 else {"schema": SEVERAL_SCHEMA, "verdicts": plain})

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from syncline_design.report.ci import Finding, findings, spec_file, spec_name
+from syncline_design.report.ci import Finding, findings
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import Json, outcome
+from syncline_design.report.verdict_words import outcome
+from syncline_design.verdict.tree import Checked
 
 
-def render_junit(verdicts: Sequence[Json]) -> str:
+def render_junit(verdicts: Sequence[Checked]) -> str:
     """A JUnit document; failures fail, what is undecided errors, what is waived is skipped.
 
     Times are 0 and no timestamp is given: the same verdict gives the same bytes.
@@ -27,7 +28,7 @@ def render_junit(verdicts: Sequence[Json]) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + body + "\n"
 
 
-def _suite(verdict: Json) -> ElementTree.Element:
+def _suite(verdict: Checked) -> ElementTree.Element:
     found = findings(verdict)
     cases = [finding for finding in found if finding.level != "warning"]
     counts = {
@@ -36,12 +37,12 @@ def _suite(verdict: Json) -> ElementTree.Element:
         "errors": sum(f.level == "undecided" for f in cases),
         "skipped": sum(f.level in ("waived", "not_reached") for f in cases),
     }
-    suite = ElementTree.Element("testsuite", {"name": visible(spec_name(verdict))})
+    suite = ElementTree.Element("testsuite", {"name": visible(verdict.name)})
     for key, value in counts.items():
         suite.set(key, str(value))
     suite.set("time", "0")
     for finding in cases:
-        suite.append(_case(finding, spec_file(verdict)))
+        suite.append(_case(finding, verdict.file))
     lines = [outcome(verdict).word]
     lines += [f"warning [{f.rule}]: {visible(f.message)}" for f in found if f.level == "warning"]
     ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)

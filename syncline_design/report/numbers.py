@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 from syncline_design.model import estimates
 from syncline_design.model.horizon import duration_words
 from syncline_design.model.quantity import Dimension, format_quantity
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import MissionHorizon
 
 MISSING: Final = "\N{EM DASH}"
 _TYPOGRAPHIC = (
@@ -47,11 +49,10 @@ def time(value: Any, digits: int = 4) -> str:
     return _shown(value, Dimension.TIME, digits)
 
 
-def horizon(entry: Mapping[str, Any]) -> str:
+def horizon(entry: MissionHorizon) -> str:
     """`1 h, extent 1 km, tilt 10 deg`."""
-    duration = finite(entry.get("duration_s"))
-    shown = MISSING if duration is None else duration_words(duration)
-    return f"{shown}, extent {length(entry.get('extent_m'))}, tilt {angle(entry.get('tilt_rad'))}"
+    extent, tilt = length(entry.extent_m), angle(entry.tilt_rad)
+    return f"{duration_words(entry.duration_s)}, extent {extent}, tilt {tilt}"
 
 
 def time_limit(value: Any, digits: int = 4) -> str:

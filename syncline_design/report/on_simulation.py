@@ -43,7 +43,6 @@ CSV_HEADER: Final = "tau_s,worst_case_m,syncline_m,ratio,bound_m,gap,reason"
 
 def on_simulation(result: Simulation, system: System) -> Document:
     """A simulated system as a document; no verdict is due here."""
-    monte_carlo = result.monte_carlo.to_json()
     name = result.spec.name if result.spec is not None else "Simulated system"
     file = result.spec.file if result.spec is not None else ""
     where = f", along {result.trajectory}" if result.trajectory else ""
@@ -53,7 +52,7 @@ def on_simulation(result: Simulation, system: System) -> Document:
         name=name,
         sentences=(f"The nonlinear measurement chain against the Syncline{where}.",),
         facts=(
-            *simulation_facts(monte_carlo),
+            *simulation_facts(result.monte_carlo),
             ("\u03c4_crit of the system", numbers.time_limit(result.syncline.tau_crit_s)),
         ),
         sections=(
@@ -80,8 +79,7 @@ def _grid(result: Simulation) -> list[Node]:
     said = (
         f"At the system's own \u03c4, {numbers.time(worst.tau_s)}: "
         f"{numbers.length(worst.value_m)}, {numbers.percent(worst.ratio_to_syncline, 4)} of the "
-        f"Syncline's {numbers.length(worst.syncline_m)}. "
-        + certificate(result.monte_carlo.to_json())
+        f"Syncline's {numbers.length(worst.syncline_m)}. " + certificate(result.monte_carlo)
     )
     return [
         Text("Every magnitude is held to its Syncline term and the directions are free: the "
@@ -140,11 +138,10 @@ def _causes(grid: tuple[ComparisonRow, ...]) -> list[Node]:
 
 
 def _errors(result: Simulation) -> list[Node]:
-    monte_carlo = result.monte_carlo.to_json()
-    told = ensemble(monte_carlo)
+    monte_carlo = result.monte_carlo
     return [
-        Text(f"Gaussian noise and the timing errors' own distributions. {BEYOND}"
-             + (f" {told}" if told else "")),
+        Text(f"Gaussian noise and the timing errors' own distributions. {BEYOND} "
+             f"{ensemble(monte_carlo)}"),
         *histogram_chart(monte_carlo, None),
         *show(quantiles(monte_carlo)),
     ]  # fmt: skip

@@ -13,7 +13,6 @@ from syncline_design.report import (
     verdict_tables,
     verdict_words,
 )
-from syncline_design.report.ci import spec_file, spec_name
 from syncline_design.report.document import (
     Document,
     Facts,
@@ -43,24 +42,23 @@ from syncline_design.report.simulated import (
 )
 from syncline_design.report.table import Table
 from syncline_design.report.verdict_words import Json, items, part
+from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 MOST_OPEN = 12  # rows of a table of the choice that is not folded away
 _PROVEN = muted(" (solved again to prove it)")
 
 
-def on_verdict(verdict: Json) -> Document:
-    """A verdict as a document (data: schema syncline-design/verdict/v1).
-
-    Any optional part that is missing or null is left out.
-    """
+def on_verdict(verdict: Checked) -> Document:
+    """A verdict as a document; parts that it does not have are left out."""
+    if isinstance(verdict, Refused):
+        return _on_refused(verdict)
     return Document(
         family="Design report",
         outcome=verdict_words.outcome(verdict),
-        name=spec_name(verdict),
+        name=verdict.name,
         sentences=(verdict_words.design_sentence(verdict),),
         facts=tuple(_key_facts(verdict)),
         sections=(
-            *section("problems", "Problems in the file", problems(verdict), "Problems"),
             *section("infeasibility", "Why no design meets the requirements", _why_not(verdict),
                      "Why not"),
             *section("requirements", "Requirements",
@@ -78,49 +76,57 @@ def on_verdict(verdict: Json) -> Document:
             *section("basis", "Assumptions, sources, errata", _basis(verdict), "Basis", "page"),
             *_provenance(verdict),
         ),
-        source=str(part(verdict, "spec").get("file") or ""),
+        source=verdict.file,
     )  # fmt: skip
 
 
-def _key_facts(verdict: Json) -> list[tuple[str, str]]:
+def _on_refused(refused: Refused) -> Document:
+    """A file that could not be read, among several that could."""
+    return Document(
+        family="Design report",
+        outcome=verdict_words.outcome(refused),
+        name=refused.name,
+        sentences=(verdict_words.design_sentence(refused),),
+        facts=(),
+        sections=(*section("problems", "Problems in the file", problems(refused), "Problems"),),
+    )
+
+
+def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     """Price, error, tightest margin: the answer in figures."""
-    design, syncline = part(verdict, "design"), part(verdict, "syncline")
+    design = verdict.design or {}
     facts = []
     if design.get("cost") is not None:
         currency = verdict_tables.currency_of(verdict)
         facts.append(("Price", numbers.money(design["cost"], currency)))
     target = verdict_figures.lowest_limit(verdict, "accuracy")
-    if syncline.get("total_m") is not None:
-        total = numbers.length(syncline["total_m"])
+    if verdict.syncline is not None:
         of = f" of {numbers.length(target)}" if target else ""
-        facts.append(("Syncline error", total + of))
-    row = verdict_words.tightest(items(verdict, "requirements"))
+        facts.append(("Syncline error", numbers.length(verdict.syncline.total_m) + of))
+    row = verdict_words.tightest(verdict.requirements)
     if row is not None:
-        facts.append(("Tightest margin", f"{row.get('id')}: {verdict_words.margin_text(row)}"))
-    probability = numbers.finite(
-        part(part(verdict, "monte_carlo"), "probability_within_target").get("value")
-    )
-    if probability is not None:
-        facts.append(("Simulated within target", numbers.percent(probability, 4)))
+        facts.append(("Tightest margin", f"{row.id}: {verdict_words.margin_text(row)}"))
+    within = verdict.monte_carlo and verdict.monte_carlo.probability_within_target
+    if within:
+        facts.append(("Simulated within target", numbers.percent(within.value, 4)))
     for key, label, shown in (("mass", "Mass", numbers.mass), ("power", "Power", numbers.power)):
         if design.get(key) is not None:
             facts.append((label, shown(design[key])))
     return facts
 
 
-def problems(verdict: Json) -> list[Node]:
+def problems(refused: Refused) -> list[Node]:
     """What is wrong with a file that was refused, each with its place."""
     entries: tuple[Inline, ...] = tuple(
-        (code(f"{entry.get('file') or spec_file(verdict)}:{entry.get('line')}:"
-              f"{entry.get('column')}"), " ", given(entry.get("path") or ""), ": ",
-         given(entry.get("message")))
-        for entry in items(verdict, "problems")
+        (code(f"{entry.file}:{entry.line}:{entry.column}"), " ", given(entry.path), ": ",
+         given(entry.message))
+        for entry in refused.problems
     )  # fmt: skip
     return [Items(entries)] if entries else []
 
 
-def _why_not(verdict: Json) -> list[Node]:
-    why = part(verdict, "infeasibility")
+def _why_not(verdict: Verdict) -> list[Node]:
+    why = verdict.infeasibility
     if not why:
         return []
     told = [str(line).strip() for line in why.get("text") or ()]
@@ -179,22 +185,21 @@ def _joint(entries: Sequence[Json]) -> tuple[str | Span, ...]:
     return (*told, _PROVEN)
 
 
-def _warnings(verdict: Json) -> list[Node]:
+def _warnings(verdict: Verdict) -> list[Node]:
     entries: tuple[Inline, ...] = tuple(
-        (given(entry.get("message")), " (", code(entry.get("code") or "warning"), ")")
-        for entry in items(verdict, "warnings")
+        (given(entry.message), " (", code(entry.code), ")") for entry in verdict.warnings
     )
     return [Items(entries, "!", "warn")] if entries else []
 
 
-def _payload(verdict: Json) -> list[Node]:
+def _payload(verdict: Verdict) -> list[Node]:
     return [
         *show(verdict_tables.payload(verdict), silent=True),
         *show(verdict_tables.shared(verdict)),
     ]
 
 
-def _timing(verdict: Json) -> list[Node]:
+def _timing(verdict: Verdict) -> list[Node]:
     table = verdict_tables.taus(verdict)
     if not table.rows:
         return []
@@ -203,52 +208,51 @@ def _timing(verdict: Json) -> list[Node]:
     return [Text(lead), *verdict_figures.timing_chart(verdict), *show(table, silent=True)]
 
 
-def _syncline(verdict: Json) -> list[Node]:
-    syncline = part(verdict, "syncline")
-    chart = verdict_figures.syncline_chart(verdict)
-    if not chart:
+def _syncline(verdict: Verdict) -> list[Node]:
+    syncline, chart = verdict.syncline, verdict_figures.syncline_chart(verdict)
+    if syncline is None or not chart:
         return []
-    tau, crit = (numbers.finite(syncline.get(key)) for key in ("tau_s", "tau_crit_s"))
-    bound = "synchronisation" if tau and crit and tau >= crit else "sensor noise"
+    tau, crit = syncline.tau_s, syncline.tau_crit_s
+    bound = "synchronisation" if crit is not None and tau >= crit else "sensor noise"
     facts = [
-        ("Sensor error (roof)", numbers.length(syncline.get("sensor_error_m"))),
-        ("Synchronisation rate (slope)", numbers.speed(syncline.get("sync_rate_mps"))),
+        ("Sensor error (roof)", numbers.length(syncline.sensor_error_m)),
+        ("Synchronisation rate (slope)", numbers.speed(syncline.sync_rate_mps)),
         ("\u03c4 of the system", numbers.time(tau)),
         ("\u03c4_crit of the system", numbers.time_limit(crit)),
         ("Bound by", bound),
-        ("Synchronisation error", numbers.length(syncline.get("sync_error_m"))),
-        ("Total error", numbers.length(syncline.get("total_m"))),
+        ("Synchronisation error", numbers.length(syncline.sync_error_m)),
+        ("Total error", numbers.length(syncline.total_m)),
+        ("Drifts, grids, heave charged for", numbers.horizon(verdict.horizon)),
     ]
-    if syncline.get("systematic_error_m"):
-        facts.insert(-1, ("Known effects", numbers.length(syncline["systematic_error_m"])))
-    if horizon := part(verdict, "horizon"):
-        facts.append(("Drifts, grids, heave charged for", numbers.horizon(horizon)))
+    if syncline.systematic_error_m:
+        facts.insert(-2, ("Known effects", numbers.length(syncline.systematic_error_m)))
     column = Group((Facts(tuple(facts)), *verdict_figures.explorer(verdict)))
-    return [Group((*chart, column), "split"), *show(verdict_tables.models(verdict))]
+    return [Group((*chart, column), "split"), *show(verdict_tables.models(syncline))]
 
 
-def _ledger(verdict: Json) -> list[Node]:
-    table = verdict_tables.ledger(verdict)
+def _ledger(verdict: Verdict) -> list[Node]:
+    if verdict.syncline is None:
+        return []
+    table = verdict_tables.ledger(verdict.syncline)
     return [*verdict_figures.ledger_chart(verdict), *show(table, silent=True)]
 
 
-def _simulation(verdict: Json) -> list[Node]:
-    monte_carlo = part(verdict, "monte_carlo")
-    if not monte_carlo:
+def _simulation(verdict: Verdict) -> list[Node]:
+    monte_carlo = verdict.monte_carlo
+    if monte_carlo is None:
         return []
-    told = (certificate(monte_carlo), ensemble(monte_carlo))
-    total = numbers.finite(part(verdict, "syncline").get("total_m"))
-    charts = [*histogram_chart(monte_carlo, total), *verdict_figures.grid_chart(verdict)]
+    told = (certificate(monte_carlo), ensemble(monte_carlo), BEYOND)
+    total = None if verdict.syncline is None else verdict.syncline.total_m
     return [
         Facts(tuple(simulation_facts(monte_carlo))),
-        *(Text(text, quiet=True) for text in (*told, BEYOND) if text),
-        *([Group(tuple(charts), "pair")] if charts else []),
+        *(Text(text, quiet=True) for text in told),
+        Group(tuple(histogram_chart(monte_carlo, total)), "pair"),
         *show(quantiles(monte_carlo)),
     ]
 
 
-def _choice(verdict: Json) -> list[Node]:
-    choice = part(verdict, "choice")
+def _choice(verdict: Verdict) -> list[Node]:
+    choice = verdict.choice or {}
     proof = _proof(verdict)
     nodes: list[Node] = [Text(proof)] if proof else []
     nodes += [Text((strong(line),), reach="page") for line in choice.get("incomplete") or ()]
@@ -266,14 +270,14 @@ def _folded(table: Table) -> list[Node]:
     return [Group(tuple(show(table)), "fold", summary=summary, reach="page")]
 
 
-def _proof(verdict: Json) -> str:
+def _proof(verdict: Verdict) -> str:
     """How it is known that nothing better exists."""
-    proof = part(part(verdict, "choice"), "proof")
+    proof = part(verdict.choice, "proof")
     if not proof:
         return ""
     method = ROADS.get(str(proof.get("method")), str(proof.get("method")))
-    combinations = str(part(verdict, "spec").get("combinations") or "")
-    among = f" among {_grouped(combinations)} combinations" if combinations.isdigit() else ""
+    combinations = verdict.spec.combinations
+    among = f" among {_grouped(combinations)} combinations" if combinations else ""
     optimal = "proven optimal" if proof.get("optimal") else "not proven optimal"
     checked = ", recomputed exactly afterwards" if proof.get("rechecked") else ""
     found = f"Found by {method}{among}: {optimal}{checked}."
@@ -287,40 +291,37 @@ def _grouped(digits: str) -> str:
     return f"{int(digits):,}".replace(",", "\N{NO-BREAK SPACE}")
 
 
-def _effects(verdict: Json) -> list[Node]:
-    entries: list[Inline] = []
-    for entry in items(verdict, "effects"):
-        sentence = entry.get("sentence")
-        place = f"{entry.get('stage')} {entry.get('sensor')}"
-        said: list[str | Span] = [given(f"{sentence} ")] if sentence else []
-        entries.append((*said, "(", code(entry.get("effect")), ", ", given(place), ")"))
+def _effects(verdict: Verdict) -> list[Node]:
+    entries: list[Inline] = [
+        (given(f"{entry.sentence} "), "(", code(entry.effect), ", ",
+         given(f"{entry.stage} {entry.sensor}"), ")")
+        for entry in verdict.effects or ()
+    ]  # fmt: skip
     return [Items(tuple(entries))] if entries else []
 
 
-def _basis(verdict: Json) -> list[Node]:
+def _basis(verdict: Verdict) -> list[Node]:
     notes = tuple(errata.relevant(verdict))
     title = Heading("Errata of the paper that bear on this design")
     nodes = [*show(verdict_tables.assumptions(verdict)), *show(verdict_tables.sources(verdict))]
     return [*nodes, title, Items(notes)] if notes else nodes
 
 
-def _provenance(verdict: Json) -> list[Section]:
+def _provenance(verdict: Verdict) -> list[Section]:
     """In full on the page; in one line elsewhere."""
-    found = part(verdict, "provenance")
-    labels = (
-        ("version", "syncline-design"),
-        ("spec_sha256", "Spec, SHA-256"),
-        ("catalogs_sha256", "Catalogs, SHA-256"),
-        ("seed", "Seed"),
-        ("python", "Python"),
-        ("numpy", "NumPy"),
-    )
-    known = [(label, str(found[key])) for key, label in labels if found.get(key) is not None]
-    file = part(verdict, "spec").get("file")
-    full = [*([("Spec file", str(file))] if file else []), *known]
+    found = verdict.provenance
+    full = [
+        ("Spec file", verdict.file),
+        ("syncline-design", found.version),
+        ("Spec, SHA-256", found.spec_sha256),
+        ("Catalogs, SHA-256", found.catalogs_sha256),
+        ("Seed", str(found.seed)),
+        ("Python", found.python),
+        ("NumPy", found.numpy),
+    ]
     line = (
-        f"syncline-design {found.get('version')}, spec {str(found.get('spec_sha256'))[:12]}, "
-        f"catalogs {str(found.get('catalogs_sha256'))[:12]}, seed {found.get('seed')}"
+        f"syncline-design {found.version}, spec {found.spec_sha256[:12]}, "
+        f"catalogs {found.catalogs_sha256[:12]}, seed {found.seed}"
     )
-    short = section("made-by", "Provenance", [Text(line)] if found else [], reach="text")
+    short = section("made-by", "Provenance", [Text(line)], reach="text")
     return [*provenance(full), *short]

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from syncline_design.report import numbers, verdict_tables, verdict_words
-from syncline_design.report.ci import spec_file, spec_name
 from syncline_design.report.document import (
     Document,
     Heading,
@@ -21,15 +20,15 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.on_verdict import on_verdict, problems
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.verdict_words import Json, items, part
 from syncline_design.report.words import OUTCOMES
+from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 
-def on_verdicts(verdicts: Sequence[Json]) -> Document:
+def on_verdicts(verdicts: Sequence[Checked]) -> Document:
     """The design report of one verdict, or an overview of several."""
-    if len(verdicts) == 1 and verdicts[0].get("verdict") != "refused":
+    if len(verdicts) == 1 and not isinstance(verdicts[0], Refused):
         return on_verdict(verdicts[0])
-    good = sum(verdict.get("verdict") == "meets" for verdict in verdicts)
+    good = sum(verdict.verdict == "meets" for verdict in verdicts)
     known = OUTCOMES["meets" if good == len(verdicts) else "fails"]
     word = f"{good} of {len(verdicts)} specs meet every requirement"
     specs = [node for n, verdict in enumerate(verdicts, 1) for node in _spec(verdict, n)]
@@ -47,35 +46,44 @@ def on_verdicts(verdicts: Sequence[Json]) -> Document:
     )
 
 
-def _spec(verdict: Json, index: int) -> list[Node]:
-    """A spec in short; its table has a caption of its own, for readers that jump between tables."""
+def _spec(verdict: Checked, index: int) -> list[Node]:
+    """A spec in short."""
     outcome = verdict_words.outcome(verdict)
-    caption = f"Requirements of spec {index}, {spec_name(verdict)}"
-    requirements = replace(verdict_tables.requirements(verdict), caption=caption)
     return [
-        Heading(given(spec_name(verdict))),
-        Text((strong(outcome.word), " (", code(spec_file(verdict)), ")"),
+        Heading(given(verdict.name)),
+        Text((strong(outcome.word), " (", code(verdict.file), ")"),
              mark=outcome.mark, tone=outcome.tone),
         Text(verdict_words.design_sentence(verdict)),
-        *problems(verdict),
-        *show(requirements, silent=True),
+        *(problems(verdict) if isinstance(verdict, Refused) else _requirements(verdict, index)),
     ]  # fmt: skip
 
 
-def _overview(verdicts: Sequence[Json]) -> Table:
+def _requirements(verdict: Verdict, index: int) -> list[Node]:
+    """With a caption of its own, for readers that jump between tables."""
+    caption = f"Requirements of spec {index}, {verdict.name}"
+    return show(replace(verdict_tables.requirements(verdict), caption=caption), silent=True)
+
+
+def _overview(verdicts: Sequence[Checked]) -> Table:
     rows = []
     for verdict in verdicts:
         result = verdict_words.outcome(verdict)
-        design, syncline = part(verdict, "design"), part(verdict, "syncline")
-        currency = verdict_tables.currency_of(verdict)
-        tight = verdict_words.tightest(items(verdict, "requirements"))
-        rows.append((
-            spec_name(verdict),
-            Cell(result.word, tone=result.tone, mark=result.mark),
-            Cell(numbers.money(design.get("cost"), currency), numbers.finite(design.get("cost"))),
-            Cell(numbers.length(syncline.get("total_m")), numbers.finite(syncline.get("total_m"))),
-            numbers.MISSING if tight is None
-            else f"{verdict_words.margin_text(tight)} ({tight.get('id')})",
-        ))  # fmt: skip
+        word = Cell(result.word, tone=result.tone, mark=result.mark)
+        rows.append((verdict.name, word, *_answer(verdict)))
     heads = ("Spec", "Verdict", "Price #", "Syncline error #", "Tightest margin")
     return table("Verdicts", heads, rows)
+
+
+def _answer(verdict: Checked) -> tuple[Cell, Cell, str]:
+    """Price, error and tightest margin, as far as there are any."""
+    unknown = Cell(numbers.MISSING)
+    if isinstance(verdict, Refused):
+        return unknown, unknown, numbers.MISSING
+    cost = None if verdict.design is None else verdict.design["cost"]
+    total = None if verdict.syncline is None else verdict.syncline.total_m
+    tight = verdict_words.tightest(verdict.requirements)
+    return (
+        Cell(numbers.money(cost, verdict.spec.currency), cost),
+        Cell(numbers.length(total), total),
+        numbers.MISSING if tight is None else f"{verdict_words.margin_text(tight)} ({tight.id})",
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
@@ -26,9 +27,9 @@ def render_optimize(name: str, found: Optimisation) -> str:
     from syncline_design.report.on_verdict import on_verdict
     from syncline_design.report.render_html import html
 
-    verdict = found.verdict.to_json() if found.verdict is not None else {}
+    assert found.verdict is not None
     told = optimisation_json(found)
-    choice = dict(verdict.get("choice") or {})
+    choice = dict(found.verdict.choice or {})
     choice |= {key: told[key] for key in _HINGES if told.get(key)}
     choice["incomplete"] = incomplete_lines(found)
-    return html(on_verdict({**verdict, "choice": choice}))
+    return html(on_verdict(replace(found.verdict, choice=choice)))

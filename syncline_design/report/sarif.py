@@ -16,7 +16,7 @@ from syncline_design import __version__
 from syncline_design.report.ci import SILENT, Finding, all_findings
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import Json
+from syncline_design.verdict.tree import Checked
 
 SCHEMA_URI: Final = (
     "https://docs.oasis-open.org/sarif/sarif/v2.1.0/errata01/os/schemas/sarif-schema-2.1.0.json"
@@ -35,9 +35,9 @@ _RULES: Final[dict[str, str]] = {
 _LEVELS: Final = {"fail": "error", "waived": "error", "undecided": "warning", "warning": "note"}
 
 
-def render_sarif(verdicts: Sequence[Json]) -> str:
+def render_sarif(verdicts: Sequence[Checked]) -> str:
     """A SARIF log with one run; what passes is left out, what is waived is suppressed."""
-    return sarif_log([f for f in all_findings(list(verdicts)) if f.level not in SILENT])
+    return sarif_log([f for f in all_findings(verdicts) if f.level not in SILENT])
 
 
 def sarif_log(found: Sequence[Finding]) -> str:

@@ -6,16 +6,16 @@ from collections import Counter
 from collections.abc import Sequence
 
 from syncline_design.report.text import sentence_list, visible
-from syncline_design.report.verdict_words import Json
 from syncline_design.report.words import VERBS
 from syncline_design.spec.folders import Skipped
+from syncline_design.verdict.tree import Checked
 
 
-def summary_line(verdicts: Sequence[Json]) -> str:
+def summary_line(verdicts: Sequence[Checked]) -> str:
     """`5 specs: 3 meet their requirements, 1 is infeasible and 1 is refused.`"""
     if not verdicts:
         return "No spec to check."
-    counts = Counter(str(verdict.get("verdict")) for verdict in verdicts)
+    counts: Counter[str] = Counter(verdict.verdict for verdict in verdicts)
     parts = [f"{counts[word]} {VERBS[word][counts[word] > 1]}" for word in VERBS if counts[word]]
     many = "spec" if len(verdicts) == 1 else "specs"
     return f"{len(verdicts)} {many}: {sentence_list(parts)}."

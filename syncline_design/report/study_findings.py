@@ -53,7 +53,7 @@ def _misses(case: CaseResult) -> Iterator[_Miss]:
         return
     missed = [row for row in case.record.requirements if row.status == "fail" and not row.is_waived]
     for row in missed:
-        sentence = requirement_sentence(row.to_json())
+        sentence = requirement_sentence(row)
         yield _Miss(row.kind, sentence, row.id, row.line, row.column)
     if missed:
         return

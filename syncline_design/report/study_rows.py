@@ -7,7 +7,7 @@ from typing import Any
 
 from syncline_design.model.quantity import Dimension
 from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import design_sentence
+from syncline_design.report.verdict_words import obstacle_sentence
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.record import CaseRecord
 from syncline_design.studies.result import CaseResult, StudyResult
@@ -115,7 +115,7 @@ def reason(case: CaseResult) -> str:
     why = record.infeasibility or {}
     fixes = [fix["text"] for fix in why["fixes"]]
     would = f" Either would do: {'; '.join(fixes)}." if fixes else ""
-    return design_sentence({"infeasibility": why}) + would
+    return obstacle_sentence(why) + would
 
 
 def study_csv(result: StudyResult) -> str:

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from syncline_design.report import choice_tables, numbers, verdict_tables, verdict_words
 from syncline_design.report.document import Chart, Explorer, Node
 from syncline_design.report.text import shortened
-from syncline_design.report.verdict_words import Json, items, part
+from syncline_design.report.verdict_words import items
+from syncline_design.verdict.tree import SynclineFigures, Verdict
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
@@ -15,21 +16,15 @@ if TYPE_CHECKING:
 # What draws is imported where it draws: ElementTree and matplotlib hide behind it.
 
 
-def lowest_limit(verdict: Json, kind: str) -> float | None:
+def lowest_limit(verdict: Verdict, kind: str) -> float | None:
     """The tightest limit of a kind."""
-    limits = [
-        float(row["limit"])
-        for row in items(verdict, "requirements")
-        if row.get("kind") == kind and numbers.finite(row.get("limit")) is not None
-    ]
-    return min(limits, default=None)
+    return min((row.limit for row in verdict.requirements if row.kind == kind), default=None)
 
 
-def syncline_chart(verdict: Json) -> list[Node]:
-    """The verdict's Syncline with its operating point; nothing where it has none."""
-    syncline = part(verdict, "syncline")
-    floor, rate = _floor_and_rate(verdict)
-    if floor is None or rate is None:
+def syncline_chart(verdict: Verdict) -> list[Node]:
+    """The verdict's Syncline with its operating point; nothing where it has no roof."""
+    syncline = verdict.syncline
+    if syncline is None or not syncline.sensor_error_m:
         return []
 
     def draw() -> InlineFigure:
@@ -37,13 +32,13 @@ def syncline_chart(verdict: Json) -> list[Node]:
 
         return figures.syncline(
             figures.SynclineCurve(
-                floor_m=floor,
-                rate_mps=rate,
-                tau_crit_s=numbers.finite(syncline.get("tau_crit_s")),
-                tau_s=numbers.finite(syncline.get("tau_s")),
-                total_m=numbers.finite(syncline.get("total_m")),
+                floor_m=_floor_m(syncline),
+                rate_mps=syncline.sync_rate_mps,
+                tau_crit_s=syncline.tau_crit_s,
+                tau_s=syncline.tau_s,
+                total_m=syncline.total_m,
                 target_m=lowest_limit(verdict, "accuracy"),
-                lever_arm_rate_mps=numbers.finite(part(syncline, "lever_arm").get("sync_rate_mps")),
+                lever_arm_rate_mps=syncline.lever_arm.sync_rate_mps,
             )
         )
 
@@ -55,23 +50,20 @@ def syncline_chart(verdict: Json) -> list[Node]:
     return [Chart("syncline", draw, caption)]
 
 
-def _floor_and_rate(verdict: Json) -> tuple[float | None, float | None]:
-    """The error at tau 0 [m] and what each second of tau adds [m/s]."""
-    syncline = part(verdict, "syncline")
-    sensor = numbers.finite(syncline.get("sensor_error_m"))
-    known = numbers.finite(syncline.get("systematic_error_m")) or 0.0
-    return sensor + known if sensor else None, numbers.finite(syncline.get("sync_rate_mps"))
+def _floor_m(syncline: SynclineFigures) -> float:
+    """The error at tau 0 [m]: sensor noise and known effects."""
+    return syncline.sensor_error_m + syncline.systematic_error_m
 
 
-def explorer(verdict: Json) -> list[Node]:
+def explorer(verdict: Verdict) -> list[Node]:
     """Values for the sliders; the total follows the model that decides, in proportion to tau."""
-    syncline, rows = part(verdict, "syncline"), items(verdict, "requirements")
-    floor, _ = _floor_and_rate(verdict)
-    tau, total = numbers.finite(syncline.get("tau_s")), numbers.finite(syncline.get("total_m"))
-    if floor is None or not tau or total is None:
+    syncline = verdict.syncline
+    if syncline is None or not syncline.sensor_error_m or not syncline.tau_s:
         return []
-    crit, target = numbers.finite(syncline.get("tau_crit_s")), lowest_limit(verdict, "accuracy")
-    fixed = [row for row in rows if row.get("kind") not in ("accuracy", "sync", "monte_carlo")]
+    floor, tau, total = _floor_m(syncline), syncline.tau_s, syncline.total_m
+    crit, target = syncline.tau_crit_s, lowest_limit(verdict, "accuracy")
+    simulated = ("accuracy", "sync", "monte_carlo")
+    fixed = [row for row in verdict.requirements if row.kind not in simulated]
     centre, middle = crit or tau, target or total
     return [
         Explorer(
@@ -89,7 +81,7 @@ def explorer(verdict: Json) -> list[Node]:
     ]
 
 
-def timing_chart(verdict: Json) -> list[Node]:
+def timing_chart(verdict: Verdict) -> list[Node]:
     """Each sensor's tau against its tau_crit."""
     roles = [r for r in verdict_tables.roles(verdict) if numbers.finite(r[2].get("tau_s"))
              is not None]  # fmt: skip
@@ -111,24 +103,19 @@ def timing_chart(verdict: Json) -> list[Node]:
     return [Chart("timing", draw, caption)] if roles else []
 
 
-def ledger_chart(verdict: Json) -> list[Node]:
+def ledger_chart(verdict: Verdict) -> list[Node]:
     """The terms of the total error."""
-    entries = [
-        entry
-        for entry in items(part(verdict, "syncline"), "ledger")
-        if numbers.finite(entry.get("value_m")) is not None
-    ]
-    many = len({str(entry.get("stage")) for entry in entries if entry.get("stage")}) > 1
+    entries = () if verdict.syncline is None else verdict.syncline.ledger
+    many = len({entry.stage for entry in entries if entry.stage}) > 1
 
     def draw() -> InlineFigure:
         from syncline_design.report import figures
 
         terms = []
         for entry in entries:
-            named = many and entry.get("stage")
-            stage = f"{shortened(str(entry['stage']), 14)}: " if named else ""
+            stage = f"{shortened(entry.stage, 14)}: " if many and entry.stage else ""
             label = stage + shortened(verdict_words.term_text(entry))
-            terms.append(figures.LedgerTerm(label, float(entry["value_m"]), str(entry.get("kind"))))
+            terms.append(figures.LedgerTerm(label, entry.value_m, entry.kind))
         return figures.ledger(terms, lowest_limit(verdict, "accuracy"))
 
     caption = (
@@ -138,31 +125,10 @@ def ledger_chart(verdict: Json) -> list[Node]:
     return [Chart("ledger", draw, caption)] if entries else []
 
 
-def grid_chart(verdict: Json) -> list[Node]:
-    """The simulated worst case and the Syncline over tau, incomplete rows left out."""
-    points = []
-    for row in items(part(verdict, "monte_carlo"), "grid"):
-        figures = [numbers.finite(row.get(k)) for k in ("tau_s", "worst_case_m", "syncline_m")]
-        known = [value for value in figures if value]
-        if len(known) == len(figures):
-            points.append((known[0], known[1], known[2]))
-
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import GridPoint, simulated_against_syncline
-
-        return simulated_against_syncline([GridPoint(*point) for point in sorted(points)])
-
-    caption = (
-        "Worst case found by optimisation with every magnitude held to its Syncline term, over a "
-        "grid of \u03c4."
-    )
-    return [Chart("grid", draw, caption)] if len(points) > 1 else []
-
-
-def choice_chart(verdict: Json) -> list[Node]:
+def choice_chart(verdict: Verdict) -> list[Node]:
     """The exact front of cost against error, the chosen design on it."""
     points = []
-    for entry in items(part(verdict, "choice"), "front"):
+    for entry in items(verdict.choice, "front"):
         price, error = numbers.finite(entry.get("cost")), numbers.finite(entry.get("error_m"))
         if price is not None and error:
             points.append((price, error, choice_tables.is_chosen(verdict, entry)))

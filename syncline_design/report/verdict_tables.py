@@ -12,58 +12,55 @@ from syncline_design.report.verdict_words import (
     kind_text,
     margin_text,
     named,
-    part,
     relative_margin,
     selection_reason,
     status_of,
     term_text,
-    value_text,
     waiver_text,
 )
 from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, TIMELINES
+from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
 
-def roles(verdict: Json) -> Iterator[tuple[str, str, Json]]:
+def roles(verdict: Verdict) -> Iterator[tuple[str, str, Json]]:
     """(stage, role, entry) of every chosen sensor."""
-    for stage in items(part(verdict, "design"), "stages"):
+    for stage in items(verdict.design, "stages"):
         for role, entry in named(stage, "roles"):
             yield str(stage.get("name")), role, entry
 
 
-def requirements(verdict: Json) -> Table:
+def requirements(verdict: Verdict) -> Table:
     """Every requirement with value, limit, margin and where the spec states it."""
     rows = []
-    for row in items(verdict, "requirements"):
+    for row in verdict.requirements:
         state = status_of(row)
-        line = numbers.finite(row.get("line"))
-        where = "implied" if row.get("implied") or not line else f"line {line:.0f}"
-        notes = [str(n) for n in (row.get("note"), _interval(row, verdict), waiver_text(row)) if n]
+        notes = (row.note, _interval(row, verdict), waiver_text(row))
         rows.append((
-            Cell(str(row.get("id"))),
+            Cell(row.id),
             Cell(state.word, tone=state.tone, mark=state.mark),
             kind_text(row),
-            Cell(value_text(row, "value"), numbers.finite(row.get("value"))),
-            Cell(value_text(row, "limit"), numbers.finite(row.get("limit"))),
+            Cell(numbers.in_unit(row.value, row.unit), row.value),
+            Cell(numbers.in_unit(row.limit, row.unit), row.limit),
             Cell(margin_text(row), relative_margin(row)),
-            where,
-            "; ".join(notes),
+            f"line {row.line}" if row.line and not row.implied else "implied",
+            "; ".join(note for note in notes if note),
         ))  # fmt: skip
     heads = ("Requirement", "Status", "Limits", "Value #", "Limit #", "Margin #", "In the spec",
              "Note")  # fmt: skip
     return table("Requirements", heads, rows)
 
 
-def _interval(row: Json, verdict: Json) -> str:
-    low, high = row.get("low"), row.get("high")
-    if numbers.finite(low) is None or numbers.finite(high) is None:
+def _interval(row: RequirementResult, verdict: Verdict) -> str:
+    if verdict.monte_carlo is None or numbers.finite(row.low) is None:
         return ""
-    unit = str(row.get("unit") or "")
-    confidence = numbers.percent(part(verdict, "monte_carlo").get("confidence") or 0.95)
-    ends = f"{numbers.in_unit(low, unit)} to {numbers.in_unit(high, unit)}"
+    if numbers.finite(row.high) is None:
+        return ""
+    confidence = numbers.percent(verdict.monte_carlo.confidence)
+    ends = f"{numbers.in_unit(row.low, row.unit)} to {numbers.in_unit(row.high, row.unit)}"
     return f"{confidence} interval, over all looks at the decision, {ends}"
 
 
-def payload(verdict: Json) -> Table:
+def payload(verdict: Verdict) -> Table:
     """Chosen sensors, how each is timestamped, and why."""
     currency = currency_of(verdict)
     rows = [
@@ -82,9 +79,9 @@ def payload(verdict: Json) -> Table:
     return table("Payload and timestamping", heads, rows)
 
 
-def shared(verdict: Json) -> Table | None:
+def shared(verdict: Verdict) -> Table | None:
     """Shared hardware and clocks, bought once per vehicle."""
-    design = part(verdict, "design")
+    design = verdict.design
     currency = currency_of(verdict)
     rows = [
         (
@@ -109,7 +106,7 @@ def shared(verdict: Json) -> Table | None:
     return table("Shared hardware and clocks", heads, rows) if rows else None
 
 
-def taus(verdict: Json) -> Table:
+def taus(verdict: Verdict) -> Table:
     """tau of each sensor against its tau_crit, as in the paper and with the lever arm."""
     rows = []
     for stage, role, entry in roles(verdict):
@@ -137,54 +134,50 @@ def taus(verdict: Json) -> Table:
     return table("Timestamp error of each sensor against the largest it may have", heads, rows)
 
 
-def ledger(verdict: Json) -> Table:
+def ledger(syncline: SynclineFigures) -> Table:
     """Every term of the total error."""
     rows = [
         (
             term_text(entry),
-            str(entry.get("stage") or ""),
-            LEDGER_KINDS.get(str(entry.get("kind")), str(entry.get("kind"))),
-            Cell(numbers.length(entry.get("value_m")), numbers.finite(entry.get("value_m"))),
-            Cell(numbers.percent(entry.get("share")), numbers.finite(entry.get("share"))),
+            entry.stage,
+            LEDGER_KINDS[entry.kind],
+            Cell(numbers.length(entry.value_m), entry.value_m),
+            Cell(numbers.percent(entry.share), entry.share),
         )
-        for entry in items(part(verdict, "syncline"), "ledger")
+        for entry in syncline.ledger
     ]
     return table("Terms of the total error", ("Term", "Stage", "Kind", "Value #", "Share #"), rows)
 
 
-def models(verdict: Json) -> Table:
+def models(syncline: SynclineFigures) -> Table:
     """Both synchronisation models and the lever-arm variant, side by side."""
-    syncline = part(verdict, "syncline")
-    used = str(syncline.get("model") or "syncline")
-    rows = []
-    for key, entry in named(syncline, "models"):
-        rows.append((
-            SYNC_MODELS.get(str(key), str(key)) + (" \u2014 decides" if key == used else ""),
-            Cell(numbers.length(entry.get("sync_error_m")), entry.get("sync_error_m")),
-            Cell(numbers.length(entry.get("total_m")), entry.get("total_m")),
-        ))  # fmt: skip
-    lever = part(syncline, "lever_arm")
-    if lever:
-        total, sensor = numbers.finite(lever.get("total_m")), syncline.get("sensor_error_m")
-        rate, tau = numbers.finite(lever.get("sync_rate_mps")), syncline.get("tau_s")
-        error = rate * tau if rate is not None and tau is not None else None
-        if error is None and total is not None and numbers.finite(sensor) is not None:
-            error = total - float(sensor or 0.0)
-        rows.append((
+    found = (("syncline", syncline.models.syncline), ("per_sensor", syncline.models.per_sensor))
+    rows = [
+        (
+            SYNC_MODELS[key] + (" \u2014 decides" if key == syncline.model else ""),
+            Cell(numbers.length(entry.sync_error_m), entry.sync_error_m),
+            Cell(numbers.length(entry.total_m), entry.total_m),
+        )
+        for key, entry in found
+    ]
+    lever = syncline.lever_arm
+    error = lever.sync_rate_mps * syncline.tau_s
+    rows.append(
+        (
             "Syncline with the lever arm's rotation",
             Cell(numbers.length(error), error),
-            Cell(numbers.length(total), total),
-        ))  # fmt: skip
+            Cell(numbers.length(lever.total_m), lever.total_m),
+        )
+    )
     heads = ("Model", "Synchronisation error #", "Total error #")
     return table("Total error by model", heads, rows)
 
 
-def assumptions(verdict: Json) -> Table | None:
+def assumptions(verdict: Verdict) -> Table | None:
     """Figures without a public source that this verdict rests on, a row per catalog entry."""
     figures: dict[tuple[str, str], list[str]] = {}
-    for entry in items(verdict, "assumptions"):
-        key = (str(entry.get("entry")), str(entry.get("note") or ""))
-        figures.setdefault(key, []).append(f"{entry.get('figure')} {entry.get('value')}")
+    for entry in verdict.assumptions or ():
+        figures.setdefault((entry.entry, entry.note), []).append(f"{entry.figure} {entry.value}")
     rows = [
         (Cell(name, code=True), "; ".join(values), note) for (name, note), values in figures.items()
     ]
@@ -192,16 +185,12 @@ def assumptions(verdict: Json) -> Table | None:
     return table("Assumptions: figures without a public source", heads, rows) if rows else None
 
 
-def sources(verdict: Json) -> Table | None:
+def sources(verdict: Verdict) -> Table | None:
     """Where the catalog's figures come from."""
-    rows = [
-        (Cell(str(entry.get("entry")), code=True), str(entry.get("source")))
-        for entry in items(verdict, "sources")
-    ]
+    rows = [(Cell(entry.entry, code=True), entry.source) for entry in verdict.sources or ()]
     return table("Sources of the catalog figures", ("Entry", "Source"), rows) if rows else None
 
 
-def currency_of(verdict: Json) -> str:
+def currency_of(verdict: Verdict) -> str:
     """The currency amounts are given in."""
-    design, spec = part(verdict, "design"), part(verdict, "spec")
-    return str(design.get("currency") or spec.get("currency") or "EUR")
+    return verdict.spec.currency

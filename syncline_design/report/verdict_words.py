@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from syncline_design.report.words import (
     STATUSES,
     TERMS,
 )
+from syncline_design.verdict.tree import Checked, LedgerRow, Refused, RequirementResult, Verdict
 
 Json = Mapping[str, Any]
 
@@ -43,69 +44,58 @@ def named(source: Json | None, key: str) -> list[tuple[str, Json]]:
     ]
 
 
-def outcome(verdict: Json) -> Outcome:
-    """The verdict's outcome; an unknown word counts as no verdict.
+def outcome(verdict: Checked) -> Outcome:
+    """The verdict's outcome.
 
     A design that meets while a larger figure of its own does not says so in the same breath.
     """
-    found = OUTCOMES.get(str(verdict.get("verdict")), OUTCOMES["indeterminate"])
+    found = OUTCOMES[verdict.verdict]
+    if isinstance(verdict, Refused):
+        return found
     return replace(found, word=found.word + qualification(verdict))
 
 
-def qualification(verdict: Json) -> str:
+def qualification(verdict: Verdict) -> str:
     """What a headline adds to `meets`: warnings that a figure exceeds the limit; else nothing."""
-    if verdict.get("verdict") != "meets":
+    if verdict.verdict != "meets":
         return ""
     told = [
-        f"{figure} exceeds the limit of {visible(entry.get('requirement') or 'accuracy')} ({code})"
+        f"{figure} exceeds the limit of {visible(entry.requirement or 'accuracy')} ({code})"
         for code, figure in QUALIFYING.items()
-        for entry in items(verdict, "warnings")
-        if entry.get("code") == code
+        for entry in verdict.warnings
+        if entry.code == code
     ]
     return f", but {sentence_list(told)}" if told else ""
 
 
-def status_of(row: Json) -> Outcome:
+def status_of(row: RequirementResult) -> Outcome:
     """A requirement's outcome; a failing one with a waiver in force is waived."""
-    status = str(row.get("status"))
-    if status == "fail" and is_waived(row):
-        return STATUSES["waived"]
-    return STATUSES.get(status, STATUSES["indeterminate"])
+    return STATUSES["waived" if row.status == "fail" and row.is_waived else row.status]
 
 
-def is_waived(row: Json) -> bool:
-    """Whether a waiver covers this requirement (an expired one says so itself)."""
-    waiver = part(row, "waiver")
-    return bool(waiver) and not waiver.get("expired", False)
-
-
-def waiver_text(row: Json) -> str:
+def waiver_text(row: RequirementResult) -> str:
     """`waived until 2027-01-31: reason`, or why it no longer counts."""
-    waiver = part(row, "waiver")
-    if not waiver:
+    waiver = row.waiver
+    if waiver is None:
         return ""
-    state = "waiver expired on" if waiver.get("expired") else "waived until"
-    until = waiver.get("expires")
-    head = f"{state} {until}" if until else "waived"
-    return f"{head}: {waiver.get('reason', 'no reason given')}"
+    state = "waiver expired on" if waiver.expired else "waived until"
+    return f"{state} {waiver.expires}: {waiver.reason}"
 
 
-def kind_text(row: Json) -> str:
+def kind_text(row: RequirementResult) -> str:
     """What a requirement limits."""
-    kind = str(row.get("kind"))
-    quantile = numbers.finite(row.get("quantile"))
-    if kind == "monte_carlo" and quantile is not None:
-        return f"simulated error, {numbers.percent(quantile)} quantile"
-    return KINDS.get(kind, kind)
+    if row.kind == "monte_carlo" and row.quantile is not None:
+        return f"simulated error, {numbers.percent(row.quantile)} quantile"
+    return KINDS[row.kind]
 
 
-def relative_margin(row: Json) -> float | None:
+def relative_margin(row: RequirementResult) -> float | None:
     """(limit - value) / limit: what is left of the limit; None where it cannot be said."""
-    value, limit = numbers.finite(row.get("value")), numbers.finite(row.get("limit"))
+    value, limit = row.value, row.limit
     return None if value is None or not limit else (limit - value) / limit
 
 
-def margin_text(row: Json) -> str:
+def margin_text(row: RequirementResult) -> str:
     """`12.4 % to spare` or `8.1 % over`."""
     margin = relative_margin(row)
     if margin is None:
@@ -116,21 +106,15 @@ def margin_text(row: Json) -> str:
     return f"{numbers.percent(abs(margin))} {word}"
 
 
-def value_text(row: Json, key: str) -> str:
-    """A requirement's value or limit in its unit."""
-    return numbers.in_unit(row.get(key), str(row.get("unit") or ""))
-
-
-def tightest(rows: list[Json]) -> Json | None:
+def tightest(rows: Sequence[RequirementResult]) -> RequirementResult | None:
     """The requirement with the least relative margin."""
     known = [row for row in rows if relative_margin(row) is not None]
     return min(known, key=lambda row: relative_margin(row) or 0.0) if known else None
 
 
-def term_text(entry: Json) -> str:
-    """A ledger term in words with its symbol; an unknown one as it stands."""
-    term = str(entry.get("term"))
-    return TERMS.get(term, term)
+def term_text(entry: LedgerRow) -> str:
+    """A ledger term in words with its symbol; a known effect as it stands."""
+    return TERMS.get(entry.term, entry.term)
 
 
 def role_phrase(entry: Json) -> str:
@@ -141,27 +125,23 @@ def role_phrase(entry: Json) -> str:
     return f"{entry.get('name') or entry.get('sensor')} ({how})"
 
 
-def design_sentence(verdict: Json) -> str:
-    """The design in one sentence; for an infeasible spec, what stands in the way."""
-    stages = items(part(verdict, "design"), "stages")
+def design_sentence(verdict: Checked) -> str:
+    """The design in one sentence; without one, what stands in the way."""
+    if isinstance(verdict, Refused):
+        plural = "problem" if len(verdict.problems) == 1 else "problems"
+        return f"{len(verdict.problems)} {plural} in the file; nothing was computed."
+    stages = items(verdict.design, "stages")
     if not stages:
-        return _no_design_sentence(verdict)
+        return obstacle_sentence(verdict.infeasibility)
     many = len(stages) > 1
     phrases = []
     for stage in stages:
         roles = [role_phrase(entry) for _, entry in named(stage, "roles")]
         where = f" on {stage.get('name')}" if many else ""
         phrases.append(sentence_list(roles) + where)
-    platforms = sentence_list([str(p) for p in _platform_names(verdict)])
-    chosen = part(verdict, "spec").get("open_roles")
-    lead = "Chosen payload" if chosen else "Payload as pinned"
+    platforms = sentence_list([stage.platform.name for stage in verdict.spec.stages])
+    lead = "Chosen payload" if verdict.spec.open_roles else "Payload as pinned"
     return f"{lead} for {platforms}: {'; '.join(phrases)}."
-
-
-def _platform_names(verdict: Json) -> list[str]:
-    stages = items(part(verdict, "spec"), "stages")
-    names = [part(stage, "platform") for stage in stages]
-    return [str(p.get("name") or p.get("id") or "the platform") for p in names] or ["the platform"]
 
 
 def requirement_name(entry: Json) -> str:
@@ -169,12 +149,8 @@ def requirement_name(entry: Json) -> str:
     return str(entry.get("id") or "the implied sync requirement")
 
 
-def _no_design_sentence(verdict: Json) -> str:
-    problems = items(verdict, "problems")
-    if problems:
-        plural = "problem" if len(problems) == 1 else "problems"
-        return f"{len(problems)} {plural} in the file; nothing was computed."
-    infeasibility = part(verdict, "infeasibility")
+def obstacle_sentence(infeasibility: Json | None) -> str:
+    """What stands in the way of a design, in one sentence."""
     members = items(part(infeasibility, "conflict"), "requirements")
     conflict = [requirement_name(member) for member in members]
     if conflict:
@@ -188,14 +164,12 @@ def _no_design_sentence(verdict: Json) -> str:
     return "No design was found."
 
 
-def selection_reason(verdict: Json, stage: str, role: str) -> str:
+def selection_reason(verdict: Verdict, stage: str, role: str) -> str:
     """Why this option stands in the design: pinned, or chosen among how many."""
-    open_roles = part(verdict, "spec").get("open_roles")
-    if not isinstance(open_roles, list) or f"{stage}.{role}" not in open_roles:
+    if f"{stage}.{role}" not in verdict.spec.open_roles:
         return "pinned in the spec"
-    objective = str(part(verdict, "spec").get("objective") or "cost")
-    word = OBJECTIVES.get(objective, objective)
-    excluded = [entry for entry in items(part(verdict, "choice"), "excluded")
+    word = OBJECTIVES[verdict.spec.objective]
+    excluded = [entry for entry in items(verdict.choice, "excluded")
                 if (entry.get("stage"), entry.get("role")) == (stage, role)]  # fmt: skip
     if not excluded:
         return f"chosen for {word} of the whole design"

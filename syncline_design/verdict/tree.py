@@ -295,6 +295,16 @@ class Verdict(Record):
     choice: Mapping[str, Any] | None = optional()
 
     @property
+    def name(self) -> str:
+        """The system's name."""
+        return self.spec.name
+
+    @property
+    def file(self) -> str:
+        """The spec's path as it was given."""
+        return self.spec.file
+
+    @property
     def exit_code(self) -> int:
         """0 meets, 1 does not meet, 3 no verdict."""
         return EXIT_CODES[self.verdict]
@@ -322,6 +332,14 @@ class Refused(Record):
     text: str
 
     @property
+    def name(self) -> str:
+        """Its path: what it calls itself could not be read."""
+        return self.file
+
+    @property
     def exit_code(self) -> int:
         """2."""
         return EXIT_CODES[self.verdict]
+
+
+Checked = Verdict | Refused  # what there is to say of one file among several

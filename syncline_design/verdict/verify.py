@@ -36,6 +36,7 @@ from syncline_design.verdict.recheck import Recheck, recheck
 from syncline_design.verdict.tree import (
     UNITS,
     Caution,
+    Checked,
     Refused,
     RequirementResult,
     Status,
@@ -82,7 +83,7 @@ def check_file(path: str | Path, settings: CheckSettings | None = None) -> Verdi
         return check_loaded(load(path), replace(wanted, time_limit_s=None))
 
 
-def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Verdict | Refused]:
+def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Checked]:
     """Verdicts of specs, in the order given; a refused file stands among them as such.
 
     Of a refused file nothing is computed.  A time limit binds all of them together.
@@ -93,7 +94,7 @@ def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Verdict 
         return [_check_or_refuse(item, alone) for item in read]
 
 
-def _check_or_refuse(read: Case | Refused, settings: CheckSettings) -> Verdict | Refused:
+def _check_or_refuse(read: Case | Refused, settings: CheckSettings) -> Checked:
     if isinstance(read, Refused):
         return read
     return _or_refused(read.path, lambda _: check_loaded(read, settings))
