@@ -12,7 +12,6 @@ from pathlib import Path
 
 import pytest
 
-from syncline_design.choice import presentation
 from syncline_design.choice.decide import best, choose
 from syncline_design.choice.evaluate import broken, evaluate
 from syncline_design.choice.front import front
@@ -31,6 +30,14 @@ from syncline_design.choice.variations import (
 )
 from syncline_design.model.known import Known
 from syncline_design.model.quantity import Dimension
+from syncline_design.report.choice_csv import designs_csv, front_csv
+from syncline_design.report.on_choice import (
+    designs_table,
+    front_table,
+    slack_table,
+    staircase_table,
+    target_text,
+)
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load, load_text
 from syncline_design.verdict.recheck import recheck
@@ -271,30 +278,33 @@ def test_measure_next_finds_a_flip_and_its_price(tmp_path: Path) -> None:
 def test_tables_and_csv(tmp_path: Path) -> None:
     problem, design = chosen(spec(tmp_path))
     points = front(problem)
-    lines = presentation.front_table(problem, points, "cost", "EUR")
-    assert lines[0].split()[:2] == ["cost", "error"]
-    assert len(lines) == 1 + len(points)
-    rows = list(csv.DictReader(io.StringIO(presentation.front_csv(problem, points, "cost"))))
+    shown = front_table(problem, points, "cost", "EUR")
+    assert [head.text for head in shown.heads][:2] == ["Cost", "Error"]
+    assert [row[0].sort for row in shown.rows] == [float(p.amount or 0) for p in points]
+    assert [row[1].sort for row in shown.rows] == [p.error_m for p in points]
+    rows = list(csv.DictReader(io.StringIO(front_csv(problem, points, "cost"))))
     assert [Fraction(row["cost"]) for row in rows] == [point.amount for point in points]
     assert [float(row["error_m"]) for row in rows] == [point.error_m for point in points]
     assert rows[0]["uav_attitude_sensor"] == "cheap_ins"
-    assert len(presentation.designs_table(problem, best(problem, 3), "EUR")) >= 2
-    assert "uav.position" in presentation.designs_csv(problem, [design])
-    assert presentation.staircase_lines(staircase(points), "EUR")[0].count("up to") == 0
-    assert presentation.slack_table([Slack("x", "s", 1.0, "m", None, None, 2.0)])[1].endswith("2 m")
+    assert len(designs_table(problem, best(problem, 3), "EUR").rows) >= 1
+    assert "uav.position" in designs_csv(problem, [design])
+    prices = staircase_table(staircase(points), "EUR", "cost")
+    assert "and looser" in prices.rows[0][0].text
+    (row,) = slack_table([Slack("x", "s", 1.0, "m", None, None, 2.0)]).rows
+    assert (row[-1].text, row[-1].sort) == ("2\u00a0m", 2.0)
 
 
 @pytest.mark.parametrize(
     ("value", "text"), [(5.7563287, "5.757 m"), (0.25, "250 mm"), (0.29453366, "294.6 mm")]
 )
 def test_printed_targets_are_ones_that_the_price_buys(value: float, text: str) -> None:
-    assert presentation.target_text(value) == text
+    assert target_text(value) == text.replace(" ", "\u00a0")
 
 
 @pytest.mark.parametrize("name", ["=HYPERLINK(1)", "+1+1", "@SUM(A1)", "-2+3"])
 def test_csv_runs_no_formula(name: str) -> None:
     roles = [[option(name, 0.5, 0.0, 1)], [option("b", 0.5, 0.0, 1)], [option("c", 0.5, 0.0, 1)]]
     problem = one_stage(roles, Limits(None, 1.0), 1.0, 1.0)
-    text = presentation.front_csv(problem, front(problem), "cost")
+    text = front_csv(problem, front(problem), "cost")
     assert f"'{name}" in text
     assert not any(cell.startswith(("=", "+", "@", "-2")) for cell in text.split(","))

@@ -18,7 +18,9 @@ from scipy.stats import chi
 
 from syncline_design.choice.table import Design
 from syncline_design.choice.tolerance import ToleranceVerdict, tolerance_verdict
+from syncline_design.report.on_choice import on_choice
 from syncline_design.report.optimisations import render_optimize
+from syncline_design.report.render_console import console
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
 from syncline_design.verdict import acceptance, verify
@@ -27,7 +29,6 @@ from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.optimise import (
     OptimizeSettings,
     optimisation_json,
-    optimisation_text,
     optimize,
 )
 from syncline_design.verdict.verify import CheckSettings, check_loaded
@@ -212,7 +213,7 @@ def test_a_design_that_its_samples_leave_open_carries_the_requirement(
     assert marked == {"c": ["MC"], "e": None, "f": None}
     points = {position(p["design"]): p.get("undecided") for p in verdict["choice"]["front"]}
     assert points == {"c": ["MC"], "d": None, "f": None}
-    printed = optimisation_text(optimize(loaded, OptimizeSettings(count=9, pareto=True)))
+    printed = console(on_choice(optimize(loaded, OptimizeSettings(count=9, pareto=True))))
     of_c = [line for line in printed.splitlines() if " c by " in line]
     assert len(of_c) == 2  # among the designs and on the front
     assert all(line.endswith("MC undecided") for line in of_c)
@@ -316,7 +317,7 @@ def test_lists_that_simulation_cuts_short_say_so(
 
     loaded = spec(tmp_path, [simulated(0.9)])
     whole = optimize(loaded, OptimizeSettings(count=9, pareto=True))
-    assert "gave up" not in optimisation_text(whole)
+    assert "gave up" not in console(on_choice(whole))
     assert optimisation_json(whole)["gave_up"] == []
     monkeypatch.setattr(optimisation, "Simulations", few)
     monkeypatch.setattr(verify, "Simulations", few)
@@ -324,7 +325,7 @@ def test_lists_that_simulation_cuts_short_say_so(
     data = optimisation_json(found)
     assert len(data["designs"]) <= 3
     assert {"front", "next best designs"} <= set(data["gave_up"])
-    assert "not complete: front, next best designs" in optimisation_text(found)
+    assert "not complete: front, next best designs" in console(on_choice(found))
     assert "not complete: front, next best designs" in render_optimize("html", found)
     assert "gave up" not in render_optimize("html", whole)
     verdict = check_loaded(loaded, CheckSettings()).to_json()

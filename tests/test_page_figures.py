@@ -11,14 +11,15 @@ import pytest
 
 from html_page import Page
 from syncline_design.report.axes import log_ticks
+from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.optimisations import render_optimize
+from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.optimise import (
     OptimizeSettings,
     optimisation_json,
-    optimisation_text,
     optimize,
 )
 from syncline_design.verdict.verify import CheckSettings, check_file
@@ -65,14 +66,14 @@ def test_a_datasheet_figure_reads_as_it_was_written() -> None:
     found = optimize(loaded, OptimizeSettings(report=True))
     entries = optimisation_json(found)["measure_next"]
     assert {entry["value_text"] for entry in entries} >= {"2 cm", "0.2 deg"}
-    console, page = optimisation_text(found), Page(render_optimize("html", found)).text
+    text, page = console(on_choice(found)), Page(render_optimize("html", found)).text
     for entry in entries:
         for key in ("value", "at"):
             number, unit = entry[f"{key}_text"].split(" ")
             assert float(number) * UNITS[unit] == pytest.approx(entry[key], rel=5e-4)
             assert unit == entry["value_text"].split(" ")[1]
             assert entry[f"{key}_text"] in page
-            assert entry[f"{key}_text"] in console
+            assert entry[f"{key}_text"] in text
     assert "Figure (SI)" not in page
 
 

@@ -10,10 +10,11 @@ from typing import Any
 
 import pytest
 
-from syncline_design.choice.presentation import slack_table
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Problem
+from syncline_design.report.on_choice import slack_table
+from syncline_design.report.render_console import table_lines
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
 
@@ -237,7 +238,7 @@ def test_never_is_said_only_where_proven(tmp_path: Any) -> None:
         FAR.replace("  - {id: A, kind: accuracy, limit: 900 m}\n", ""), tmp_path / "spec.yaml"
     )
     ledger = slack_ledger(plain, build_problem(plain), Design((0, 0, 0), (0,)))
-    shown = slack_table(ledger)
+    shown = list(table_lines(slack_table(ledger)))
     by_term = {row.term: row for row in ledger}
     assert by_term["position sensor error"].never == ("verdict", "payload")
     assert by_term["distance"].never == ()

@@ -102,9 +102,11 @@ def optimize(
 ) -> int:
     """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
     deadline = deadline_of(time_limit)
+    from syncline_design.report.on_choice import on_choice
     from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
+    from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
-    from syncline_design.verdict.optimise import OptimizeSettings, optimisation_text, optimize
+    from syncline_design.verdict.optimise import OptimizeSettings, optimize
 
     targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
     settings = OptimizeSettings(
@@ -119,7 +121,7 @@ def optimize(
         found = optimize(case, settings)
     if write_design is not None and found.exit_code == 0:
         _write_design(found, write_design)
-    emit(optimisation_text(found), targets, lambda n: render_optimize(n, found), quiet=quiet)
+    emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet)
     return found.exit_code
 
 

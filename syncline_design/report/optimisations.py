@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
+from syncline_design.report.choice_csv import optimisation_csv
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.verdict.optimise import (
     Optimisation,
     incomplete_lines,
-    optimisation_csv,
     optimisation_json,
 )
 

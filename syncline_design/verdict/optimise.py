@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from syncline_design import __version__
-from syncline_design.choice import presentation
 from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.decide import best
 from syncline_design.choice.explain import Explanation, explain
 from syncline_design.choice.front import front
-from syncline_design.choice.outcome import ROADS, FrontPoint, Method, Unfinished
+from syncline_design.choice.outcome import FrontPoint, Method, Unfinished
 from syncline_design.choice.prices import Step, staircase
 from syncline_design.choice.problem import selection_of
 from syncline_design.choice.slack import Slack, slack_ledger
@@ -29,14 +28,12 @@ from syncline_design.machine.records import json_of
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned_spec_text
 from syncline_design.spec.selection import RoleSelection
-from syncline_design.spec.yaml_text import printable
 from syncline_design.verdict.acceptance import MOST_SIMULATED, Simulations
 from syncline_design.verdict.choice_data import (
     designs_json,
     excluded_json,
     front_json,
     left_out,
-    left_out_text,
     proof_json,
     unproven_json,
 )
@@ -251,7 +248,7 @@ def optimisation_json(found: Optimisation) -> Json:
     if found.exit_code == 3:
         data["verdict"] = "indeterminate"
     if found.unfinished:
-        data["message"] = _unfinished_line(found)
+        data["message"] = unfinished_line(found)
     if found.settings.pareto:
         data["front"] = front_json(case, problem, found.front, found.settings.resource)
         data["front_left_out"] = left_out(case, problem, found.settings.resource)
@@ -274,33 +271,9 @@ def _proof(found: Optimisation) -> Json:
     return proof_json(found.picked)
 
 
-def _unfinished_line(found: Optimisation) -> str:
+def unfinished_line(found: Optimisation) -> str:
+    """What is said where the time limit came before any design."""
     return f"No verdict: {found.unfinished}; no design was found by then."
-
-
-def optimisation_text(found: Optimisation) -> str:
-    """The same for a terminal."""
-    problem, currency = found.problem, found.case.spec.currency
-    blocks = [[f"{found.case.spec.name} ({found.case.path})"]]
-    if found.explanation is not None:
-        blocks.append(found.explanation.lines())
-    if found.unfinished:
-        blocks.append([_unfinished_line(found)])
-    if found.picked is not None and found.designs:
-        blocks.append([_proof_line(found, found.picked)])
-        blocks.append(presentation.designs_table(problem, found.designs, currency))
-    if found.front:
-        title = f"Exact front of {found.settings.resource} against error, all else met:"
-        table = presentation.front_table(problem, found.front, found.settings.resource, currency)
-        prices = presentation.staircase_lines(found.prices, currency, found.settings.resource)
-        blocks += [[title, *table], ["What accuracy costs:", *(f"  {line}" for line in prices)]]
-    if found.settings.pareto and found.picked is not None:
-        missing = left_out(found.case, problem, found.settings.resource)
-        blocks += [[left_out_text(missing, found.settings.resource)]] if missing else []
-    blocks += _hinge_blocks(found.hinges)
-    blocks += [[line] for line in incomplete_lines(found)]
-    shown = ["\n".join(printable(line, len(line)) for line in block) for block in blocks]
-    return "\n\n".join(shown) + "\n"
 
 
 def incomplete_lines(found: Optimisation) -> list[str]:
@@ -317,59 +290,10 @@ def gave_up_line(pieces: Sequence[str]) -> str:
     return f"After {MOST_SIMULATED} simulated designs the search gave up; not complete: {names}."
 
 
-def _hinge_blocks(hinges: Hinges | None) -> list[list[str]]:
-    if hinges is None:
-        return []
-    blocks: list[list[str]] = []
-    if hinges.slack is not None:
-        blocks.append(["How far each term may grow:", *presentation.slack_table(hinges.slack)])
-    told = [] if hinges.tolerance is None else [hinges.tolerance.text]
-    told += [] if hinges.measure_next is None else _measure_lines(hinges.measure_next)
-    return [*blocks, told] if told else blocks
-
-
-def _proof_line(found: Optimisation, picked: Picked) -> str:
-    proof = picked.choice.proof
-    if not proof.optimal:
-        gap = "" if proof.gap is None else f": the optimum is at most {100 * proof.gap:.3g} % lower"
-        return (
-            f"Found among {problem_size(found.problem)} combinations by "
-            f"{found.case.spec.objective} within the time limit, rechecked exactly, not proven "
-            f"optimal{gap}"
-        )
-    confirmed = " and ".join(ROADS.get(road, road) for road in proof.agrees_with)
-    others = f", confirmed by {confirmed}" if confirmed else ""
-    passed = picked.passed_over
-    skipped = f"; {passed} better ones fail the Monte Carlo requirements" if passed else ""
-    return (
-        f"Best of {problem_size(found.problem)} combinations by {found.case.spec.objective}: "
-        f"proven by {ROADS.get(proof.method, proof.method)}{others}, rechecked exactly{skipped}"
-    )
-
-
 def problem_size(problem: Problem) -> str:
     """How many combinations there are: plain up to a million, then as a power."""
     count = problem.combinations
     return f"{count}" if count < 1_000_000 else f"{count:.2e}"
-
-
-def _measure_lines(measure: Sequence[Measurement]) -> list[str]:
-    if not measure:
-        return ["No single datasheet figure, 20 % up or down, changes the choice."]
-    lines = ["What to measure next (a single figure that changes the choice):"]
-    for one in measure:
-        spread = " (20 % assumed)" if one.assumed else ""
-        lines.append(
-            f"  {one.figure} from {one.value_text} to {one.at_text}{spread}: {one.becomes}"
-        )
-    return lines
-
-
-def optimisation_csv(found: Optimisation) -> str:
-    """The front with --pareto, else the designs."""
-    if found.settings.pareto:
-        return presentation.front_csv(found.problem, found.front, found.settings.resource)
-    return presentation.designs_csv(found.problem, found.designs)
 
 
 def pinned_text(case: Case, problem: Problem, design: Design) -> str:
