@@ -37,6 +37,7 @@ from tests.world import hidden, make_log, scenario
 Array = NDArray[np.float64]
 PAIRS = [(e, s) for e in registry().values() for s in e.sensors]
 IDS = [f"{effect.name}-{sensor}" for effect, sensor in PAIRS]
+OWN = ("factor", "tails")  # they change a sensor's own noise
 ROWS = 60
 MARGIN = 2e-3  # of the largest slope: what second-order terms leave at the small step taken
 
@@ -165,7 +166,6 @@ def neutral(effect: Effect, size: float) -> dict[str, float]:
     return {}
 
 
-OWN = ("factor", "tails")  # they change a sensor's own noise
 STOCHASTIC = [(e, s) for e, s in PAIRS if e.kind == "stochastic" and e.opens not in OWN]
 
 

@@ -37,8 +37,14 @@ from syncline_design.diagnosis.result import (
     WholeGap,
 )
 from syncline_design.diagnosis.scene import Acting, scene
-from syncline_design.diagnosis.search import Search, SearchResult, start_search
-from syncline_design.diagnosis.settings import DiagnosisSettings, Progress, silent
+from syncline_design.diagnosis.search import (
+    DiagnosisSettings,
+    Progress,
+    Search,
+    SearchResult,
+    silent,
+    start_search,
+)
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force

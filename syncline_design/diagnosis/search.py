@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from syncline_design.diagnosis.calibration import refit_factor
 from syncline_design.diagnosis.candidates import (
     Candidate,
     Signature,
@@ -22,7 +21,6 @@ from syncline_design.diagnosis.candidates import (
 )
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
-from syncline_design.diagnosis.scatter import scatter_candidates
 from syncline_design.diagnosis.scores import (
     Gram,
     clean_least,
@@ -30,11 +28,17 @@ from syncline_design.diagnosis.scores import (
     gram,
     log_p_of,
     possible,
+    refit_factor,
 )
-from syncline_design.diagnosis.settings import DiagnosisSettings
 from syncline_design.diagnosis.settling import Settled, settle
 from syncline_design.diagnosis.tails import tails_in
-from syncline_design.diagnosis.trials import freedom_of, log_chance, plausible, with_effect
+from syncline_design.diagnosis.trials import (
+    freedom_of,
+    log_chance,
+    plausible,
+    scatter_candidates,
+    with_effect,
+)
 from syncline_design.machine.deadline import in_force
 
 TRIED = 4  # candidates fitted with their own noise per step
@@ -49,6 +53,25 @@ NEAR = 2.0  # log p within this factor of the threshold is checked on simulated 
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
+
+Progress = Callable[[str, float], None]  # (what is being done, share done 0..1)
+
+
+def silent(_: str, __: float) -> None:
+    """No progress shown."""
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosisSettings:
+    """seed: of everything drawn.  false_alarm_rate: chance that a clean log is found at fault.
+
+    max_effects: how many effects are named at most.  exclude_effects: names that must not be used.
+    """
+
+    seed: int = 0
+    false_alarm_rate: float = 0.05
+    max_effects: int = 4
+    exclude_effects: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
