@@ -23,22 +23,15 @@ from syncline_design.effects.record import (
 )
 from syncline_design.model.system import Stage
 
+# enu: east, north, up for north, east, down (attitude: yaw from east to north, pitch up negative);
+# up: height in the down column; yaw_sign, azimuth_sign, elevation_sign: turned round; yaw_180:
+# facing backwards; transposed: NED to body for body to NED; radians: written where degrees are due;
+# degrees: written where radians are due.
 CHOICES: Mapping[Target, tuple[str, ...]] = {
     "position": ("enu", "up"),
     "attitude": ("yaw_sign", "yaw_180", "transposed", "enu", "radians", "degrees"),
     "ranging": ("azimuth_sign", "elevation_sign", "radians", "degrees"),
 }
-
-
-def conventions(sensor: Target) -> tuple[str, ...]:
-    """Conventions that a sensor's columns may be in by mistake.
-
-    enu: east, north, up for north, east, down (attitude: yaw from east to north, pitch up
-    negative); up: height in the down column; yaw_sign, azimuth_sign, elevation_sign: turned round;
-    yaw_180: facing backwards; transposed: NED to body for body to NED; radians: written where
-    degrees are due; degrees: written where radians are due.
-    """
-    return CHOICES.get(sensor, ())
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
