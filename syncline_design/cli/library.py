@@ -56,6 +56,7 @@ def schema(
             "reproduction",
             "simulation",
             "study-result",
+            "verdict",
         ],
         typer.Argument(help="A kind of file (spec, catalog, study) or of result (the others)."),
     ],
