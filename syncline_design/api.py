@@ -17,7 +17,7 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, load
 
 if TYPE_CHECKING:
-    from syncline_design.choice.outcome import Method
+    from syncline_design.choice.outcome import Road
     from syncline_design.choice.table import ResourceName
     from syncline_design.comparison.difference import Difference
     from syncline_design.comparison.meaning import DiagnosisAndDesign
@@ -50,7 +50,7 @@ def _case(spec: Spec) -> Case:
 
 
 def check(
-    spec: Spec, *, seed: int = 0, method: Method = "auto", time_limit_s: float | None = None,
+    spec: Spec, *, seed: int = 0, method: Road = "auto", time_limit_s: float | None = None,
     monte_carlo: bool = True, today: date | None = None,
 ) -> Verdict:  # fmt: skip
     """The verdict on a spec.
@@ -67,7 +67,7 @@ def check(
 
 def optimize(
     spec: Spec, *, best: int = 1, every: bool = False, pareto: bool = False,
-    resource: ResourceName = "cost", seed: int = 0, method: Method = "auto",
+    resource: ResourceName = "cost", seed: int = 0, method: Road = "auto",
     time_limit_s: float | None = None,
 ) -> Optimisation:  # fmt: skip
     """The best designs of a spec, proven, and what they hinge on.

@@ -16,7 +16,7 @@ from syncline_design.choice.decide import best, choose
 from syncline_design.choice.evaluate import broken, evaluate
 from syncline_design.choice.front import front
 from syncline_design.choice.outcome import Choice, Infeasible
-from syncline_design.choice.prices import Step, staircase
+from syncline_design.choice.prices import PriceStep, staircase
 from syncline_design.choice.problem import build_problem, selection_of
 from syncline_design.choice.slack import Slack, payload, same_design, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem
@@ -88,7 +88,7 @@ def test_steps_join_without_gaps() -> None:
     assert price_of(steps, 0.0) is None
 
 
-def price_of(steps: Sequence[Step], target_m: float) -> Step | None:
+def price_of(steps: Sequence[PriceStep], target_m: float) -> PriceStep | None:
     """The step that buys an accuracy target; None where no design reaches it."""
     return next((step for step in steps if step.tightest_m <= target_m), None)
 

@@ -24,7 +24,7 @@ import pytest
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import yaml_text
 from syncline_design.spec.load import BadInput, load, load_text
-from syncline_design.spec.yaml_text import Problem, read
+from syncline_design.spec.yaml_text import Flaw, read
 
 CORPUS = Path(__file__).parent / "corpus"
 SPECS = Path(__file__).parent.parent / "specs"
@@ -45,7 +45,7 @@ def corpus(copied: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return copied
 
 
-def refused(path: str | Path) -> tuple[str, tuple[Problem, ...]]:
+def refused(path: str | Path) -> tuple[str, tuple[Flaw, ...]]:
     """The message of a file that has to be refused, within a second."""
     start = time.perf_counter()
     with pytest.raises(BadInput) as caught:
@@ -283,7 +283,7 @@ def test_fuzzed_specs_load_or_are_refused(seed: int) -> None:
     sources = [p.read_text(encoding="utf-8") for p in sorted(SPECS.glob("*.yaml"))]
     sources = [re.sub(r"(?m)^#.*\n", "", source) for source in sources]
     outcomes = {"loaded": 0, "refused": 0}
-    problems: list[Problem] = []
+    problems: list[Flaw] = []
     for _ in range(200):
         text = mutated(rng.choice(sources), rng)
         try:

@@ -11,7 +11,8 @@ from scipy.optimize import minimize
 from syncline_design.effects import registry
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.known import EffectEntry
-from syncline_design.model.system import Platform, RoleName, Sensor, Stage, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation import worst_cases
 from tests.plain_chain import PlainHorizon, PlainStage, chain_error, size

@@ -19,7 +19,8 @@ from syncline_design.model.budget import Budget, budget, differs, lever_arm_m
 from syncline_design.model.known import Known
 from syncline_design.model.pairing import largest
 from syncline_design.model.quantity import Dimension, parse_quantity
-from syncline_design.model.system import Platform, RoleName, Sensor, Stage, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import Constant, Normal, TimingError, Uniform
 
 DEG = math.pi / 180.0

@@ -14,14 +14,14 @@ from syncline_design.paper.errata import ERRATA
 from syncline_design.paper.figures import (
     FIGURE_2_PAYLOAD,
     SURVEY_PAYLOAD,
-    Figure,
+    PaperPlot,
     figures,
     survey_system,
 )
 from syncline_design.paper.printed import PRINTED
 from syncline_design.paper.reproduce import (
     SCHEMA,
-    Cell,
+    PrintedCell,
     Reproduction,
     reproduce,
     tau_crit_cells,
@@ -46,7 +46,7 @@ def without_simulation(catalog: Catalog) -> Reproduction:
     return reproduce(catalog, simulate=False)
 
 
-def cell_of(result: Reproduction, *key: str) -> Cell:
+def cell_of(result: Reproduction, *key: str) -> PrintedCell:
     cells = (*result.cells, *result.inputs)
     return next(c for c in cells if (c.table, c.row, c.column) == key)
 
@@ -259,11 +259,11 @@ def test_same_bytes_twice(catalog: Catalog, result: Reproduction) -> None:
 
 
 @pytest.fixture(scope="module")
-def plotted(catalog: Catalog) -> dict[int, Figure]:
+def plotted(catalog: Catalog) -> dict[int, PaperPlot]:
     return {figure.number: figure for figure in figures(catalog)}
 
 
-def test_curves_double_at_tau_crit_and_rise(plotted: dict[int, Figure]) -> None:
+def test_curves_double_at_tau_crit_and_rise(plotted: dict[int, PaperPlot]) -> None:
     for figure in plotted.values():
         grid = figure.tau_grid_s()
         assert len(grid) == 61
@@ -276,28 +276,28 @@ def test_curves_double_at_tau_crit_and_rise(plotted: dict[int, Figure]) -> None:
             assert errors[-1] > 100.0 * curve.sensor_error_m  # and so is the slope
 
 
-def test_figure_1_is_the_car_with_its_tau_crit_by_hand(plotted: dict[int, Figure]) -> None:
+def test_figure_1_is_the_car_with_its_tau_crit_by_hand(plotted: dict[int, PaperPlot]) -> None:
     """0.1 m / (30 m/s + 50 m * 0.301942 rad/s) = 0.1 m / 45.0971 m/s = 2.21744 ms."""
     (curve,) = plotted[1].curves
     assert 1.0 / curve.sensor_error_m == 10.0
     assert curve.tau_crit_s == pytest.approx(2.21744e-3, rel=3e-6)
 
 
-def test_figure_5_same_roof_and_the_large_vessels_is_longer(plotted: dict[int, Figure]) -> None:
+def test_figure_5_same_roof_and_the_large_vessels_is_longer(plotted: dict[int, PaperPlot]) -> None:
     large, small = plotted[5].curves
     assert large.sensor_error_m == small.sensor_error_m
     assert large.tau_crit_s > 3.0 * small.tau_crit_s
 
 
 def test_figure_6_a_better_gnss_does_little_beside_a_better_ins_or_usbl(
-    plotted: dict[int, Figure],
+    plotted: dict[int, PaperPlot],
 ) -> None:
     base, gnss, ins, usbl = (curve.sensor_error_m for curve in plotted[6].curves)
     assert 0.0 < base - gnss < 0.01 * (base - ins)
     assert base - gnss < 0.01 * (base - usbl)
 
 
-def test_figures_use_the_papers_payloads(plotted: dict[int, Figure]) -> None:
+def test_figures_use_the_papers_payloads(plotted: dict[int, PaperPlot]) -> None:
     for curve in plotted[2].curves:
         assert curve.system is not None
         (stage,) = curve.system.stages
@@ -312,7 +312,7 @@ def test_figures_use_the_papers_payloads(plotted: dict[int, Figure]) -> None:
 
 @pytest.mark.parametrize("number", [3, 7])
 def test_simulated_points_stay_near_the_syncline(
-    result: Reproduction, plotted: dict[int, Figure], number: int
+    result: Reproduction, plotted: dict[int, PaperPlot], number: int
 ) -> None:
     """The paper finds no significant deviation.
 

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from syncline_design.choice.table import Design, Option, Problem
 from syncline_design.model import timing
-from syncline_design.model.system import ROLES, UTC, Platform, RoleName, Sensor, Stage, System
+from syncline_design.model.roles import ROLES, RoleName
+from syncline_design.model.system import UTC, Platform, Sensor, Stage, System
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
     ClockEntry,

@@ -16,10 +16,10 @@ from syncline_design.choice.outcome import (
     Choice,
     Deadline,
     Infeasible,
-    Method,
     NoVerdict,
     OutOfTime,
     Proof,
+    Road,
     TooLarge,
     Unfinished,
 )
@@ -35,7 +35,7 @@ MOST_STEPS = 4000  # steps of the search that confirms the merge before it is le
 
 
 def choose(
-    problem: Problem, method: Method = "auto", time_limit_s: float | None = None
+    problem: Problem, method: Road = "auto", time_limit_s: float | None = None
 ) -> Choice | Infeasible:
     """The best design in the documented order, or that there is none.
 
@@ -85,7 +85,7 @@ def _before(problem: Problem, design: Design, deadline: Deadline) -> int:
     return next((place for place, one in enumerate(order) if one == design), MOST_COUNTED)
 
 
-def _by_sums(problem: Problem, method: Method, deadline: Deadline) -> Choice | Infeasible:
+def _by_sums(problem: Problem, method: Road, deadline: Deadline) -> Choice | Infeasible:
     """The best design by the sums; one in hand where the time ends before the proof."""
     held = in_hand(problem, deadline)
     try:
@@ -97,7 +97,7 @@ def _by_sums(problem: Problem, method: Method, deadline: Deadline) -> Choice | I
         return found
 
 
-def _proven(problem: Problem, method: Method, deadline: Deadline) -> Choice | Infeasible:
+def _proven(problem: Problem, method: Road, deadline: Deadline) -> Choice | Infeasible:
     """The answer of one road, or of roads that agree."""
     if method == "auto":
         return _auto(problem, deadline)

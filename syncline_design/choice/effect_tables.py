@@ -19,11 +19,12 @@ from syncline_design.effects import registry
 from syncline_design.effects.acting import known_of
 from syncline_design.model.budget import Budget, budget
 from syncline_design.model.known import EffectEntry, Known
-from syncline_design.model.system import RoleName, Sensor, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import Sensor, System
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput
+from syncline_design.spec.yaml_text import Flaw as FileProblem
 from syncline_design.spec.yaml_text import KeyPath, show_path
-from syncline_design.spec.yaml_text import Problem as FileProblem
 
 Key = tuple[str, RoleName, str]  # stage, role, sensor
 Term = tuple[str, str, float]  # name, stage, value [m]

@@ -23,7 +23,7 @@ from syncline_design.choice.table import (
 
 
 @dataclass(frozen=True, slots=True)
-class Units:
+class Bought:
     """Shared hardware bought for one vehicle."""
 
     vehicle: int
@@ -38,7 +38,7 @@ class Evaluation:
     cost: Fraction | None
     mass: Fraction | None
     power: Fraction | None
-    units: tuple[Units, ...]
+    units: tuple[Bought, ...]
     sensor_error_m: Fraction
     tau_sys_s: Fraction
     sync_error_m: Fraction
@@ -131,7 +131,7 @@ def pair_bound(problem: Problem, design: Design, options: list[Option], pair: Pa
     return bound
 
 
-def units_bought(problem: Problem, design: Design, options: list[Option]) -> tuple[Units, ...]:
+def units_bought(problem: Problem, design: Design, options: list[Option]) -> tuple[Bought, ...]:
     """Shared hardware: the channels in use per vehicle, divided by a unit's, rounded up."""
     used: dict[tuple[int, str], int] = {}
     needs = [(problem.roles[r].vehicle, option.requires) for r, option in enumerate(options)]
@@ -140,7 +140,7 @@ def units_bought(problem: Problem, design: Design, options: list[Option]) -> tup
         for name, channels in requires:
             used[vehicle, name] = used.get((vehicle, name), 0) + channels
     return tuple(
-        Units(vehicle, i, -(-used[vehicle, item.id] // item.channels))
+        Bought(vehicle, i, -(-used[vehicle, item.id] // item.channels))
         for vehicle in range(len(problem.vehicles))
         for i, item in enumerate(problem.infrastructure)
         if used.get((vehicle, item.id), 0) > 0
@@ -151,7 +151,7 @@ def _sum(
     problem: Problem,
     design: Design,
     options: list[Option],
-    units: tuple[Units, ...],
+    units: tuple[Bought, ...],
     name: ResourceName,
 ) -> Fraction | None:
     parts: list[tuple[Resources, int]] = [(option.resources, 1) for option in options]

@@ -11,8 +11,8 @@ from syncline_design.machine.deadline import Deadline as Deadline
 from syncline_design.machine.deadline import NoVerdict as NoVerdict
 from syncline_design.machine.deadline import OutOfTime as OutOfTime
 
-Method = Literal["auto", "front", "milp", "enumerate"]
-METHODS: tuple[Method, ...] = ("auto", "front", "milp", "enumerate")
+Road = Literal["auto", "front", "milp", "enumerate"]
+METHODS: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
 # The roads in words, for every text that says how a design was proven best.
 ROADS: dict[str, str] = {
     "front": "the exact Pareto front",

@@ -14,7 +14,7 @@ from syncline_design.choice.outcome import FrontPoint
 
 
 @dataclass(frozen=True, slots=True)
-class Step:
+class PriceStep:
     """One step: `amount` buys every accuracy target from `tightest_m` up to `looser_than_m`.
 
     looser_than_m: error of the next cheaper point, where that one takes over (None: the cheapest).
@@ -36,13 +36,13 @@ class Step:
         }
 
 
-def staircase(points: Sequence[FrontPoint]) -> tuple[Step, ...]:
+def staircase(points: Sequence[FrontPoint]) -> tuple[PriceStep, ...]:
     """Prices by falling accuracy target, breakpoints exact: one step per point of the front."""
     steps = []
     before: FrontPoint | None = None
     for point in points:
         steps.append(
-            Step(
+            PriceStep(
                 point.amount,
                 point.error_m,
                 before.error_m if before else None,

@@ -41,7 +41,7 @@ from syncline_design.choice.table import (
 from syncline_design.machine.deadline import unhurried
 from syncline_design.model.known import NOTHING_KNOWN, Known
 from syncline_design.model.quantity import Quantity
-from syncline_design.model.system import RoleName
+from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Candidate, Case, RoleCase, StageCase, usable_primitives
 from syncline_design.spec.catalog import (
     ClockEntry,

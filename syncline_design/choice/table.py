@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal, Protocol
 
-from syncline_design.model.system import RoleName
+from syncline_design.model.roles import RoleName
 
 Objective = Literal["cost", "mass", "power", "error"]
 ResourceName = Literal["cost", "mass", "power"]

@@ -22,12 +22,18 @@ from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
 from syncline_design.choice.problem import build_problem, selection_of, with_everything
 from syncline_design.choice.slack import payload
 from syncline_design.choice.table import RESOURCES, Design, Problem
-from syncline_design.choice.variations import Build, Figure, quantity, sigma_figures, with_figure
+from syncline_design.choice.variations import (
+    Build,
+    SheetFigure,
+    quantity,
+    sigma_figures,
+    with_figure,
+)
 from syncline_design.model.quantity import format_like
 from syncline_design.spec.case import Case
 from syncline_design.spec.selection import RoleSelection
 
-Word = Literal["always", "sometimes", "never"]
+HowOften = Literal["always", "sometimes", "never"]
 ASSUMED_SPREAD = Fraction(1, 5)  # where a datasheet gives no tolerance, for `measure_next` only
 
 
@@ -39,7 +45,7 @@ class ToleranceVerdict:
     nominal, otherwise they decide together, the widest first.
     """
 
-    word: Word
+    word: HowOften
     figures: tuple[str, ...]
     deciding: tuple[str, ...]
     alone: bool
@@ -101,7 +107,7 @@ def _errors(
     return everything, design, [o.error() for o in chosen_options(everything, design)]
 
 
-def _at(case: Case, figures: Iterable[Figure], end: Literal["low", "high"]) -> Case:
+def _at(case: Case, figures: Iterable[SheetFigure], end: Literal["low", "high"]) -> Case:
     for figure in figures:
         value = getattr(figure.quantity, end)
         case = with_figure(case, figure, quantity(value, figure.dimension))
@@ -112,9 +118,9 @@ def _word(
     case: Case,
     selected: Sequence[RoleSelection],
     design: Design,
-    figures: Sequence[Figure],
+    figures: Sequence[SheetFigure],
     build: Build,
-) -> Word:
+) -> HowOften:
     """Always, sometimes or never, by the ends of every sensor's error.
 
     Always asks simulation too, at the upper ends: what it leaves open is not said to pass always.
@@ -163,7 +169,9 @@ def _budgets_broken(problem: Problem, design: Design, plain: Design) -> tuple[st
     return broken(problem, evaluate(problem, Design(plain.options, design.clocks)), accuracy=False)
 
 
-def _span(case: Case, selected: Sequence[RoleSelection], figure: Figure, build: Build) -> float:
+def _span(
+    case: Case, selected: Sequence[RoleSelection], figure: SheetFigure, build: Build
+) -> float:
     """How much a figure's tolerance moves the sensor error [m]."""
     ends = [sum(_errors(_at(case, [figure], end), selected, build)[2]) for end in ("low", "high")]
     return float(ends[1] - ends[0])
@@ -229,7 +237,7 @@ def _flips(
     problem: Problem,
     design: Design,
     build: Build,
-    figure: Figure,
+    figure: SheetFigure,
     *,
     assumed: bool,
 ) -> Iterator[Measurement]:
@@ -257,7 +265,7 @@ def _flips(
 
 
 def _measurement(
-    figure: Figure, end: float, assumed: bool, becomes: str, change: float | None
+    figure: SheetFigure, end: float, assumed: bool, becomes: str, change: float | None
 ) -> Measurement:
     value = figure.quantity
     return Measurement(

@@ -10,9 +10,10 @@ from typing import Any, Literal
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import IN_PLACE, Case
 from syncline_design.spec.catalog import SensorEntry
-from syncline_design.spec.spec import MethodChoice, Role
+from syncline_design.spec.spec import MethodChoice
 
 Build = Callable[[Case], Problem]
 PlatformFigure = Literal["v_max", "distance", "omega_max"]
@@ -56,7 +57,7 @@ def platform_figure(case: Case, stage: int, figure: PlatformFigure) -> float:
     return value
 
 
-def with_methods(case: Case, stage: int, role: Role, methods: tuple[str, ...]) -> Case:
+def with_methods(case: Case, stage: int, role: RoleName, methods: tuple[str, ...]) -> Case:
     """The spec with other timestamping methods open to one role."""
     choice = case.spec.stages[stage].role(role)
     assert choice is not None
@@ -65,7 +66,7 @@ def with_methods(case: Case, stage: int, role: Role, methods: tuple[str, ...]) -
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class SheetFigure:
     """One datasheet figure of a sensor: `figure` of axis `axis` (None: the one for all axes).
 
     stage, role: where a sensor given in place stands; None: an entry of the catalogs.
@@ -75,7 +76,7 @@ class Figure:
     figure: str
     axis: int | None
     quantity: Quantity
-    place: tuple[int, Role] | None = None
+    place: tuple[int, RoleName] | None = None
 
     @property
     def dimension(self) -> Dimension:
@@ -89,7 +90,7 @@ class Figure:
         return f"{self.sensor} {self.figure}{axis}"
 
 
-def sigma_figures(case: Case) -> Iterator[Figure]:
+def sigma_figures(case: Case) -> Iterator[SheetFigure]:
     """Every datasheet figure of every sensor that the spec may use, once."""
     seen: set[tuple[str, str, int | None]] = set()
     for stage in case.stages:
@@ -103,18 +104,20 @@ def sigma_figures(case: Case) -> Iterator[Figure]:
                         yield figure
 
 
-def _figures(name: str, entry: SensorEntry, place: tuple[int, Role] | None) -> Iterator[Figure]:
+def _figures(
+    name: str, entry: SensorEntry, place: tuple[int, RoleName] | None
+) -> Iterator[SheetFigure]:
     for figure in SIGMA_DIMENSIONS:
         value = getattr(entry, figure)
         if isinstance(value, Quantity):
-            yield Figure(name, figure, None, value, place)
+            yield SheetFigure(name, figure, None, value, place)
         elif isinstance(value, tuple):
             for axis, one in enumerate(value):
                 if isinstance(one, Quantity):
-                    yield Figure(name, figure, axis, one, place)
+                    yield SheetFigure(name, figure, axis, one, place)
 
 
-def with_figure(case: Case, figure: Figure, value: Quantity) -> Case:
+def with_figure(case: Case, figure: SheetFigure, value: Quantity) -> Case:
     """The spec and catalogs with one datasheet figure changed; OutOfTime after the deadline."""
     in_force().check()
     if figure.place is not None:
@@ -130,7 +133,7 @@ def with_figure(case: Case, figure: Figure, value: Quantity) -> Case:
     return replace(case, catalog=catalog)
 
 
-def _changed(entry: SensorEntry, figure: Figure, value: Quantity) -> SensorEntry:
+def _changed(entry: SensorEntry, figure: SheetFigure, value: Quantity) -> SensorEntry:
     new: Any = value
     if figure.axis is not None:
         axes = list(getattr(entry, figure.figure))

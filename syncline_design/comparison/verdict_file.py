@@ -8,7 +8,7 @@ from typing import Any, NoReturn
 
 from syncline_design.machine.records import NotThisResultError, read_as
 from syncline_design.spec.load import BadInput
-from syncline_design.spec.yaml_text import Problem, StopReadingError, read_bytes
+from syncline_design.spec.yaml_text import Flaw, StopReadingError, read_bytes
 from syncline_design.verdict.tree import Verdict
 
 _WANTED = "a verdict as `check --output json:PATH` writes it, of one spec"
@@ -57,7 +57,7 @@ def _schema_of(path: Path, text: str) -> str:
     try:
         data = json.loads(text, parse_constant=_no_constant)
     except json.JSONDecodeError as error:
-        problem = Problem(str(path), error.lineno, error.colno, "", f"not JSON: {error.msg}")
+        problem = Flaw(str(path), error.lineno, error.colno, "", f"not JSON: {error.msg}")
         raise BadInput((problem,)) from None
     except (ValueError, RecursionError) as error:
         deep = isinstance(error, RecursionError)
@@ -72,4 +72,4 @@ def _no_constant(name: str) -> NoReturn:
 def _refuse(
     path: Path, message: str, where: str = "", expected: str = "", found: str = ""
 ) -> NoReturn:
-    raise BadInput((Problem(str(path), 1, 1, where, message, expected, found),)) from None
+    raise BadInput((Flaw(str(path), 1, 1, where, message, expected, found),)) from None

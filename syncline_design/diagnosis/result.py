@@ -11,9 +11,9 @@ from syncline_design.machine.records import Record, optional
 from syncline_design.spec.effects_listed import EffectChoice
 
 SCHEMA: Final = "syncline-design/diagnosis/v1"
-Verdict = Literal["agrees", "explained", "unexplained"]
+Outcome = Literal["agrees", "explained", "unexplained"]
 Severity = Literal["contradiction", "caution"]
-EXIT_CODES: Final[Mapping[Verdict, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
+EXIT_CODES: Final[Mapping[Outcome, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
 LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
 
 
@@ -336,7 +336,7 @@ class Diagnosis(Record):
     """
 
     schema: str = SCHEMA
-    verdict: Verdict
+    verdict: Outcome
     sound: bool
     checks: tuple[Check, ...]
     findings: tuple[Finding, ...]

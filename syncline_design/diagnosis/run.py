@@ -29,11 +29,11 @@ from syncline_design.diagnosis.result import (
     LogRead,
     Motion,
     Noise,
+    Outcome,
     Provenance,
     Remaining,
     SlowNoise,
     SpecRead,
-    Verdict,
     WholeGap,
 )
 from syncline_design.diagnosis.scene import Acting, scene
@@ -112,7 +112,7 @@ def diagnose_measured(
     left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
     checks = log_checks(view)
     sound = all(c.severity != "contradiction" for c in checks)
-    verdict: Verdict = "unexplained"
+    verdict: Outcome = "unexplained"
     if sound and not left:
         verdict = "explained" if result.model.labels or faults else "agrees"
     progress("measuring the gap", 0.8)

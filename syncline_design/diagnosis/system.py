@@ -15,7 +15,7 @@ from syncline_design.logs.reading import read_log
 from syncline_design.model.system import System
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput
-from syncline_design.spec.yaml_text import KeyPath, Problem
+from syncline_design.spec.yaml_text import Flaw, KeyPath
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,5 +119,5 @@ def _refuse(
     case: Case, path: KeyPath, message: str, expected: str = "", hint: str = ""
 ) -> BadInput:
     shown = ".".join(map(str, path))
-    problem = Problem(str(case.path), *case.position(path), shown, message, expected, hint=hint)
+    problem = Flaw(str(case.path), *case.position(path), shown, message, expected, hint=hint)
     return BadInput((problem,))

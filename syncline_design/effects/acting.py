@@ -21,7 +21,8 @@ from syncline_design.effects.record import (
 from syncline_design.model.known import Known
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
-from syncline_design.model.system import RoleName, SimulationError, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import SimulationError, System
 
 
 @dataclass(frozen=True, slots=True)

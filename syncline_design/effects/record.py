@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
-from syncline_design.model.system import RoleName, Stage
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import Stage
 
 Array = NDArray[np.float64]
 Target = RoleName | Literal["target"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from syncline_design.spec.load import BadInput
-from syncline_design.spec.yaml_text import Problem
+from syncline_design.spec.yaml_text import Flaw
 
 
 def refuse(
@@ -20,5 +20,5 @@ def refuse(
     hint: str = "",
 ) -> BadInput:
     """The error for a log that cannot be read."""
-    problem = Problem(str(path), line, column, field, message, expected, found, hint)
+    problem = Flaw(str(path), line, column, field, message, expected, found, hint)
     return BadInput((problem,))

@@ -23,7 +23,8 @@ from syncline_design.model.pairing import (
     pair_rows,
     tau_s,
 )
-from syncline_design.model.system import UTC, RoleName, Sensor, Stage, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import UTC, Sensor, Stage, System
 
 SyncModelName = Literal["syncline", "per_sensor"]
 TermKind = Literal["sensor", "sync", "systematic"]

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 from syncline_design.model import timing
 from syncline_design.model.known import Known
-from syncline_design.model.system import UTC, RoleName, Sensor, Stage, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import UTC, Sensor, Stage, System
 
 
 @dataclass(frozen=True, slots=True)

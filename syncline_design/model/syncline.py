@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, TypeVar
 
-from syncline_design.model.system import RoleName
+from syncline_design.model.roles import RoleName
 
 if TYPE_CHECKING:
     from numpy import float64

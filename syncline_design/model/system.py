@@ -6,14 +6,12 @@ This is what the Syncline, the simulator, the effects and the diagnosis all take
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.known import EffectEntry
+from syncline_design.model.roles import RoleName
 from syncline_design.model.timing import NO_ERROR, TimingError
 
-RoleName = Literal["position", "attitude", "ranging"]
-ROLES: tuple[RoleName, ...] = ("position", "attitude", "ranging")
 UTC = "utc"
 
 

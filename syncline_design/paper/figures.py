@@ -14,7 +14,8 @@ from syncline_design.machine.records import Record
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.model.horizon import Horizon
-from syncline_design.model.system import Platform, RoleName, Sensor, Stage, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.spec.catalog import Catalog, SensorEntry
 
@@ -64,7 +65,7 @@ class Curve:
 
 
 @dataclass(frozen=True, slots=True)
-class Figure:
+class PaperPlot:
     """One figure of the paper; simulated: the paper sets its curve beside a simulation."""
 
     number: int
@@ -115,7 +116,7 @@ class PlottedFigure(Record):
     simulated: tuple[SimulatedPoint, ...]
 
 
-def plotted(figure: Figure, simulated: tuple[SimulatedPoint, ...]) -> PlottedFigure:
+def plotted(figure: PaperPlot, simulated: tuple[SimulatedPoint, ...]) -> PlottedFigure:
     """A figure with its curves over its own grid."""
     grid = figure.tau_grid_s()
     curves = tuple(
@@ -125,7 +126,7 @@ def plotted(figure: Figure, simulated: tuple[SimulatedPoint, ...]) -> PlottedFig
     return PlottedFigure(figure.number, figure.title, figure.note, grid, curves, simulated)
 
 
-def compare(figure: Figure, points: int = 13, seed: int = 0) -> tuple[SimulatedPoint, ...]:
+def compare(figure: PaperPlot, points: int = 13, seed: int = 0) -> tuple[SimulatedPoint, ...]:
     """The simulated points of a figure: nonlinear chain, magnitudes bounded, directions free.
 
     Empty for a figure that the paper does not set beside a simulation.  Lever arms of the length
@@ -185,12 +186,12 @@ def survey_system(
     return System((first, second), horizon=LEVEL)
 
 
-def figures(catalog: Catalog) -> tuple[Figure, ...]:
+def figures(catalog: Catalog) -> tuple[PaperPlot, ...]:
     """All seven figures of the paper."""
     return (*_georeferencing_figures(catalog), *_survey_figures(catalog))
 
 
-def _georeferencing_figures(catalog: Catalog) -> tuple[Figure, ...]:
+def _georeferencing_figures(catalog: Catalog) -> tuple[PaperPlot, ...]:
     car = platform_of(catalog, "car")
     rate = syncline.sync_rate_mps(car.v_max_mps, car.omega_max_radps, car.distance_m)
     first = Curve(catalog.platforms["car"].name, FIGURE_1_SENSOR_ERROR_M, rate, None)
@@ -201,20 +202,20 @@ def _georeferencing_figures(catalog: Catalog) -> tuple[Figure, ...]:
     named = {name: catalog.platforms[name].name for name in platforms}
     fixed_wing = _curve(named["uav_fixed_wing"], by_platform["uav_fixed_wing"])
     return (
-        Figure(1, "A Syncline: a car with sensors good for 0.1 m", (first,)),
-        Figure(
+        PaperPlot(1, "A Syncline: a car with sensors good for 0.1 m", (first,)),
+        PaperPlot(
             2,
             f"Direct georeferencing with {_payload_label(catalog, FIGURE_2_PAYLOAD)}",
             tuple(_curve(named[name], system) for name, system in by_platform.items()),
         ),
-        Figure(
+        PaperPlot(
             3,
             "UAV fixed wing, Syncline and simulation",
             (fixed_wing,),
             simulated=True,
             note="The paper does not name the payload; figure 2's is taken.",
         ),
-        Figure(
+        PaperPlot(
             4,
             "UAV fixed wing with different payloads",
             tuple(
@@ -229,10 +230,10 @@ def _georeferencing_figures(catalog: Catalog) -> tuple[Figure, ...]:
     )
 
 
-def _survey_figures(catalog: Catalog) -> tuple[Figure, ...]:
+def _survey_figures(catalog: Catalog) -> tuple[PaperPlot, ...]:
     vessels = {name: catalog.platforms[name].name for name in ("large_sv", "small_sv")}
     return (
-        Figure(
+        PaperPlot(
             5,
             f"Underwater survey with {_payload_label(catalog, SURVEY_PAYLOAD)}",
             tuple(
@@ -240,7 +241,7 @@ def _survey_figures(catalog: Catalog) -> tuple[Figure, ...]:
                 for name, label in vessels.items()
             ),
         ),
-        Figure(
+        PaperPlot(
             6,
             f"{vessels['large_sv']} and AUV with different payloads",
             tuple(
@@ -251,7 +252,7 @@ def _survey_figures(catalog: Catalog) -> tuple[Figure, ...]:
             ),
             note=FREE_CHOICE,
         ),
-        Figure(
+        PaperPlot(
             7,
             f"{vessels['small_sv']} and AUV, Syncline and simulation",
             (_curve(vessels["small_sv"], survey_system(catalog, "small_sv", FIGURE_7_PAYLOAD)),),

@@ -38,11 +38,11 @@ from syncline_design.spec.load import load_builtin
 SCHEMA: Final = "syncline-design/reproduction/v1"
 TAU_CRIT_TABLES = ("tau_crit_georeferencing", "tau_crit_survey")
 
-Status = Literal["agrees", "erratum", "differs"]
+Agreement = Literal["agrees", "erratum", "differs"]
 
 
 @dataclass(frozen=True, slots=True)
-class Cell(Record):
+class PrintedCell(Record):
     """One printed figure and the same computed, both in `unit`."""
 
     table: str
@@ -52,7 +52,7 @@ class Cell(Record):
     printed_text: str
     computed: float
     unit: str
-    status: Status
+    status: Agreement
     note: str
 
 
@@ -88,8 +88,8 @@ class Reproduction(Record):
     seed: int
     ok: bool
     counts: Counts
-    cells: tuple[Cell, ...]
-    inputs: tuple[Cell, ...]
+    cells: tuple[PrintedCell, ...]
+    inputs: tuple[PrintedCell, ...]
     errata: tuple[Erratum, ...]
     figures: tuple[PlottedFigure, ...]
 
@@ -199,7 +199,7 @@ def _last_digit(number: str) -> Fraction:
     return Fraction(1, 10 ** len(number.partition(".")[2]))
 
 
-def _cell(key: Key, text: str, computed_si: float, *, exact: bool = False) -> Cell:
+def _cell(key: Key, text: str, computed_si: float, *, exact: bool = False) -> PrintedCell:
     """Compare a printed figure with the computed one: within one unit of the last digit.
 
     exact: an input, which has to be the printed figure itself.
@@ -211,10 +211,10 @@ def _cell(key: Key, text: str, computed_si: float, *, exact: bool = False) -> Ce
     distance = abs(computed - Fraction(number))
     agrees = distance == 0 if exact else distance < _last_digit(number)
     status, note = _agreement(key) if agrees else _explain(key, computed)
-    return Cell(*key, float(number), text, float(computed), unit, status, note)
+    return PrintedCell(*key, float(number), text, float(computed), unit, status, note)
 
 
-def _agreement(key: Key) -> tuple[Status, str]:
+def _agreement(key: Key) -> tuple[Agreement, str]:
     """A figure that agrees, with what it was computed with where that is not the printed row."""
     table, row, column = key
     uses_auv = table in TAU_CRIT_TABLES and column == "auv"
@@ -222,7 +222,7 @@ def _agreement(key: Key) -> tuple[Status, str]:
     return "agrees", "with the corrected AUV row" if corrected else ""
 
 
-def _explain(key: Key, computed: Fraction) -> tuple[Status, str]:
+def _explain(key: Key, computed: Fraction) -> tuple[Agreement, str]:
     """A figure that does not agree: an erratum if it is documented and comes out as documented."""
     for erratum in ERRATA:
         if key not in erratum.cells:
@@ -234,16 +234,16 @@ def _explain(key: Key, computed: Fraction) -> tuple[Status, str]:
     return "differs", "neither agrees nor is a documented erratum"
 
 
-def tau_crit_cells(cells: Iterable[Cell]) -> tuple[Cell, ...]:
+def tau_crit_cells(cells: Iterable[PrintedCell]) -> tuple[PrintedCell, ...]:
     """The cells of the paper's two tau_crit tables."""
     return tuple(cell for cell in cells if cell.table in TAU_CRIT_TABLES)
 
 
-def _counts(cells: Iterable[Cell], inputs: Iterable[Cell]) -> Counts:
+def _counts(cells: Iterable[PrintedCell], inputs: Iterable[PrintedCell]) -> Counts:
     text = [cell for cell in cells if cell.table == "text"]
     return Counts(_count(tau_crit_cells(cells)), _count(text), _count(inputs))
 
 
-def _count(cells: Iterable[Cell]) -> Count:
+def _count(cells: Iterable[PrintedCell]) -> Count:
     found = Counter(cell.status for cell in cells)
     return Count(found.total(), found["agrees"], found["erratum"], found["differs"])

@@ -33,7 +33,7 @@ SILENT: Final = ("pass", "not_reached")  # nothing to annotate
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Notice:
     """One thing said about a spec: rule (the requirement's kind), id, place, one sentence."""
 
     level: Level
@@ -46,7 +46,7 @@ class Finding:
     justification: str = ""
 
 
-def findings(verdict: Checked) -> list[Finding]:
+def findings(verdict: Checked) -> list[Notice]:
     """Every requirement, problem, reason of infeasibility and warning of a verdict."""
     if isinstance(verdict, Refused):
         return [_problem(entry) for entry in verdict.problems]
@@ -56,25 +56,25 @@ def findings(verdict: Checked) -> list[Finding]:
     return found + [_warning(entry, verdict) for entry in verdict.warnings]
 
 
-def found_failure(found: list[Finding]) -> bool:
+def found_failure(found: list[Notice]) -> bool:
     """Whether something already fails a job."""
     return any(finding.level == "fail" for finding in found)
 
 
-def _warning(entry: Caution, verdict: Verdict) -> Finding:
+def _warning(entry: Caution, verdict: Verdict) -> Notice:
     """At the requirement that it is about, else at the top."""
     places = {row.id: (row.line or 1, row.column or 1) for row in verdict.requirements}
     place = places.get(entry.requirement or "", (1, 1))
-    return Finding("warning", entry.code, "", verdict.file, *place, entry.message)
+    return Notice("warning", entry.code, "", verdict.file, *place, entry.message)
 
 
-def _problem(entry: FileProblem) -> Finding:
+def _problem(entry: FileProblem) -> Notice:
     message = (f"{entry.path}: " if entry.path else "") + entry.message
     place = (max(entry.line, 1), max(entry.column, 1))
-    return Finding("fail", "spec", "", entry.file, *place, message)
+    return Notice("fail", "spec", "", entry.file, *place, message)
 
 
-def _requirement(row: RequirementResult, verdict: Verdict) -> Finding:
+def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
     levels: dict[str, Level] = {"pass": "pass", "fail": "fail", "indeterminate": "undecided"}
     level, message = levels[row.status], requirement_sentence(row)
     conflict = _conflict_of(row, verdict)
@@ -86,7 +86,7 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Finding:
     elif level == "undecided" and verdict.design is None:
         level = "not_reached"
     place = (row.line or 1, row.column or 1)
-    return Finding(level, row.kind, row.id, verdict.file, *place, message, waiver_text(row))
+    return Notice(level, row.kind, row.id, verdict.file, *place, message, waiver_text(row))
 
 
 def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:
@@ -133,13 +133,13 @@ def requirement_sentence(row: RequirementResult) -> str:
     return text + (f"; {row.note}" if row.note else "")
 
 
-def _no_design(verdict: Verdict) -> Finding:
+def _no_design(verdict: Verdict) -> Notice:
     level: Level = "fail" if verdict.verdict == "infeasible" else "undecided"
     text = f"{outcome(verdict).word}. {obstacle_sentence(verdict.infeasibility)}{_fixes(verdict)}"
-    return Finding(level, verdict.verdict, "", verdict.file, 1, 1, text)
+    return Notice(level, verdict.verdict, "", verdict.file, 1, 1, text)
 
 
-def all_findings(verdicts: Iterable[Checked]) -> Iterator[Finding]:
+def all_findings(verdicts: Iterable[Checked]) -> Iterator[Notice]:
     """Findings of several verdicts, in their order."""
     for verdict in verdicts:
         yield from findings(verdict)

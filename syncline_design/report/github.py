@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from syncline_design.report.ci import SILENT, Finding, all_findings
+from syncline_design.report.ci import SILENT, Notice, all_findings
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import design_sentence, outcome
 from syncline_design.verdict.tree import Checked
@@ -27,7 +27,7 @@ def render_github(verdicts: Sequence[Checked]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def github_command(finding: Finding) -> str:
+def github_command(finding: Notice) -> str:
     """One annotation."""
     title = f"{finding.id} {finding.rule}".strip()
     if finding.level == "waived":

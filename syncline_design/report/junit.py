@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from xml.etree import ElementTree
 
-from syncline_design.report.ci import Finding, findings
+from syncline_design.report.ci import Notice, findings
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import outcome
 from syncline_design.verdict.tree import Checked
@@ -49,7 +49,7 @@ def _suite(verdict: Checked) -> ElementTree.Element:
     return suite
 
 
-def _case(finding: Finding, file: str) -> ElementTree.Element:
+def _case(finding: Notice, file: str) -> ElementTree.Element:
     name = f"{finding.id} {finding.rule}" if finding.id else finding.rule
     case = ElementTree.Element(
         "testcase",

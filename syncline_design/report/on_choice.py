@@ -9,7 +9,7 @@ from fractions import Fraction
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.evaluate import chosen_options, evaluate
 from syncline_design.choice.outcome import ROADS, FrontPoint
-from syncline_design.choice.prices import Step
+from syncline_design.choice.prices import PriceStep
 from syncline_design.choice.slack import Slack
 from syncline_design.choice.table import Design, Problem, ResourceName
 from syncline_design.report import numbers
@@ -182,7 +182,7 @@ def front_table(
     return table("Exact front", heads, rows)
 
 
-def staircase_table(steps: Sequence[Step], currency: str, resource: ResourceName) -> Table:
+def staircase_table(steps: Sequence[PriceStep], currency: str, resource: ResourceName) -> Table:
     """The price of accuracy, loosest target first."""
     rows = []
     for step in steps:

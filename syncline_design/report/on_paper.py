@@ -8,7 +8,7 @@ from typing import Final
 from syncline_design.paper.errata import Erratum
 from syncline_design.paper.figures import PlottedFigure, SimulatedPoint
 from syncline_design.paper.reproduce import TAU_CRIT_TABLES, Counts, Reproduction
-from syncline_design.paper.reproduce import Cell as Printed
+from syncline_design.paper.reproduce import PrintedCell as Printed
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,

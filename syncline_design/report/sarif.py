@@ -13,7 +13,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from syncline_design import __version__
-from syncline_design.report.ci import SILENT, Finding, all_findings
+from syncline_design.report.ci import SILENT, Notice, all_findings
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import visible
 from syncline_design.verdict.tree import Checked
@@ -40,7 +40,7 @@ def render_sarif(verdicts: Sequence[Checked]) -> str:
     return sarif_log([f for f in all_findings(verdicts) if f.level not in SILENT])
 
 
-def sarif_log(found: Sequence[Finding]) -> str:
+def sarif_log(found: Sequence[Notice]) -> str:
     """A SARIF log of these findings."""
     rules = sorted({_rule_id(f) for f in found})
     run = {
@@ -57,7 +57,7 @@ def sarif_log(found: Sequence[Finding]) -> str:
     return json_text({"$schema": SCHEMA_URI, "version": "2.1.0", "runs": [run]})
 
 
-def _rule_id(finding: Finding) -> str:
+def _rule_id(finding: Notice) -> str:
     return visible(finding.rule)
 
 
@@ -66,7 +66,7 @@ def _rule(rule: str) -> dict[str, Any]:
     return {"id": rule, "shortDescription": {"text": text}}
 
 
-def _result(finding: Finding, rules: list[str]) -> dict[str, Any]:
+def _result(finding: Notice, rules: list[str]) -> dict[str, Any]:
     rule = _rule_id(finding)
     result: dict[str, Any] = {
         "ruleId": rule,
@@ -84,7 +84,7 @@ def _result(finding: Finding, rules: list[str]) -> dict[str, Any]:
     return result
 
 
-def _location(finding: Finding) -> dict[str, Any]:
+def _location(finding: Notice) -> dict[str, Any]:
     return {
         "physicalLocation": {
             "artifactLocation": {"uri": artifact_uri(finding.file)},
@@ -100,7 +100,7 @@ def artifact_uri(file: str) -> str:
     return f"file://{encoded}" if path.is_absolute() else encoded
 
 
-def _fingerprint(finding: Finding) -> str:
+def _fingerprint(finding: Notice) -> str:
     """Stable under changes of the figures: file, rule and requirement."""
     parts = (finding.file, finding.rule, finding.id or finding.message)
     return hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from syncline_design.report.schema import schema_text
 from syncline_design.spec.load import BadInput
-from syncline_design.spec.yaml_text import Problem
+from syncline_design.spec.yaml_text import Flaw
 
 SPEC_NAME = "system.yaml"
 SCHEMA_NAME = "syncline-spec.schema.json"
@@ -107,5 +107,5 @@ def init_project(directory: str | Path) -> tuple[Path, ...]:
     return tuple(contents)
 
 
-def _refused(path: Path, reason: str) -> Problem:
-    return Problem(str(path), 0, 0, "", reason, hint="choose another folder")
+def _refused(path: Path, reason: str) -> Flaw:
+    return Flaw(str(path), 0, 0, "", reason, hint="choose another folder")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from xml.etree import ElementTree
 
-from syncline_design.report.ci import Finding, Level, requirement_sentence
+from syncline_design.report.ci import Level, Notice, requirement_sentence
 from syncline_design.report.study_rows import reason
 from syncline_design.report.study_words import outcome, rule_sentence
 from syncline_design.report.text import visible
@@ -33,7 +33,7 @@ class _Tally:
     count: int = 0
 
 
-def study_findings(result: StudyResult) -> list[Finding]:
+def study_findings(result: StudyResult) -> list[Notice]:
     """What stands in the way, once per requirement and base however many cases it concerns."""
     tallies: dict[tuple[int, str, str], _Tally] = {}
     totals: dict[int, int] = {}
@@ -64,7 +64,7 @@ def _misses(case: CaseResult) -> Iterator[_Miss]:
         yield _Miss(case.verdict, reason(case))
 
 
-def _finding(result: StudyResult, tally: _Tally, total: int) -> Finding:
+def _finding(result: StudyResult, tally: _Tally, total: int) -> Notice:
     miss = tally.miss
     level: Level = "warning"
     if result.verdict != "meets":
@@ -73,7 +73,7 @@ def _finding(result: StudyResult, tally: _Tally, total: int) -> Finding:
         f"missed in {tally.count} of {total} cases of the study {result.study.name}; first at "
         f"{setting_text(tally.first)}: {miss.message}"
     )
-    return Finding(
+    return Notice(
         level, miss.rule, miss.id, tally.first.file, miss.line or 1, miss.column or 1, message
     )
 

@@ -17,7 +17,8 @@ from syncline_design.model.budget import budget
 from syncline_design.model.known import Known
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
-from syncline_design.model.system import RoleName, Stage, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import Stage, System
 
 
 @dataclass(frozen=True, slots=True)

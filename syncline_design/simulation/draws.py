@@ -10,7 +10,8 @@ import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.model.lever_arms import position_lever_arm
-from syncline_design.model.system import RoleName, Sensor, Stage, System
+from syncline_design.model.roles import RoleName
+from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.model.timing import (
     Constant,
     Distribution,

@@ -18,6 +18,7 @@ from syncline_design.model.known import NOTHING_KNOWN as NOTHING_KNOWN
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.known import Known as Known
 from syncline_design.model.quantity import Quantity
+from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.spec.catalog import (
     Catalog,
     ClockEntry,
@@ -29,17 +30,15 @@ from syncline_design.spec.catalog import (
     TimestampingEntry,
 )
 from syncline_design.spec.spec import (
-    ROLE_NAMES,
     InlineTimestamping,
     PlatformChoice,
     Query,
     Requirement,
-    Role,
     RoleChoice,
     Spec,
     StageChoice,
 )
-from syncline_design.spec.yaml_text import KeyPath, Position
+from syncline_design.spec.yaml_text import KeyPath, TextPosition
 
 E = TypeVar("E", bound=Entry)
 Origins = Mapping[tuple[str, str], str]  # (section, id) to file:line:column
@@ -62,7 +61,7 @@ class RoleCase:
     inline: a timestamp error given in place; there are no methods then.
     """
 
-    role: Role
+    role: RoleName
     choice: RoleChoice
     sensors: tuple[Candidate[SensorEntry], ...]
     methods: tuple[Candidate[TimestampingEntry], ...]
@@ -87,7 +86,7 @@ class StageCase:
     roles: tuple[RoleCase, ...]
     clocks: tuple[Candidate[ClockEntry], ...]
 
-    def role(self, name: Role) -> RoleCase | None:
+    def role(self, name: RoleName) -> RoleCase | None:
         """One role; None where no sensor takes it."""
         return next((one for one in self.roles if one.role == name), None)
 
@@ -104,7 +103,7 @@ class Case:
     spec: Spec
     catalog: Catalog
     path: Path
-    positions: dict[KeyPath, Position] = field(repr=False)
+    positions: dict[KeyPath, TextPosition] = field(repr=False)
     spec_sha256: str
     catalogs_sha256: str
     text: str = field(repr=False)
@@ -122,7 +121,7 @@ class Case:
         object.__setattr__(self, "hardware", _hardware(self, stages))
         object.__setattr__(self, "effects", _effects(self.spec))
 
-    def position(self, path: KeyPath) -> Position:
+    def position(self, path: KeyPath) -> TextPosition:
         """Line and column of a key path, or of the nearest thing around it."""
         around = (path[:length] for length in range(len(path), -1, -1))
         return next((self.positions[one] for one in around if one in self.positions), (1, 1))
@@ -157,7 +156,7 @@ def _stage(case: Case, index: int) -> StageCase:
         _platform(choice, catalog, origins),
         tuple(
             _role(case, choice, name, role)
-            for name in ROLE_NAMES
+            for name in ROLES
             if (role := choice.role(name)) is not None and not role.is_empty
         ),
         tuple(
@@ -180,7 +179,7 @@ def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candida
     return Candidate(choice.use, entry, origins.get(("platforms", choice.use), ""))
 
 
-def _role(case: Case, stage: StageChoice, name: Role, choice: RoleChoice) -> RoleCase:
+def _role(case: Case, stage: StageChoice, name: RoleName, choice: RoleChoice) -> RoleCase:
     """Candidates of a role; timestamping is its own, else the stage's, else the spec's."""
     stamping = choice.timestamping or stage.timestamping or case.spec.timestamping
     inline = stamping if isinstance(stamping, InlineTimestamping) else None
@@ -203,7 +202,7 @@ def _role(case: Case, stage: StageChoice, name: Role, choice: RoleChoice) -> Rol
 
 
 def _sensors(
-    case: Case, stage: StageChoice, role: Role, choice: RoleChoice
+    case: Case, stage: StageChoice, role: RoleName, choice: RoleChoice
 ) -> tuple[Candidate[SensorEntry], ...]:
     if isinstance(choice.sensor, SensorEntry):  # named by itself, or by stage and role
         return (Candidate(choice.sensor.name or f"{stage.name}.{role}", choice.sensor),)
@@ -221,7 +220,7 @@ def _sensors(
     )
 
 
-def matches(query: Query, entry: SensorEntry, role: Role, spec: Spec) -> bool:
+def matches(query: Query, entry: SensorEntry, role: RoleName, spec: Spec) -> bool:
     """Whether a sensor answers a query; it has to suit the role in any case."""
     if entry.modality != role or query.modality not in (None, entry.modality):
         return False

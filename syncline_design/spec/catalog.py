@@ -8,11 +8,11 @@ from pydantic import Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
 
 from syncline_design.model.quantity import Dimension, Quantity
+from syncline_design.model.roles import RoleName
 from syncline_design.spec.fields import (
     AngularRate,
     AtLeastOne,
     Count,
-    Loc,
     Mass,
     Money,
     NonNegativeLength,
@@ -36,9 +36,9 @@ from syncline_design.spec.fields import (
     refusal,
     refusals,
 )
+from syncline_design.spec.yaml_text import KeyPath
 
 Primitive = Literal["pps", "network", "tov", "trigger", "arrival"]
-Modality = Literal["position", "attitude", "ranging"]
 Need = Literal["gnss"]  # what an entry cannot work without
 Sigma = float | tuple[float, ...]
 
@@ -106,7 +106,7 @@ class SensorEntry(Entry):
     A single sigma_position, sigma_attitude or sigma_bearing holds for every axis.
     """
 
-    modality: Modality
+    modality: RoleName
     type: str = ""
     sigma_position: Annotated[Sigma, axes(Dimension.LENGTH, ("north", "east", "down"))] | None = (
         None
@@ -122,7 +122,7 @@ class SensorEntry(Entry):
 
     @model_validator(mode="after")
     def _sigmas_fit_modality(self) -> SensorEntry:
-        errors: list[tuple[Loc, PydanticCustomError]] = []
+        errors: list[tuple[KeyPath, PydanticCustomError]] = []
         for modality, names in SIGMAS_OF.items():
             for name in names:
                 given = getattr(self, name) is not None

@@ -16,9 +16,10 @@ import yaml
 
 from syncline_design.machine.result_files import write_file
 from syncline_design.model.quantity import Quantity
+from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
-from syncline_design.spec.spec import EffectChoice, Role
+from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import KeyPath, parse, plain_scalar
 
 MAX_WIDTH = 96
@@ -29,7 +30,7 @@ class PinnedRole:
     """What was chosen for one role; timestamping None leaves the spec's own as it is."""
 
     stage: int
-    role: Role
+    role: RoleName
     sensor: str
     primitive: str | None = None
     timestamping: str | None = None

@@ -16,7 +16,6 @@ from syncline_design.model.quantity import (
     suffix_unit,
 )
 from syncline_design.spec.fields import (
-    Loc,
     Reader,
     Record,
     Text,
@@ -26,6 +25,7 @@ from syncline_design.spec.fields import (
     refusal,
     refusals,
 )
+from syncline_design.spec.yaml_text import KeyPath
 
 
 def _read_parameter(name: str, value: Any) -> float | str:
@@ -57,7 +57,7 @@ def _read_parameters(value: Any) -> dict[str, float | str]:
     if not isinstance(value, dict):
         raise refusal("not parameters", "a mapping such as {latency_s: 0.087}", kind_of(value))
     parameters: dict[str, float | str] = {}
-    errors: list[tuple[Loc, PydanticCustomError]] = []
+    errors: list[tuple[KeyPath, PydanticCustomError]] = []
     for name, item in value.items():
         if si_name(name) in parameters:
             errors.append(((name,), refusal("given twice, in two units", si_name(name))))

@@ -31,10 +31,10 @@ from syncline_design.model.quantity import (
     parse_quantity,
     plain_number,
 )
+from syncline_design.spec.yaml_text import KeyPath
 
 T = TypeVar("T")
 R = TypeVar("R", bound="Record")
-Loc = tuple[str | int, ...]
 MAX_SUGGESTIONS = 50  # of one record or list: more errors than that are no typing slips
 
 
@@ -46,7 +46,7 @@ def refusal(
     return PydanticCustomError("refused", "{message}", parts)
 
 
-def refusals(errors: Iterable[tuple[Loc, PydanticCustomError]]) -> ValidationError:
+def refusals(errors: Iterable[tuple[KeyPath, PydanticCustomError]]) -> ValidationError:
     """Several errors of one record, each at its own place inside it."""
     return ValidationError.from_exception_data(
         "record", [InitErrorDetails(type=error, loc=loc, input=None) for loc, error in errors]
@@ -265,7 +265,7 @@ def axes(dimension: Dimension, names: tuple[str, ...]) -> Reader:
 def _each(values: Iterable[Any], read: Callable[[Any], T]) -> list[T]:
     """Read every item, so that all wrong ones are named together."""
     items: list[T] = []
-    errors: list[tuple[Loc, PydanticCustomError]] = []
+    errors: list[tuple[KeyPath, PydanticCustomError]] = []
     for index, value in enumerate(values):
         try:
             items.append(read(value))

@@ -15,8 +15,8 @@ from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import (
     Document,
+    Flaw,
     KeyPath,
-    Problem,
     StopReadingError,
     printable,
     read,
@@ -37,7 +37,7 @@ class Collection:
         default_factory=dict
     )  # (section, id) -> file:line:col
     documents: dict[tuple[str, str], tuple[Document, KeyPath]] = field(default_factory=dict)
-    problems: list[Problem] = field(default_factory=list)
+    problems: list[Flaw] = field(default_factory=list)
     digests: list[str] = field(default_factory=list)
 
     def catalog(self) -> Catalog:
@@ -62,10 +62,10 @@ class Collection:
 def problem_at(
     document: Document, path: KeyPath, message: str, expected: str = "", found: str = "",
     hint: str = "",
-) -> Problem:  # fmt: skip
+) -> Flaw:  # fmt: skip
     """A problem at the place of a key path."""
     line, column = document.position(path)
-    return Problem(
+    return Flaw(
         document.file, line, column, show_path(path), message, expected, printable(found, 80), hint
     )
 
@@ -93,7 +93,7 @@ def _add_listed(
         if not isinstance(name, str) or not name:
             continue  # the model of the listing file says so
         inside = inside_folder(lister, ("catalogs", index), name, folder, root)
-        if isinstance(inside, Problem):
+        if isinstance(inside, Flaw):
             collection.problems.append(inside)
             continue
         shown = str(Path(chain[0]).parent / inside.relative_to(root))
@@ -116,7 +116,7 @@ def _add_listed(
 
 def inside_folder(
     document: Document, path: KeyPath, name: str, folder: Path, root: Path
-) -> Path | Problem:
+) -> Path | Flaw:
     """The file that a relative name means, if it is inside `root` after following symlinks."""
     wanted = "a file inside the spec's folder"
     if Path(name).is_absolute() or name.startswith(("~", "\\")) or ":" in name[:3]:
@@ -172,7 +172,7 @@ def _add_entry(
     if first is not None:
         message = f"this id is taken: {identity} is also at {first}"
         shown, hint = show_path((section, identity)), "rename one of them"
-        problem = Problem(document.file, line, column, shown, message, hint=hint)
+        problem = Flaw(document.file, line, column, shown, message, hint=hint)
         collection.problems.append(problem)
         return
     collection.origins[section, identity] = place
@@ -210,7 +210,7 @@ def _empirical_values(
         collection.problems.append(error)
         return None
     inside = inside_folder(document, at, data["file"], *folders)
-    if isinstance(inside, Problem):
+    if isinstance(inside, Flaw):
         collection.problems.append(inside)
         return None
     try:

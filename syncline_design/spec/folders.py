@@ -11,7 +11,7 @@ from typing import Final
 
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.load import BadInput
-from syncline_design.spec.yaml_text import Document, Problem, read
+from syncline_design.spec.yaml_text import Document, Flaw, read
 
 SUFFIXES: Final = (".yaml", ".yml")
 NOT_ENTERED: Final = "a folder with specs that are not checked; name it too"
@@ -64,14 +64,14 @@ def _in_folder(folder: Path) -> tuple[list[Path], list[Skipped]]:
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
         message = f"cannot read the folder: {reason}"
-        raise BadInput((Problem(str(folder), 0, 0, "", message),)) from None
+        raise BadInput((Flaw(str(folder), 0, 0, "", message),)) from None
     found = [path for path in inside if path.suffix.lower() in SUFFIXES]
     judged = [(path, _folder_kind(path) if path.is_dir() else other_kind(path)) for path in found]
     others = [Skipped(str(path), what) for path, what in judged if what is not None]
     others += [Skipped(str(p), NOT_ENTERED) for p in inside if p not in found and _holds_spec(p)]
     specs = [path for path, what in judged if what is None]
     if not specs:
-        raise BadInput((Problem(str(folder), 0, 0, "", _no_spec_text(others)),))
+        raise BadInput((Flaw(str(folder), 0, 0, "", _no_spec_text(others)),))
     return specs, others
 
 

@@ -9,10 +9,10 @@ from syncline_design.model.estimates import figure
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.files import problem_at
 from syncline_design.spec.spec import EffectChoice, Spec
-from syncline_design.spec.yaml_text import Document, KeyPath, Problem
+from syncline_design.spec.yaml_text import Document, Flaw, KeyPath
 
 
-def effect_problems(document: Document, spec: Spec) -> Iterator[Problem]:
+def effect_problems(document: Document, spec: Spec) -> Iterator[Flaw]:
     """Effects that do not exist, or do not fit where they are said to act."""
     if not spec.effects:
         return
@@ -35,7 +35,7 @@ def effect_problems(document: Document, spec: Spec) -> Iterator[Problem]:
 
 def _transponder_problem(
     document: Document, at: KeyPath, spec: Spec, effect: EffectChoice, acting: str
-) -> Iterator[Problem]:
+) -> Iterator[Flaw]:
     """A later stage has no position sensor whose stamps or noise an effect could change."""
     names = [stage.name for stage in spec.stages]
     place = names.index(effect.stage) if effect.stage in names else 0
@@ -52,7 +52,7 @@ def _transponder_problem(
 
 def _problem(
     document: Document, path: KeyPath, message: str, found: str, known: tuple[str, ...]
-) -> Problem:
+) -> Flaw:
     close = get_close_matches(found, known, 1)
     hint = f"did you mean {close[0]}?" if close else ""
     expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]

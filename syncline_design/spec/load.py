@@ -29,7 +29,7 @@ from syncline_design.spec.known_effects import effect_problems
 from syncline_design.spec.references import currency_problems, misfits, missing_figures, unknown_ids
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate
-from syncline_design.spec.yaml_text import Document, KeyPath, Position, Problem, parse, read
+from syncline_design.spec.yaml_text import Document, Flaw, KeyPath, TextPosition, parse, read
 
 MAX_SHOWN = 50
 MOST_TRAJECTORY_BYTES = 2**28
@@ -39,7 +39,7 @@ BUILTIN_FOLDER = Path(str(files(BUILTIN_PACKAGE))).resolve()
 class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the program
     """What is wrong with a user's files; printing it gives one line per problem."""
 
-    def __init__(self, problems: tuple[Problem, ...]) -> None:
+    def __init__(self, problems: tuple[Flaw, ...]) -> None:
         # By place, then by text: the order of a set differs from run to run.
         self.problems = tuple(sorted(set(problems), key=_place_and_text))
         super().__init__(self._lines())
@@ -51,7 +51,7 @@ class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the p
         return "\n".join(lines)
 
 
-def _place_and_text(problem: Problem) -> tuple[str, int, int, str]:
+def _place_and_text(problem: Flaw) -> tuple[str, int, int, str]:
     return problem.file, problem.line, problem.column, str(problem)
 
 
@@ -93,7 +93,7 @@ def load_builtin() -> Catalog:
     return collection.catalog()
 
 
-def _stop_at(problems: list[Problem]) -> None:
+def _stop_at(problems: list[Flaw]) -> None:
     if problems:
         raise BadInput(tuple(problems))
 
@@ -133,7 +133,7 @@ def _complete(
 
 def _named_files(
     document: Document, spec: Spec, folder: Path
-) -> tuple[list[Problem], FileContent | None]:
+) -> tuple[list[Flaw], FileContent | None]:
     """Files that the spec names for later: they have to be there, inside its folder.
 
     The trajectory is read at once, so that a verdict rests on one content of it.
@@ -143,22 +143,20 @@ def _named_files(
         inside_folder(document, ("log", "files", i), name, folder, folder.resolve())
         for i, name in named
     ]
-    problems = [item for item in found if isinstance(item, Problem)]
+    problems = [item for item in found if isinstance(item, Flaw)]
     recorded = _recorded_trajectory(document, spec, folder)
-    if isinstance(recorded, Problem):
+    if isinstance(recorded, Flaw):
         return [*problems, recorded], None
     return problems, recorded
 
 
-def _recorded_trajectory(
-    document: Document, spec: Spec, folder: Path
-) -> FileContent | Problem | None:
+def _recorded_trajectory(document: Document, spec: Spec, folder: Path) -> FileContent | Flaw | None:
     choice = spec.monte_carlo.trajectory
     if choice is None or choice.file is None:
         return None
     at: KeyPath = ("monte_carlo", "trajectory", "file")
     inside = inside_folder(document, at, choice.file, folder, folder.resolve())
-    if isinstance(inside, Problem):
+    if isinstance(inside, Flaw):
         return inside
     try:
         return FileContent(folder / choice.file, read_plain(inside, MOST_TRAJECTORY_BYTES))
@@ -182,7 +180,7 @@ def _beside(spec: Path, found: FilesRead) -> tuple[FileRead, ...]:
 __all__ = [
     "BadInput",
     "Case",
-    "Problem",
+    "Flaw",
     "catalogs_of",
     "load",
     "load_builtin",
@@ -197,7 +195,7 @@ def without_simulated(case: Case) -> Case:
     kept = [i for i, r in enumerate(case.spec.requirements) if r.kind != "monte_carlo"]
     requirements = tuple(case.spec.requirements[i] for i in kept)
     renumbered = {old: new for new, old in enumerate(kept)}
-    positions: dict[KeyPath, Position] = {}
+    positions: dict[KeyPath, TextPosition] = {}
     for path, position in case.positions.items():
         if path[:1] == ("requirements",) and len(path) > 1:
             if path[1] not in renumbered:

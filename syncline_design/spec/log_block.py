@@ -10,7 +10,6 @@ from pydantic_core import PydanticCustomError
 
 from syncline_design.model.quantity import UNITS, Dimension, Quantity, suffix_unit
 from syncline_design.spec.fields import (
-    Loc,
     Reader,
     Record,
     Text,
@@ -21,6 +20,7 @@ from syncline_design.spec.fields import (
     refusal,
     refusals,
 )
+from syncline_design.spec.yaml_text import KeyPath
 
 
 def split_column(text: str) -> tuple[str, str]:
@@ -40,7 +40,7 @@ def _read_place(value: Any) -> tuple[Quantity, ...]:
         found = f"{len(value)} figures" if isinstance(value, tuple | list) else kind_of(value)
         raise refusal("not a place", wanted, found)
     kinds = (Dimension.ANGLE, Dimension.ANGLE, Dimension.LENGTH)
-    read, errors = [], list[tuple[Loc, PydanticCustomError]]()
+    read, errors = [], list[tuple[KeyPath, PydanticCustomError]]()
     for k, (item, kind) in enumerate(zip(value, kinds, strict=True)):
         try:
             read.append(read_quantity(item, kind))
@@ -86,7 +86,7 @@ class LogChoice(Record):
 
     @model_validator(mode="after")
     def _units_fit(self) -> LogChoice:
-        errors: list[tuple[Loc, PydanticCustomError]] = []
+        errors: list[tuple[KeyPath, PydanticCustomError]] = []
         for canonical, theirs in self.columns.items():
             dimension, (_, unit) = suffix_unit(canonical)[1], split_column(theirs)
             known = UNITS.get(unit)

@@ -7,11 +7,12 @@ from itertools import islice
 from typing import Any
 
 from syncline_design.model.quantity import Quantity
+from syncline_design.model.roles import ROLES
 from syncline_design.spec.case import Case, RoleCase, usable_primitives
 from syncline_design.spec.fields import MAX_SUGGESTIONS, did_you_mean
 from syncline_design.spec.files import Collection, problem_at
-from syncline_design.spec.spec import ROLE_NAMES, Query, Spec
-from syncline_design.spec.yaml_text import Document, KeyPath, Problem
+from syncline_design.spec.spec import Query, Spec
+from syncline_design.spec.yaml_text import Document, Flaw, KeyPath
 
 _WORDS = {
     "platforms": "platform",
@@ -22,7 +23,7 @@ _WORDS = {
 }
 
 
-def unknown_ids(spec: Document, collection: Collection) -> list[Problem]:
+def unknown_ids(spec: Document, collection: Collection) -> list[Flaw]:
     """Ids that no catalog has; looked for in the raw data, so that other errors don't hide them."""
     unknown = (
         (path, section, identity)
@@ -41,7 +42,7 @@ def unknown_ids(spec: Document, collection: Collection) -> list[Problem]:
 
 def _unknown(
     document: Document, path: KeyPath, section: str, identity: str, collection: Collection
-) -> Problem:
+) -> Flaw:
     known = [name for part, name in collection.origins if part == section]
     elsewhere = [part for part, name in collection.origins if name == identity]
     hint = did_you_mean(identity, known)
@@ -75,7 +76,7 @@ def _spec_ids(data: Any) -> Iterator[tuple[str, KeyPath, str]]:
             yield "platforms", (*at, "platform", "use"), use
         for section, key in (("timestamping", "timestamping"), ("clocks", "clock")):
             yield from _choice_ids(section, _at(stage, (key,)), (*at, key))
-        for name in ROLE_NAMES:
+        for name in ROLES:
             role, place = _at(stage, (name,)), (*at, name)
             sensor = _at(role, ("sensor",))
             if isinstance(sensor, str) and sensor:
@@ -94,9 +95,9 @@ def _choice_ids(section: str, choice: Any, path: KeyPath) -> Iterator[tuple[str,
             yield section, (*path, "candidates", index), identity
 
 
-def misfits(document: Document, case: Case) -> list[Problem]:
+def misfits(document: Document, case: Case) -> list[Flaw]:
     """Where valid ids do not fit together."""
-    problems: list[Problem] = []
+    problems: list[Flaw] = []
     for stage in case.stages:
         for role in stage.roles:
             problems += _role_misfits(document, ("stages", stage.index, role.role), role)
@@ -105,7 +106,7 @@ def misfits(document: Document, case: Case) -> list[Problem]:
     return problems
 
 
-def _role_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Problem]:
+def _role_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Flaw]:
     name, pinned = role.role, role.choice.primitive
     if not role.sensors:
         message = "no sensor of the catalogs matches this query"
@@ -125,7 +126,7 @@ def _role_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[P
         yield from _method_misfits(document, at, role)
 
 
-def _method_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Problem]:
+def _method_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Flaw]:
     if not role.methods:
         wanted = (
             "a method id, {candidates: [...]}, or {error: {...}} here, in the stage or the spec"
@@ -150,7 +151,7 @@ def _named(role: RoleCase) -> str:
     return role.sensors[0].id if len(role.sensors) == 1 else "any of the candidates"
 
 
-def _vehicle_misfits(document: Document, spec: Spec) -> Iterator[Problem]:
+def _vehicle_misfits(document: Document, spec: Spec) -> Iterator[Flaw]:
     """Stages on one vehicle share its host clock: at most one of them says which."""
     first: dict[str, int] = {}
     for index, stage in enumerate(spec.stages):
@@ -163,7 +164,7 @@ def _vehicle_misfits(document: Document, spec: Spec) -> Iterator[Problem]:
             yield problem_at(document, path, message, "one clock per vehicle")
 
 
-def _effect_misfits(document: Document, spec: Spec) -> Iterator[Problem]:
+def _effect_misfits(document: Document, spec: Spec) -> Iterator[Flaw]:
     names = [stage.name for stage in spec.stages]
     for index, effect in enumerate(spec.effects):
         at: KeyPath = ("effects", index)
@@ -173,7 +174,7 @@ def _effect_misfits(document: Document, spec: Spec) -> Iterator[Problem]:
             hint = did_you_mean(effect.stage, names)
             wanted = f"one of {', '.join(names)}"
             yield problem_at(document, (*at, "stage"), "unknown stage", wanted, effect.stage, hint)
-        elif effect.sensor in ROLE_NAMES:
+        elif effect.sensor in ROLES:
             place = names.index(effect.stage) if effect.stage else 0
             stage = spec.stages[place]
             if place > 0 and effect.sensor == "position":
@@ -220,7 +221,7 @@ def _hardware(case: Case, at: KeyPath, requires: Iterable[str]) -> Iterator[Part
         yield at, f"shared hardware {identity}", case.hardware[identity].entry
 
 
-def currency_problems(document: Document, case: Case) -> list[Problem]:
+def currency_problems(document: Document, case: Case) -> list[Flaw]:
     """Amounts in a currency that the spec gives no rate for."""
     spec, problems = case.spec, []
     for path, what, amount in _amounts(case):
@@ -279,7 +280,7 @@ def _has_options(role: RoleCase) -> bool:
     return sum(len(primitives) for primitives in pairs) > 1
 
 
-def missing_figures(document: Document, case: Case) -> list[Problem]:
+def missing_figures(document: Document, case: Case) -> list[Flaw]:
     """Costs, masses and powers that a requirement or the objective needs and a catalog lacks."""
     spec = case.spec
     needed: dict[str, str] = {

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
 
-Role = Literal["position", "attitude", "ranging"]
+from syncline_design.model.roles import RoleName
 
 
 @dataclass(frozen=True, slots=True)
@@ -13,7 +12,7 @@ class RoleSelection:
     """One role of one stage, by the ids of the catalogs (`inline` for a figure given in place)."""
 
     stage: str
-    role: Role
+    role: RoleName
     sensor: str
     primitive: str
     method: str
@@ -34,7 +33,7 @@ class Selection:
     roles: tuple[RoleSelection, ...]
     clocks: tuple[ClockSelection, ...] = ()
 
-    def role(self, stage: str, role: Role) -> RoleSelection | None:
+    def role(self, stage: str, role: RoleName) -> RoleSelection | None:
         """What was chosen for one role."""
         for one in self.roles:
             if one.stage == stage and one.role == role:

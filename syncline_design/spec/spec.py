@@ -13,12 +13,12 @@ from pydantic_core import PydanticCustomError
 
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.quantity import CURRENCIES, Dimension, Quantity
-from syncline_design.spec.catalog import ErrorEntry, Modality, Primitive, SensorEntry
+from syncline_design.model.roles import RoleName
+from syncline_design.spec.catalog import ErrorEntry, Primitive, SensorEntry
 from syncline_design.spec.effects_listed import EffectChoice as EffectChoice
 from syncline_design.spec.fields import (
     AngularRate,
     AtLeastOne,
-    Loc,
     Money,
     NonNegativeAngle,
     NonNegativeLength,
@@ -41,9 +41,7 @@ from syncline_design.spec.fields import (
 )
 from syncline_design.spec.log_block import LogChoice as LogChoice
 from syncline_design.spec.log_block import split_column as split_column
-
-Role = Literal["position", "attitude", "ranging"]
-ROLE_NAMES: tuple[Role, ...] = ("position", "attitude", "ranging")
+from syncline_design.spec.yaml_text import KeyPath
 
 MOST_REQUIREMENTS = 1_000
 MOST_STAGES = 32  # the work grows with the square of their number; chains have two or three
@@ -145,7 +143,7 @@ class PlatformChoice(Record):
 class Query(Record):
     """A catalog query: every key given must match."""
 
-    modality: Modality | None = None
+    modality: RoleName | None = None
     type: Text | None = None
     max_cost: Money | None = None
 
@@ -286,7 +284,7 @@ class StageChoice(Record):
     timing_from: Text | None = None  # stage that GNSS time comes from, by a cable
     note: str = ""
 
-    def role(self, name: Role) -> RoleChoice | None:
+    def role(self, name: RoleName) -> RoleChoice | None:
         """The choice of one role."""
         return {"position": self.position, "attitude": self.attitude, "ranging": self.ranging}[name]
 
@@ -398,7 +396,7 @@ class Spec(Record):
         return amount.exact * self.exchange_rates[str(amount.currency)].exact
 
 
-Located = tuple[Loc, PydanticCustomError]
+Located = tuple[KeyPath, PydanticCustomError]
 
 
 def _duplicates(section: str, key: str, names: list[str]) -> list[Located]:
@@ -430,7 +428,7 @@ def _rate_errors(spec: Spec) -> list[Located]:
 def _stage_errors(spec: Spec) -> list[Located]:
     errors: list[Located] = []
     for index, stage in enumerate(spec.stages):
-        at: Loc = ("stages", index)
+        at: KeyPath = ("stages", index)
         errors += _first_position(stage, at) if index == 0 else _later_position(stage, at)
         if stage.ranging is None and len(spec.stages) > 1:
             message = "missing: every stage of a chain measures the next object"
@@ -446,7 +444,7 @@ def _stage_errors(spec: Spec) -> list[Located]:
     return errors
 
 
-def _cable_errors(spec: Spec, stage: StageChoice, at: Loc) -> list[Located]:
+def _cable_errors(spec: Spec, stage: StageChoice, at: KeyPath) -> list[Located]:
     """A cable comes from another stage, and not round in a circle."""
     source = {one.name: one.timing_from for one in spec.stages}
     name = stage.timing_from
@@ -467,7 +465,7 @@ def _cable_errors(spec: Spec, stage: StageChoice, at: Loc) -> list[Located]:
     return [((*at, "timing_from"), error)]
 
 
-def _first_position(stage: StageChoice, at: Loc) -> list[Located]:
+def _first_position(stage: StageChoice, at: KeyPath) -> list[Located]:
     if stage.position is None:
         error = refusal("missing in the first stage", "a position sensor")
         return [((*at, "position"), error)]
@@ -476,7 +474,7 @@ def _first_position(stage: StageChoice, at: Loc) -> list[Located]:
     return []
 
 
-def _later_position(stage: StageChoice, at: Loc) -> list[Located]:
+def _later_position(stage: StageChoice, at: KeyPath) -> list[Located]:
     role = stage.position
     given = [] if role is None else sorted(role.model_fields_set - {"lever_arm", "note"})
     message = "the position of a later stage is the chain before it"

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from syncline_design.spec.fields import Record, did_you_mean, kind_of
-from syncline_design.spec.yaml_text import Document, KeyPath, Problem, printable, show_path
+from syncline_design.spec.yaml_text import Document, Flaw, KeyPath, printable, show_path
 
 M = TypeVar("M", bound=Record)
 
@@ -29,9 +29,7 @@ _WANTED = {
 }
 
 
-def validate(
-    model: type[M], document: Document, data: Any = None
-) -> tuple[M | None, list[Problem]]:
+def validate(model: type[M], document: Document, data: Any = None) -> tuple[M | None, list[Flaw]]:
     """The model of a document's data, or what is wrong with it.
 
     Places that the reader refused already are not reported a second time.
@@ -47,7 +45,7 @@ def validate(
     return (None if nulls else value), list(nulls.values())
 
 
-def _nulls(document: Document, data: Any, path: KeyPath) -> Iterator[tuple[KeyPath, Problem]]:
+def _nulls(document: Document, data: Any, path: KeyPath) -> Iterator[tuple[KeyPath, Flaw]]:
     """Keys and items with nothing in them: a slip more often than a wish for the default."""
     if isinstance(data, dict | tuple):
         for key, item in data.items() if isinstance(data, dict) else enumerate(data):
@@ -55,12 +53,10 @@ def _nulls(document: Document, data: Any, path: KeyPath) -> Iterator[tuple[KeyPa
     elif data is None and path not in document.problem_paths:
         place = document.position(path)
         hint = "give a value, or delete the key"
-        yield path, Problem(document.file, *place, show_path(path), "nothing (null)", hint=hint)
+        yield path, Flaw(document.file, *place, show_path(path), "nothing (null)", hint=hint)
 
 
-def _problems(
-    error: ValidationError, document: Document, refused: set[KeyPath]
-) -> Iterator[Problem]:
+def _problems(error: ValidationError, document: Document, refused: set[KeyPath]) -> Iterator[Flaw]:
     for detail in error.errors(include_url=False):
         path = tuple(detail["loc"])
         if any(path[:length] in refused for length in range(1, len(path) + 1)):
@@ -74,7 +70,7 @@ def _had_a_refused_key(path: KeyPath, refused: set[KeyPath]) -> bool:
     return any(len(r) == len(path) + 1 and r[:-1] == path for r in refused)
 
 
-def _problem(detail: dict[str, Any], path: KeyPath, document: Document) -> Problem:
+def _problem(detail: dict[str, Any], path: KeyPath, document: Document) -> Flaw:
     line, column = document.position(path)
     kind, context = detail["type"], detail.get("ctx", {})
     if kind in ("unknown_key", "extra_forbidden"):
@@ -87,7 +83,7 @@ def _problem(detail: dict[str, Any], path: KeyPath, document: Document) -> Probl
         found, hint = context["found"], context["hint"]
     else:
         message, expected, found, hint = _standard(kind, context, detail)
-    return Problem(
+    return Flaw(
         document.file, line, column, show_path(path), message, expected, printable(found, 80), hint
     )
 

@@ -30,7 +30,7 @@ MAX_PROBLEMS = 500  # then reading stops
 MAX_BYTES = 3 * 2**19  # 1.5 MiB: one MiB is honest work, two are not
 
 KeyPath = tuple[str | int, ...]
-Position = tuple[int, int]
+TextPosition = tuple[int, int]
 
 _CParser: Any = None  # stays so where PyYAML was built without libyaml
 with suppress(ImportError):
@@ -43,7 +43,7 @@ _VALUE_REFUSED = re.compile(f"[\x00\ud800-\udfff\ufffe\uffff{_BIDI}]")
 
 
 @dataclass(frozen=True, slots=True)
-class Problem:
+class Flaw:
     """One thing wrong with a file: where, what, what was expected and found, what to do."""
 
     file: str
@@ -82,14 +82,14 @@ class Document:
 
     file: str
     data: Any
-    positions: dict[KeyPath, Position]
-    key_positions: dict[KeyPath, Position]
+    positions: dict[KeyPath, TextPosition]
+    key_positions: dict[KeyPath, TextPosition]
     sha256: str
     text: str = field(repr=False)
-    problems: tuple[Problem, ...] = ()
+    problems: tuple[Flaw, ...] = ()
     problem_paths: tuple[KeyPath, ...] = ()
 
-    def position(self, path: KeyPath) -> Position:
+    def position(self, path: KeyPath) -> TextPosition:
         """Where a key path is, or the nearest thing around it."""
         for length in range(len(path), -1, -1):
             if path[:length] in self.positions:
@@ -122,9 +122,9 @@ def read(path: str | Path, shown_as: str | None = None) -> Document:
         raw = read_bytes(Path(path))
     except OSError as error:
         reason = error.strerror or str(error)
-        return _unreadable(Problem(file, 1, 1, "", f"cannot read the file: {reason.lower()}"))
+        return _unreadable(Flaw(file, 1, 1, "", f"cannot read the file: {reason.lower()}"))
     except StopReadingError as refused:
-        return _unreadable(Problem(file, 1, 1, "", str(refused)))
+        return _unreadable(Flaw(file, 1, 1, "", str(refused)))
     try:
         text = raw.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -132,7 +132,7 @@ def read(path: str | Path, shown_as: str | None = None) -> Document:
     return parse(text, file)
 
 
-def _unreadable(problem: Problem, sha256: str = "") -> Document:
+def _unreadable(problem: Flaw, sha256: str = "") -> Document:
     return Document(problem.file, None, {}, {}, sha256, "", (problem,), ((),))
 
 
@@ -144,7 +144,7 @@ def read_bytes(path: Path) -> bytes:
         raise StopReadingError(str(error)) from None
 
 
-def _encoding_problem(file: str, raw: bytes, error: UnicodeDecodeError) -> Problem:
+def _encoding_problem(file: str, raw: bytes, error: UnicodeDecodeError) -> Flaw:
     before = raw[: error.start].decode("utf-8", "replace")
     line, column = before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
     byte = raw[error.start]
@@ -154,7 +154,7 @@ def _encoding_problem(file: str, raw: bytes, error: UnicodeDecodeError) -> Probl
         guess = "surrogates encoded as UTF-8 (CESU-8)"
     else:
         guess = "Latin-1 (ISO 8859-1) or Windows-1252"
-    return Problem(
+    return Flaw(
         file, line, column, "", "not UTF-8", "UTF-8", f"byte 0x{byte:02x}, probably {guess}",
         "save the file as UTF-8",
     )  # fmt: skip
@@ -222,7 +222,7 @@ def _refuse_characters(text: str, builder: _Builder) -> None:
         raise StopReadingError
 
 
-def _place(mark: Any) -> Position:
+def _place(mark: Any) -> TextPosition:
     return (mark.line + 1, mark.column + 1)
 
 
@@ -231,17 +231,17 @@ class _Builder:
 
     def __init__(self, file: str) -> None:
         self.file = file
-        self.positions: dict[KeyPath, Position] = {}
-        self.key_positions: dict[KeyPath, Position] = {}
-        self.problems: list[Problem] = []
+        self.positions: dict[KeyPath, TextPosition] = {}
+        self.key_positions: dict[KeyPath, TextPosition] = {}
+        self.problems: list[Flaw] = []
         self.problem_paths: list[KeyPath] = []
 
     def refuse(
-        self, path: KeyPath, place: Position, message: str, *, expected: str = "",
+        self, path: KeyPath, place: TextPosition, message: str, *, expected: str = "",
         found: str = "", hint: str = "",
     ) -> None:  # fmt: skip
         self.problems.append(
-            Problem(self.file, *place, show_path(path), message, expected, found, hint)
+            Flaw(self.file, *place, show_path(path), message, expected, found, hint)
         )
         self.problem_paths.append(path)
         if len(self.problems) >= MAX_PROBLEMS:
@@ -286,14 +286,14 @@ class _Builder:
             return self._sequence(events, path, depth)
         return self._mapping(events, path, depth)
 
-    def _check_properties(self, event: Any, path: KeyPath, place: Position) -> None:
+    def _check_properties(self, event: Any, path: KeyPath, place: TextPosition) -> None:
         if event.anchor is not None:
             self.refuse(path, place, f"an anchor (&{event.anchor})", hint="delete it")
         if event.tag is not None:
             tag = event.tag.replace("tag:yaml.org,2002:", "!!")
             self.refuse(path, place, f"a tag ({printable(tag)})", hint="delete it")
 
-    def _scalar(self, event: Any, path: KeyPath, place: Position) -> Any:
+    def _scalar(self, event: Any, path: KeyPath, place: TextPosition) -> Any:
         if _VALUE_REFUSED.search(event.value):
             bad = _VALUE_REFUSED.search(event.value)
             code = ord(bad[0]) if bad else 0
@@ -329,7 +329,7 @@ class _Builder:
                 self.positions[value_path] = first
         return entries
 
-    def _refuse_duplicate(self, path: KeyPath, place: Position) -> None:
+    def _refuse_duplicate(self, path: KeyPath, place: TextPosition) -> None:
         line, column = self.key_positions[path]
         self.refuse(
             path, place, f"duplicate key; the first one is at line {line}, column {column}",

@@ -17,7 +17,7 @@ from syncline_design.machine.input_files import ReplacedInputError, noting
 from syncline_design.spec.case import Case
 from syncline_design.spec.keys import plain
 from syncline_design.spec.load import BadInput, without_simulated
-from syncline_design.spec.yaml_text import Problem
+from syncline_design.spec.yaml_text import Flaw
 from syncline_design.studies.inputs import canonical, inputs_of
 from syncline_design.studies.loading import Base, Study
 from syncline_design.studies.record import SCHEMA, CaseFigures, CaseRecord, FrontPoint, lost
@@ -160,7 +160,7 @@ def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Ca
     return _record(verdict, left_out)
 
 
-def _problem(problem: Problem) -> FileProblem:
+def _problem(problem: Flaw) -> FileProblem:
     message = str(problem).partition(": ")[2]
     return FileProblem(problem.file, problem.line, problem.column, problem.path, message)
 

@@ -20,7 +20,7 @@ from syncline_design.spec.load import BadInput, catalogs_of, load_document
 from syncline_design.spec.references import unknown_ids
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate
-from syncline_design.spec.yaml_text import Document, KeyPath, Problem, read
+from syncline_design.spec.yaml_text import Document, Flaw, KeyPath, read
 from syncline_design.studies.definition import (
     MAX_CASES,
     CheckChoice,
@@ -144,7 +144,7 @@ def _texts(value: Any) -> Iterator[str]:
         yield from (text for item in value for text in _texts(item))
 
 
-def _grid(chosen: StudyFile, document: Document, problems: list[Problem]) -> Iterator[Factor]:
+def _grid(chosen: StudyFile, document: Document, problems: list[Flaw]) -> Iterator[Factor]:
     combinations = len(chosen.base) * (chosen.sample.count if chosen.sample is not None else 1)
     for key, value in (chosen.grid or {}).items():
         place: KeyPath = ("grid", key)
@@ -160,7 +160,7 @@ def _grid(chosen: StudyFile, document: Document, problems: list[Problem]) -> Ite
         problems.append(problem_at(document, (), "too many cases", f"at most {MAX_CASES}", found))
 
 
-def _sample(chosen: StudyFile, document: Document, problems: list[Problem]) -> Iterator[Factor]:
+def _sample(chosen: StudyFile, document: Document, problems: list[Flaw]) -> Iterator[Factor]:
     if chosen.sample is None:
         return
     for key, value in chosen.sample.over.items():
@@ -173,14 +173,14 @@ def _sample(chosen: StudyFile, document: Document, problems: list[Problem]) -> I
         yield Factor(key, values, "sample", place, listed=False)
 
 
-def _factor_problem(document: Document, place: KeyPath, error: FactorError) -> Problem:
+def _factor_problem(document: Document, place: KeyPath, error: FactorError) -> Flaw:
     where = (*place, *error.where)
     return problem_at(document, where, error.message, error.expected, error.found)
 
 
 def _check_keys(
     chosen: StudyFile, document: Document, grid: list[Factor], sample: list[Factor],
-    problems: list[Problem],
+    problems: list[Flaw],
 ) -> None:  # fmt: skip
     both = {factor.key for factor in grid} & {factor.key for factor in sample}
     for factor in sample:
@@ -200,7 +200,7 @@ def _check_keys(
 
 def _bases(
     chosen: StudyFile, document: Document, path: Path, factors: list[Factor],
-    problems: list[Problem],
+    problems: list[Flaw],
 ) -> Iterator[Base]:  # fmt: skip
     seen: dict[Path, int] = {}
     for index, name in enumerate(chosen.base):
@@ -225,7 +225,7 @@ def _plain_path(path: Path) -> Path:
 
 
 def _base(
-    target: Path, study: Document, place: KeyPath, factors: list[Factor], problems: list[Problem]
+    target: Path, study: Document, place: KeyPath, factors: list[Factor], problems: list[Flaw]
 ) -> Base | None:
     """One base spec; its own errors stand beside the study's, each in its own file."""
     document = read(target)
@@ -253,7 +253,7 @@ def _base(
 
 
 def _paths(
-    spec: Document, study: Document, factors: list[Factor], problems: list[Problem], name: str
+    spec: Document, study: Document, factors: list[Factor], problems: list[Flaw], name: str
 ) -> dict[str, KeyPath]:
     paths: dict[str, KeyPath] = {}
     for factor in factors:
@@ -264,7 +264,7 @@ def _paths(
             message = f"{error.message} in {name}"
             shown = factor.place[0]
             problems.append(
-                Problem(
+                Flaw(
                     study.file, line, column, f"{shown}: {factor.key}", message, error.expected,
                     hint=error.hint,
                 )
@@ -286,7 +286,7 @@ def _with_data(document: Document, data: Any) -> Document:
     )  # fmt: skip
 
 
-def _check_values(base: Base, study: Study, document: Document, problems: list[Problem]) -> None:
+def _check_values(base: Base, study: Study, document: Document, problems: list[Flaw]) -> None:
     """Every value by itself in its base: what is wrong with it is said at its place."""
     for factor in study.factors:
         if factor.key not in base.paths:
@@ -306,8 +306,8 @@ def _check_values(base: Base, study: Study, document: Document, problems: list[P
                     problems.append(_at_path(restated, where))
 
 
-def _at_path(problem: Problem, path: str) -> Problem:
-    return Problem(
+def _at_path(problem: Flaw, path: str) -> Flaw:
+    return Flaw(
         problem.file, problem.line, problem.column, path, problem.message, problem.expected,
         problem.found, problem.hint,
     )  # fmt: skip
@@ -321,7 +321,7 @@ def _distinct_ends(factor: Factor) -> Sequence[Any]:
     return (*factor.values[::step], factor.values[-1])
 
 
-def _value_problems(base: Base, key: str, value: Any) -> list[Problem]:
+def _value_problems(base: Base, key: str, value: Any) -> list[Flaw]:
     """What is wrong with one value, whatever the other factors are."""
     path = base.paths[key]
     if path[0] == CATALOG:
@@ -366,7 +366,7 @@ def override_entry(catalogs: Collection, path: KeyPath, value: Any, spec: Docume
 
 def _validated(
     document: Document, place: tuple[str, str], entry: Any, spec: Path, read: Collection
-) -> tuple[Catalog | None, list[Problem]]:
+) -> tuple[Catalog | None, list[Flaw]]:
     """The entry through the catalog's own model, its errors placed in its own file.
 
     Files are named from the catalog's folder; a shipped catalog has none, the spec's counts.

@@ -16,10 +16,10 @@ from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.outcome import Unfinished
 from syncline_design.choice.problem import with_everything
-from syncline_design.choice.table import Design, Judge, Judgement, Option
-from syncline_design.choice.table import Problem as DesignProblem
+from syncline_design.choice.table import Design, Judge, Judgement, Option, Problem
 from syncline_design.machine.input_files import FileContent
-from syncline_design.model.system import ROLES, UTC, RoleName, Sensor, Stage, System
+from syncline_design.model.roles import ROLES, RoleName
+from syncline_design.model.system import UTC, Sensor, Stage, System
 from syncline_design.model.timing import (
     NO_ERROR,
     Constant,
@@ -32,7 +32,7 @@ from syncline_design.model.timing import (
 from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.simulation.run import DEFAULT_CAP
 from syncline_design.spec.case import Case
-from syncline_design.spec.load import BadInput, Problem
+from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.spec import Requirement
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
@@ -61,7 +61,7 @@ def refuse_trajectory(case: Case, message: str) -> NoReturn:
     """A trajectory that cannot be flown, as bad input at its place."""
     place = ("monte_carlo", "trajectory")
     line, column = case.positions.get(place, (0, 0))
-    raise BadInput((Problem(str(case.path), line, column, ".".join(place), message),))
+    raise BadInput((Flaw(str(case.path), line, column, ".".join(place), message),))
 
 
 @dataclass
@@ -95,7 +95,7 @@ class Simulations:
             self.known[key] = decide(nameless, settings, quantile, limit_m, cap)
         return self.known[key]
 
-    def problem_of(self, case: Case) -> DesignProblem:
+    def problem_of(self, case: Case) -> Problem:
         """The design problem of a spec, its simulated requirements included."""
         wanted = [r for r in case.spec.requirements if r.kind == "monte_carlo"]
         wanted = [r for r in wanted if not self._is_waived(r)]
@@ -131,7 +131,7 @@ class _SpecJudge:
         """How often a design was not simulated because the command had simulated too many."""
         return self.simulations.refusals
 
-    def hopeless(self, problem: DesignProblem, role: int, option: Option) -> bool:
+    def hopeless(self, problem: Problem, role: int, option: Option) -> bool:
         """Whether the noise of a sensor alone, with all else perfect, fails a limit by 1 %.
 
         Independent errors never make a symmetric, unimodal one less dispersed (T. W. Anderson,
@@ -156,7 +156,7 @@ class _SpecJudge:
         kinds = [registry()[one.effect].kind for one in self.case.effects]
         return "stochastic" in kinds
 
-    def judge(self, problem: DesignProblem, design: Design) -> Judgement:
+    def judge(self, problem: Problem, design: Design) -> Judgement:
         """Every limit in turn; the first that fails settles it."""
         left_open: list[str] = []
         system = self._system(problem, design)
@@ -167,7 +167,7 @@ class _SpecJudge:
             left_open += [name] if status == "indeterminate" else []
         return Judgement(undecided=tuple(left_open))
 
-    def _system(self, problem: DesignProblem, design: Design) -> System:
+    def _system(self, problem: Problem, design: Design) -> System:
         """The design's system; an option whose error or tau was grown has its sensor's grown."""
         system = system_of(self.case, problem, design)
         for table, place in zip(problem.roles, design.options, strict=True):
@@ -191,7 +191,7 @@ class _SpecJudge:
         quantile = next(float(r.quantile or 0.0) for r in self.requirements if r.id == name)
         return self.simulations.decide(self.case, system, quantile, limit_m)
 
-    def reached_m(self, problem: DesignProblem, design: Design, requirement: str) -> float:
+    def reached_m(self, problem: Problem, design: Design, requirement: str) -> float:
         """Upper end of the interval of the quantile that the requirement limits [m]."""
         limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
         return self._decision(self._system(problem, design), requirement, limit).estimate.high_m

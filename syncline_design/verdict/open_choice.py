@@ -10,7 +10,7 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.verdict.verified import Verified
 
 if TYPE_CHECKING:
-    from syncline_design.choice.outcome import Choice, Infeasible, Method
+    from syncline_design.choice.outcome import Choice, Infeasible, Road
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Picked:
 
 def pick(
     problem: Problem,
-    method: Method,
+    method: Road,
     time_limit_s: float | None,
     verify: Callable[[Design], Verified],
 ) -> Picked:

@@ -11,8 +11,8 @@ from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.decide import best
 from syncline_design.choice.explain import Explanation, explain
 from syncline_design.choice.front import front
-from syncline_design.choice.outcome import FrontPoint, Method, Unfinished
-from syncline_design.choice.prices import Step, staircase
+from syncline_design.choice.outcome import FrontPoint, Road, Unfinished
+from syncline_design.choice.prices import PriceStep, staircase
 from syncline_design.choice.problem import selection_of
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem, ResourceName
@@ -57,7 +57,7 @@ class OptimizeSettings:
     count: int = 1
     pareto: bool = False
     resource: ResourceName = "cost"
-    method: Method = "auto"
+    method: Road = "auto"
     time_limit_s: float | None = None
     seed: int = 0
     every: bool = False
@@ -89,7 +89,7 @@ class Optimisation:
     picked: Picked | None
     designs: tuple[Design, ...]
     front: tuple[FrontPoint, ...]
-    prices: tuple[Step, ...]
+    prices: tuple[PriceStep, ...]
     hinges: Hinges | None
     explanation: Explanation | None
     cut_short: tuple[str, ...] = ()  # what the time limit left out or incomplete

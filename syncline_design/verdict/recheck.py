@@ -19,8 +19,9 @@ from decimal import Context, Decimal, localcontext
 from fractions import Fraction
 from typing import Any, Literal
 
+from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import NOTHING_KNOWN, Case, Known, RoleCase, StageCase
-from syncline_design.spec.selection import Role, RoleSelection, Selection
+from syncline_design.spec.selection import RoleSelection, Selection
 from syncline_design.verdict.recheck_facts import impossible
 
 DIGITS = 60
@@ -147,9 +148,11 @@ def _length(figures: Any, axes: int) -> Decimal:
     return sum((_decimal(f) ** 2 for f in figures), Decimal(0)).sqrt()
 
 
-def _all_chosen(case: Case, selection: Selection, known: Known) -> dict[tuple[str, Role], _Chosen]:
+def _all_chosen(
+    case: Case, selection: Selection, known: Known
+) -> dict[tuple[str, RoleName], _Chosen]:
     """Entries of every role that the spec fills, in its order."""
-    out: dict[tuple[str, Role], _Chosen] = {}
+    out: dict[tuple[str, RoleName], _Chosen] = {}
     for stage in case.stages:
         for role in stage.roles:
             name = stage.choice.name
@@ -219,7 +222,7 @@ _Moment = tuple[str, Decimal]  # timeline of a stamp, bound of its error against
 _TRUE_TIME: _Moment = ("utc", Decimal(0))
 
 
-def _moves(stage: StageCase, chosen: Mapping[tuple[str, Role], _Chosen]) -> Moves:
+def _moves(stage: StageCase, chosen: Mapping[tuple[str, RoleName], _Chosen]) -> Moves:
     platform = stage.platform.entry
     if (stage.choice.name, "ranging") not in chosen:
         return _decimal(platform.v_max), Decimal(0), Decimal(0)
@@ -227,7 +230,7 @@ def _moves(stage: StageCase, chosen: Mapping[tuple[str, Role], _Chosen]) -> Move
     return _decimal(platform.v_max), distance * _decimal(platform.omega_max), distance
 
 
-def _sensor_error(role: Role, one: _Chosen, moves: Moves) -> Decimal:
+def _sensor_error(role: RoleName, one: _Chosen, moves: Moves) -> Decimal:
     sensor, distance = one.sensor, moves[2]
     if role == "position":
         return _length(sensor.sigma_position, 3)
@@ -236,7 +239,7 @@ def _sensor_error(role: Role, one: _Chosen, moves: Moves) -> Decimal:
     return _decimal(sensor.sigma_range) + _length(sensor.sigma_bearing, 2) * distance
 
 
-def _own_rate(role: Role, moves: Moves) -> Decimal:
+def _own_rate(role: RoleName, moves: Moves) -> Decimal:
     """What a sensor's own tau_crit is taken against; 0 for an attitude that enters nothing."""
     speed, turning, distance = moves
     if role == "position":
@@ -254,7 +257,7 @@ def _ratio(caused: Decimal, error: Decimal) -> Decimal:
 def _meetings(
     case: Case,
     selection: Selection,
-    chosen: Mapping[tuple[str, Role], _Chosen],
+    chosen: Mapping[tuple[str, RoleName], _Chosen],
     moves: Mapping[str, Moves],
 ) -> Iterator[tuple[Decimal, Decimal]]:
     """(bound of the relative timestamp error [s], rate [m/s]) of all that meet.
@@ -314,7 +317,7 @@ def _clock(case: Case, selection: Selection, vehicle: str) -> Any:
 def _amount(
     case: Case,
     selection: Selection,
-    chosen: Mapping[tuple[str, Role], _Chosen],
+    chosen: Mapping[tuple[str, RoleName], _Chosen],
     name: Literal["cost", "mass", "power"],
 ) -> Fraction | None:
     """Sum of a resource, exact; shared hardware once per vehicle and full set of channels."""

@@ -6,15 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 from syncline_design import __version__
-from syncline_design.choice.table import Design
-from syncline_design.choice.table import Problem as DesignProblem
+from syncline_design.choice.table import Design, Problem
 from syncline_design.model.budget import Budget, SyncModelName
 from syncline_design.model.system import System
 from syncline_design.simulation import MonteCarlo, SimulationError
 from syncline_design.simulation.certified import certified_worst_case_m
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.known_effects import describe
-from syncline_design.spec.load import BadInput, Problem
+from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.recheck import Recheck
 from syncline_design.verdict.tree import (
     ErrorFigures,
@@ -115,7 +114,7 @@ def known_effects(system: System) -> tuple[KnownEffect, ...]:
     )
 
 
-def frame(case: Case, problem: DesignProblem | None, seed: int) -> dict[str, Any]:
+def frame(case: Case, problem: Problem | None, seed: int) -> dict[str, Any]:
     """The fields that every verdict has; problem: None where time ended first."""
     horizon = case.spec.horizon.horizon()
     return {
@@ -125,7 +124,7 @@ def frame(case: Case, problem: DesignProblem | None, seed: int) -> dict[str, Any
     }
 
 
-def _spec_frame(case: Case, problem: DesignProblem | None) -> SpecFrame:
+def _spec_frame(case: Case, problem: Problem | None) -> SpecFrame:
     spec = case.spec
     return SpecFrame(
         name=spec.name,
@@ -182,7 +181,7 @@ def refused(file: str, error: BadInput) -> Refused:
     return Refused(file=file, problems=problems, text=str(error))
 
 
-def _file_problem(problem: Problem) -> FileProblem:
+def _file_problem(problem: Flaw) -> FileProblem:
     wanted = f"expected {problem.expected}" if problem.expected else ""
     found = f"found {problem.found}" if problem.found else ""
     parts = (problem.message, wanted, found, problem.hint)

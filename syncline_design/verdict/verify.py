@@ -12,8 +12,7 @@ from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.problem import selection_of, sole_design
-from syncline_design.choice.table import Design
-from syncline_design.choice.table import Problem as DesignProblem
+from syncline_design.choice.table import Design, Problem
 from syncline_design.effects.acting import known_of
 from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
 from syncline_design.model.budget import budget
@@ -21,7 +20,7 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
 from syncline_design.simulation import CrossCheck, Decision, SimulationError, cross_check, decide
 from syncline_design.spec.case import Case
-from syncline_design.spec.load import BadInput, Problem, load
+from syncline_design.spec.load import BadInput, Flaw, load
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.spec import Requirement
 from syncline_design.verdict.acceptance import (
@@ -54,7 +53,7 @@ from syncline_design.verdict.verified import (
 )
 
 if TYPE_CHECKING:
-    from syncline_design.choice.outcome import FrontPoint, Method
+    from syncline_design.choice.outcome import FrontPoint, Road
     from syncline_design.choice.variations import Build
     from syncline_design.verdict.open_choice import Picked
 
@@ -70,7 +69,7 @@ class CheckSettings:
     """
 
     seed: int = 0
-    method: Method = "auto"
+    method: Road = "auto"
     time_limit_s: float | None = None
     monte_carlo: bool = True
     today: date | None = None
@@ -110,7 +109,7 @@ def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Refused:
 def check_loaded(case: Case, settings: CheckSettings) -> Verdict:
     """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
     build = _build(settings)
-    problem: DesignProblem | None = None
+    problem: Problem | None = None
     with within_s(settings.time_limit_s):
         try:
             problem = build(case)
@@ -121,9 +120,7 @@ def check_loaded(case: Case, settings: CheckSettings) -> Verdict:
             return unfinished_verdict(case, problem, settings, str(error))
 
 
-def _sole_verdict(
-    case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
-) -> Verdict:
+def _sole_verdict(case: Case, problem: Problem, settings: CheckSettings, build: Build) -> Verdict:
     """The verdict on the only design that a spec leaves.
 
     Where the spec names candidates, that no design meets it is said as for any number of designs.
@@ -140,7 +137,7 @@ def _sole_verdict(
 
 
 def unfinished_verdict(
-    case: Case, problem: DesignProblem | None, settings: CheckSettings, why: str
+    case: Case, problem: Problem | None, settings: CheckSettings, why: str
 ) -> Verdict:
     """A verdict that the time limit left without a design."""
     from syncline_design.verdict.choice_data import unproven_json
@@ -164,7 +161,7 @@ def _build(settings: CheckSettings) -> Build:
     return Simulations(settings.seed, settings.today).problem_of
 
 
-def picked_design(case: Case, seed: int = 0) -> tuple[DesignProblem, Design]:
+def picked_design(case: Case, seed: int = 0) -> tuple[Problem, Design]:
     """The only design of a pinned spec, or the best of an open one; BadInput when there is none."""
     problem = Simulations(seed).problem_of(case)
     sole = sole_design(problem)
@@ -179,13 +176,11 @@ def picked_design(case: Case, seed: int = 0) -> tuple[DesignProblem, Design]:
         message = "no design meets this spec, so there is no system to work with"
         hint = f"see `syncline-design check {case.path.name}`, or pin the sensors"
         place = (str(case.path), line, column, "stages")
-        raise BadInput((Problem(*place, message, hint=hint),))
+        raise BadInput((Flaw(*place, message, hint=hint),))
     return problem, choice.design
 
 
-def _check_open(
-    case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
-) -> Verdict:
+def _check_open(case: Case, problem: Problem, settings: CheckSettings, build: Build) -> Verdict:
     """Choose, then verify; without any design say why and what would help."""
     from syncline_design.verdict.open_choice import pick
 
@@ -200,7 +195,7 @@ def _check_open(
 
 def open_verdict(
     case: Case,
-    problem: DesignProblem,
+    problem: Problem,
     picked: Picked,
     settings: CheckSettings,
     build: Build | None = None,
@@ -238,9 +233,7 @@ def _unproven(picked: Picked) -> Iterator[Caution]:
         yield Caution("not-proven-optimal", message)
 
 
-def _infeasible(
-    case: Case, problem: DesignProblem, settings: CheckSettings, build: Build
-) -> Verdict:
+def _infeasible(case: Case, problem: Problem, settings: CheckSettings, build: Build) -> Verdict:
     """Why there is no design, and which single changes would help."""
     from syncline_design.choice.explain import explain
     from syncline_design.verdict.choice_data import excluded_json
@@ -292,7 +285,7 @@ def _passed_over(picked: Picked) -> Iterator[Caution]:
     yield Caution("passed-over", message)
 
 
-def verify(case: Case, problem: DesignProblem, design: Design, settings: CheckSettings) -> Verified:
+def verify(case: Case, problem: Problem, design: Design, settings: CheckSettings) -> Verified:
     """Budget, exact recheck, Monte Carlo and every requirement of one design."""
     system = system_of(case, problem, design)
     known = known_of(system)
@@ -411,7 +404,7 @@ def _placed(
 
 def _verdict(
     case: Case,
-    problem: DesignProblem,
+    problem: Problem,
     verified: Verified,
     settings: CheckSettings,
     choice: Mapping[str, Any],
