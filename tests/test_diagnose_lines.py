@@ -24,7 +24,7 @@ from syncline_design.diagnosis.result import Rival
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
-from syncline_design.model.estimates import figure
+from syncline_design.model.quantity import format_estimate
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.render_console import console
 from syncline_design.report.render_markdown import markdown
@@ -204,7 +204,7 @@ def test_more_noise_has_no_better_best(tmp_path: Path) -> None:
     held_out = found.to_json()["gap"]["held_out"]
     for part in ("before", "after", "fitted"):
         assert held_out[part]["rms_m"] == pytest.approx(rms_m(raw_error(columns)), rel=1e-3)
-    best = figure(rms_m(raw_error(columns)), None, "m")
+    best = format_estimate(rms_m(raw_error(columns)), None, "m")
     told = " ".join(console(on_diagnosis(with_design(found, None))).split())
     assert f"RMS at best {best}" in told
 

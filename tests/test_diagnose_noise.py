@@ -27,7 +27,7 @@ from syncline_design.diagnosis.tails import tails_of
 from syncline_design.diagnosis.trajectory import pieces
 from syncline_design.effects.kinematics import gauss_markov
 from syncline_design.effects.record import Target
-from syncline_design.model.estimates import figure
+from syncline_design.model.quantity import format_estimate
 
 Array = NDArray[np.float64]
 
@@ -278,8 +278,8 @@ def test_splines_stop_at_gaps_and_hold_beyond_ends() -> None:
 
 
 def test_figures_read_as_people_write_them() -> None:
-    assert figure(0.0871, 0.0003, "s") == "87.1 ± 0.3 ms"
-    assert figure(-0.37, 0.004, "m") == "-37.0 ± 0.4 cm"
-    assert figure(0.01745329252, 0.0001745, "rad") == "1.000 ± 0.010 deg"
-    assert figure(2.5, 0.12) == "2.50 ± 0.12"
-    assert figure(0.0, None, "s") == "0 s"
+    assert format_estimate(0.0871, 0.0003, "s") == "87.1 ± 0.3 ms"
+    assert format_estimate(-0.37, 0.004, "m") == "-37.0 ± 0.4 cm"
+    assert format_estimate(0.01745329252, 0.0001745, "rad") == "1.000 ± 0.010 deg"
+    assert format_estimate(2.5, 0.12) == "2.50 ± 0.12"
+    assert format_estimate(0.0, None, "s") == "0 s"

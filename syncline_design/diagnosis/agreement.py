@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
-from syncline_design.model.estimates import figure
+from syncline_design.model.quantity import format_estimate
 
 LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 LEAST_STEPS = 4  # rows in a window
@@ -242,7 +242,7 @@ def _constant(spans: Spans, moved: Array, own: Array) -> Array:
 def _offset_words(spans: Spans, moved: Array, own: Array, places: bool) -> str:
     mean = _constant(spans, moved, own)
     k = int(np.argmax(np.abs(mean)))
-    size = figure(float(mean[k]), None, "m/s" if places else "rad/s")
+    size = format_estimate(float(mean[k]), None, "m/s" if places else "rad/s")
     return f"they hold a constant {size} {'along' if places else 'about'} the {AXES[k]} axis"
 
 

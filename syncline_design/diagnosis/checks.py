@@ -16,7 +16,7 @@ from syncline_design.diagnosis.result import Check, Severity
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import StageLog
-from syncline_design.model.estimates import figure
+from syncline_design.model.quantity import format_estimate
 from syncline_design.model.system import Stage
 
 USUAL, RARE = 0.95, 0.99  # quantiles that decide on a contradiction and on a caution
@@ -73,8 +73,8 @@ def _limit(
     word, key = NAMES[code]
     reached = USUAL if severity == "contradiction" else RARE
     message = (
-        f"{word} of {stage} reaches {figure(value, None, unit)} ({100.0 * reached:.0f} % of the "
-        f"log is below), the spec's {key} is {figure(limit, None, unit)}; "
+        f"{word} of {stage} reaches {format_estimate(value, None, unit)} "
+        f"({100.0 * reached:.0f} % of the log is below), the spec's {key} is {format_estimate(limit, None, unit)}; "
         f"{100.0 * share:.0f} % of the log is beyond it"
     )
     yield Check(code, stage, severity, message, value, limit, unit, share)

@@ -17,7 +17,7 @@ from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.effects.record import Effect
-from syncline_design.model.estimates import figure
+from syncline_design.model.quantity import format_estimate
 
 Label = tuple[str, str, int]
 Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]
@@ -30,7 +30,13 @@ def estimate(
     value: float | str, spread: float | None = None, unit: str = "", seen: bool = True
 ) -> Estimate:
     """A parameter with the text that every output prints."""
-    text = value if isinstance(value, str) else figure(value, spread, unit) if seen else NOT_SEEN
+    text = (
+        value
+        if isinstance(value, str)
+        else format_estimate(value, spread, unit)
+        if seen
+        else NOT_SEEN
+    )
     return Estimate(value, spread, unit, seen, text)
 
 

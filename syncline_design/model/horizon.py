@@ -20,11 +20,3 @@ class Horizon:
 
 
 DEFAULT_HORIZON = Horizon()
-
-
-def duration_words(duration_s: float) -> str:
-    """`1 h`, `20 min`, `45 s`."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if duration_s >= size:
-            return f"{duration_s / size:.4g} {unit}"
-    return f"{duration_s:.4g} s"

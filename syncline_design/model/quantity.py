@@ -31,6 +31,15 @@ _EXPONENT = re.compile(r"[eE]([-+]?[0-9]+)$")
 _LEADING_ZERO = re.compile(r"[-+]?0[0-9]")
 _PLUS_MINUS = re.compile(r"\+/-|\u00b1")
 _TO = re.compile(r"\s\.\.\s")
+# units of an estimate and what one of each is in SI, largest first
+_ESTIMATE_LADDERS: dict[str, tuple[tuple[str, float], ...]] = {
+    "s": (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)),
+    "m": (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)),
+    "rad": (("deg", math.pi / 180.0), ("mdeg", math.pi / 180e3)),
+    "rad/s": (("deg/s", math.pi / 180.0), ("deg/h", math.pi / 648e3)),
+    "m/(m/s2)": (("m/(m/s2)", 1.0), ("mm/(m/s2)", 1e-3)),
+    "": (("", 1.0), ("ppm", 1e-6)),
+}
 
 
 class UnitError(ValueError):
@@ -329,6 +338,37 @@ def format_like(written: str, si_value: float, digits: int = 4) -> str:
     if unit is None:
         return _figure(si_value, digits)
     return f"{_figure(si_value / float(UNITS[unit][1]), digits)} {unit}"
+
+
+def format_duration(duration_s: float) -> str:
+    """`1 h`, `20 min`, `45 s`."""
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if duration_s >= size:
+            return f"{duration_s / size:.4g} {unit}"
+    return f"{duration_s:.4g} s"
+
+
+def format_estimate(value: float, uncertainty: float | None = None, unit: str = "") -> str:
+    """`87.1 ± 0.3 ms`: the uncertainty to one or two figures (GUM 7.2.6), the value to the same
+    place, both in the unit that reads best.
+    """
+    name, scale = _rung(abs(value), unit)
+    shown = value / scale
+    if uncertainty is None or not uncertainty > 0.0 or not math.isfinite(uncertainty):
+        return f"{shown:.4g} {name}".strip()
+    spread = uncertainty / scale
+    mantissa, exponent = f"{spread:.1e}".split("e")
+    digits = 1 if float(mantissa) < 3.0 else 0  # two figures of 1.0 to 2.9, else one
+    places = max(0, digits - int(exponent))
+    return f"{shown:.{places}f} ± {spread:.{places}f} {name}".strip()
+
+
+def _rung(size: float, unit: str) -> tuple[str, float]:
+    ladder = _ESTIMATE_LADDERS.get(unit, ((unit, 1.0),))
+    for name, scale in ladder:
+        if size >= scale:
+            return name, scale
+    return ladder[-1] if size > 0.0 else ladder[0]
 
 
 def _figure(value: float, digits: int) -> str:

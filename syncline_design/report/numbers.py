@@ -5,9 +5,12 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any, Final
 
-from syncline_design.model import estimates
-from syncline_design.model.horizon import duration_words
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.quantity import (
+    Dimension,
+    format_duration,
+    format_estimate,
+    format_quantity,
+)
 
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import MissionHorizon
@@ -52,7 +55,7 @@ def time(value: Any, digits: int = 4) -> str:
 def horizon(entry: MissionHorizon) -> str:
     """`1 h, extent 1 km, tilt 10 deg`."""
     extent, tilt = length(entry.extent_m), angle(entry.tilt_rad)
-    return f"{duration_words(entry.duration_s)}, extent {extent}, tilt {tilt}"
+    return f"{format_duration(entry.duration_s)}, extent {extent}, tilt {tilt}"
 
 
 def time_limit(value: Any, digits: int = 4) -> str:
@@ -141,7 +144,7 @@ def si_quantity(value: Any, unit: str, digits: int = 4) -> str:
 
 def with_uncertainty(value: float, uncertainty: float | None, unit: str) -> str:
     """An SI estimate and its standard uncertainty in one unit, `87.1 ± 0.3 ms`, typeset."""
-    return typeset(estimates.figure(value, uncertainty, unit))
+    return typeset(format_estimate(value, uncertainty, unit))
 
 
 def typeset(text: str) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from syncline_design.effects.acting import by_stage, tilts
-from syncline_design.model.horizon import duration_words
+from syncline_design.model.quantity import format_duration
 from syncline_design.model.system import System
 from syncline_design.simulation.draws import entering
 from syncline_design.simulation.results import Ensemble
@@ -50,7 +50,7 @@ def outside_words(outside: tuple[str, ...]) -> str:
 def _over_the_horizon(system: System, envelope: str) -> list[str]:
     horizon = system.horizon
     drawn = [
-        f"time since the start up to {duration_words(horizon.duration_s)}",
+        f"time since the start up to {format_duration(horizon.duration_s)}",
         f"place within {horizon.extent_m:g} m",
     ]
     if envelope != "trajectory" and tilts(system):

@@ -9,7 +9,7 @@ import numpy as np
 from syncline_design.effects.acting import by_stage
 from syncline_design.effects.kinematics import bearing, rotate
 from syncline_design.effects.record import Array
-from syncline_design.model.horizon import duration_words
+from syncline_design.model.quantity import format_duration
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation.settings import SimulationSettings
 from syncline_design.simulation.track import Track
@@ -54,7 +54,7 @@ def _duration(track: Track, allowed_s: float) -> list[str]:
     lasts = float(track.time_s[-1] - track.time_s[0])
     if lasts <= allowed_s * (1.0 + 1e-9):
         return []
-    return [f"lasts {duration_words(lasts)}, horizon.duration is {duration_words(allowed_s)}"]
+    return [f"lasts {format_duration(lasts)}, horizon.duration is {format_duration(allowed_s)}"]
 
 
 def _motion(stage: Stage, track: Track) -> list[str]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from difflib import get_close_matches
 
-from syncline_design.model.estimates import figure
 from syncline_design.model.known import EffectEntry
+from syncline_design.model.quantity import format_estimate
 from syncline_design.spec.files import problem_at
 from syncline_design.spec.spec import EffectChoice, Spec
 from syncline_design.spec.yaml_text import Document, Flaw, KeyPath
@@ -66,7 +66,7 @@ def describe(entry: EffectEntry) -> str:
     effect = registry()[entry.effect]
     units = {parameter.name: parameter.unit for parameter in effect.parameters}
     shown = {
-        name: value if isinstance(value, str) else figure(value, None, units.get(name, ""))
+        name: value if isinstance(value, str) else format_estimate(value, None, units.get(name, ""))
         for name, value in entry.parameters
     }
     return effect.sentence.format(sensor=entry.sensor, **shown)
