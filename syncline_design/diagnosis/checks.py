@@ -74,7 +74,8 @@ def _limit(
     reached = USUAL if severity == "contradiction" else RARE
     message = (
         f"{word} of {stage} reaches {format_estimate(value, None, unit)} "
-        f"({100.0 * reached:.0f} % of the log is below), the spec's {key} is {format_estimate(limit, None, unit)}; "
+        f"({100.0 * reached:.0f} % of the log is below), the spec's {key} is "
+        f"{format_estimate(limit, None, unit)}; "
         f"{100.0 * share:.0f} % of the log is beyond it"
     )
     yield Check(code, stage, severity, message, value, limit, unit, share)
