@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from typing import Any
 
 _REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 _CONTROL_PICTURES = 0x2400  # U+2400..U+241F picture the C0 controls, U+2421 pictures DEL
@@ -61,17 +59,6 @@ def sentence_list(items: list[str]) -> str:
     if len(items) < 2:
         return "".join(items)
     return ", ".join(items[:-1]) + " and " + items[-1]
-
-
-def harmless(value: Any) -> Any:
-    """A copy of nested JSON data in which every text, keys included, is `visible`."""
-    if isinstance(value, str):
-        return visible(value)
-    if isinstance(value, Mapping):
-        return {visible(key): harmless(entry) for key, entry in value.items()}
-    if isinstance(value, list | tuple):
-        return [harmless(entry) for entry in value]
-    return value
 
 
 def shortened(text: str, most: int = 30) -> str:
