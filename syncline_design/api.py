@@ -109,7 +109,7 @@ def diagnose(
         case = _case(spec)
         found = diagnosis.diagnose(as_measured(case, seed), logs, settings)
         means = meaning(case, found.effects_entries(), seed)
-        return with_design(found, None if means is None else means.design)
+        return with_design(found, means)
 
 
 def study(

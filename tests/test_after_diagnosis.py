@@ -53,7 +53,7 @@ def of(effect: str, parameters: dict[str, float], horizon: str = "") -> DesignMe
     )
     found = meaning(load_text(text, ROOT / "specs" / "x.yaml"), (entry,))
     assert found is not None
-    return found.design
+    return found
 
 
 def added(found: DesignMeaning) -> dict[str, float]:

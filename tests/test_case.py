@@ -15,9 +15,14 @@ from syncline_design.choice.variations import (
     with_figure,
     with_platform_figure,
 )
+from syncline_design.comparison.meaning import as_measured, meaning
 from syncline_design.model.quantity import Dimension
+from syncline_design.spec import edit, yaml_text
+from syncline_design.spec import load as load_module
 from syncline_design.spec.catalog import SECTIONS, Catalog
 from syncline_design.spec.load import load
+from syncline_design.spec.spec import EffectChoice
+from syncline_design.spec.yaml_text import Document
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 ROOT = Path(__file__).parents[1]
@@ -57,6 +62,33 @@ def test_no_verdict_asks_for_what_the_spec_names_again(name: str, asked: Counter
     asked.clear()
     check_loaded(case, CheckSettings(monte_carlo=False))
     assert set(asked) <= {"case.py", "fixes.py"}
+
+
+def test_what_a_diagnosis_means_is_found_without_reading_anything_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The measured system and the spec with the findings are cases made from the first one."""
+    parsed: Counter[str] = Counter()
+
+    def counted(text: str, file: str = "<text>") -> Document:
+        parsed[file] += 1
+        return plain(text, file)
+
+    plain = yaml_text.parse
+    for module in (yaml_text, load_module, edit):
+        monkeypatch.setattr(module, "parse", counted)
+    case = load(UAV)
+    assert len(case.stages[0].role("position").sensors) > 1  # type: ignore[union-attr]
+    measured = as_measured(case)
+    assert len(measured.stages[0].role("position").sensors) == 1  # type: ignore[union-attr]
+    entry = EffectChoice(
+        effect="latency", sensor="position", stage="uav", parameters={"latency_s": 1e-5}
+    )
+    found = meaning(case, [entry])
+    assert found is not None
+    assert found.after.design is not None
+    assert parsed == dict.fromkeys(parsed, 1)
+    assert str(UAV) in parsed
 
 
 def test_a_what_if_is_looked_up_anew() -> None:

@@ -33,7 +33,7 @@ def of(log: WorldLog, *exclude: str) -> DiagnosisAndDesign:
         data = log.to_csv(Path(folder) / "log.csv")
         found = diagnose(spec, [data], DiagnosisSettings(exclude_effects=exclude))
         means = meaning(load(spec), found.effects_entries())
-    return with_design(found, None if means is None else means.design)
+    return with_design(found, means)
 
 
 @cache
@@ -42,7 +42,7 @@ def example() -> DiagnosisAndDesign:
     found = diagnose(spec, [EXAMPLES / "hidden_latency.csv"])
     means = meaning(load(spec), found.effects_entries())
     assert means is not None
-    return with_design(found, means.design)
+    return with_design(found, means)
 
 
 @cache

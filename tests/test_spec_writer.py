@@ -9,7 +9,14 @@ import pytest
 
 from syncline_design.machine.result_files import OutputError, write_file
 from syncline_design.spec.case import Case, usable_primitives
-from syncline_design.spec.edit import PinnedRole, pinned_spec_text, with_effects_text, write_spec
+from syncline_design.spec.edit import (
+    PinnedRole,
+    pinned,
+    pinned_spec_text,
+    with_effects,
+    with_effects_text,
+    write_spec,
+)
 from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import parse
@@ -65,6 +72,7 @@ def test_a_pinned_spec_loads_keeps_its_comments_and_pins_every_role(path: Path) 
         assert before is not None
         assert role.lever_arm == before.lever_arm
     assert again.spec.requirements == spec.spec.requirements
+    assert pinned(spec, pins, clocks).spec == again.spec
     comments = [line for line in spec.text.split("\n") if line.startswith("#")]
     assert [line for line in text.split("\n") if line.startswith("#")] == comments
     assert (
@@ -80,6 +88,8 @@ def test_effects_are_added_and_nothing_else_changes(path: Path) -> None:
     entry = EFFECT.model_copy(update={"stage": stage})
     once = load_text(with_effects_text(spec, [entry]), path)
     assert once.spec.effects == (*spec.spec.effects, entry)
+    added = with_effects(spec, [entry])
+    assert (added.spec, added.effects) == (once.spec, once.effects)
     assert once.spec.model_copy(update={"effects": spec.spec.effects}) == spec.spec
     assert once.text.startswith(spec.text.rstrip("\n")) or spec.spec.effects
     twice = load_text(with_effects_text(once, [entry]), path)
@@ -112,8 +122,8 @@ def test_comments_inside_an_edited_block_survive() -> None:
     text = text.replace("    position:\n", "    position:  # the antenna\n      # on the tail\n")
     assert "# on the tail" in text
     spec = load_text(text, SPECS / "x.yaml")
-    pinned = pinned_spec_text(spec, first_options(spec))
-    assert "position:  # the antenna\n      # on the tail\n      sensor: ublox_f9p_pvt\n" in pinned
+    text = pinned_spec_text(spec, first_options(spec))
+    assert "position:  # the antenna\n      # on the tail\n      sensor: ublox_f9p_pvt\n" in text
 
 
 def test_what_cannot_be_edited_is_written_anew_with_a_remark() -> None:

@@ -27,7 +27,7 @@ from syncline_design.cli.shared import (
 from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:
-    from syncline_design.comparison.meaning import Meaning
+    from syncline_design.comparison.meaning import DesignMeaning
     from syncline_design.diagnosis import Diagnosis
     from syncline_design.machine.deadline import Deadline
     from syncline_design.spec.case import Case
@@ -103,11 +103,12 @@ def diagnose(
         case = load(spec)
         found = diagnose_log(as_measured(case, seed), log or (), settings, progress)
         means = _meaning(case, found, seed, deadline)
-    whole = with_design(found, None if means is None else means.design)
+    whole = with_design(found, means)
     if write_spec is not None and means is not None:
+        from syncline_design.spec.edit import with_effects_text
         from syncline_design.spec.edit import write_spec as write_checked
 
-        write_checked(means.spec_text, write_spec)
+        write_checked(with_effects_text(case, found.effects_entries()), write_spec)
         say(f"spec with the findings written to {write_spec}")
     elif write_spec is not None:
         found_any = bool(found.effects_entries())
@@ -117,7 +118,7 @@ def diagnose(
     return found.exit_code
 
 
-def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> Meaning | None:
+def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> DesignMeaning | None:
     """What a diagnosis means for the design; without it the diagnosis stands, for want of time."""
     from syncline_design.comparison.meaning import meaning
     from syncline_design.machine.deadline import OutOfTime

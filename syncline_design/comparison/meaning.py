@@ -14,10 +14,9 @@ from syncline_design.model.budget import SyncModelName
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.simulation.results import QuantileEstimate
 from syncline_design.spec.case import Case
-from syncline_design.spec.edit import with_effects_text
+from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice
-from syncline_design.spec.load import load_text
-from syncline_design.verdict.optimise import pinned_text
+from syncline_design.verdict.optimise import pinned_case
 from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
 from syncline_design.verdict.verified import frame
 from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
@@ -103,41 +102,28 @@ def as_measured(case: Case, seed: int = 0) -> Case:
     problem, design = picked_design(case, seed)
     if problem.combinations == 1:
         return case
-    text = pinned_text(case, problem, design)
-    return load_text(text, case.path, case.builtin)
+    return pinned_case(case, problem, design)
 
 
-@dataclass(frozen=True, slots=True)
-class Meaning:
-    """What findings mean for the design; spec_text: the spec that holds them."""
-
-    spec_text: str
-    design: DesignMeaning
-
-
-def meaning(case: Case, entries: Sequence[EffectChoice], seed: int = 0) -> Meaning | None:
+def meaning(case: Case, entries: Sequence[EffectChoice], seed: int = 0) -> DesignMeaning | None:
     """Check the spec with and without the findings; None when nothing was found."""
     if not entries:
         return None
-    text = with_effects_text(case, entries)
     settings = CheckSettings(seed=seed)
     before = _checked(case, settings)
-    after = _checked(load_text(text, case.path, case.builtin), settings)
+    after = _checked(with_effects(case, entries), settings)
     horizon = after.verdict.horizon
     given = "horizon" in case.spec.model_fields_set
-    return Meaning(
-        text,
-        DesignMeaning(
-            before=_summary(before.verdict),
-            after=_summary(after.verdict),
-            text=(*_lines(before, after), *_why_models_differ(after.verdict)),
-            figures=error_figures(before.verdict, after.verdict),
-            horizon=ChargedHorizon(
-                horizon.duration_s,
-                horizon.extent_m,
-                horizon.tilt_rad,
-                horizon_words(horizon, given=given),
-            ),
+    return DesignMeaning(
+        before=_summary(before.verdict),
+        after=_summary(after.verdict),
+        text=(*_lines(before, after), *_why_models_differ(after.verdict)),
+        figures=error_figures(before.verdict, after.verdict),
+        horizon=ChargedHorizon(
+            horizon.duration_s,
+            horizon.extent_m,
+            horizon.tilt_rad,
+            horizon_words(horizon, given=given),
         ),
     )
 

@@ -108,7 +108,6 @@ class Case:
     catalogs_sha256: str
     text: str = field(repr=False)
     origins: Origins = field(repr=False)
-    builtin: bool = True
     files: tuple[FileRead, ...] = ()
     trajectory: FileContent | None = None
     stages: tuple[StageCase, ...] = field(init=False, repr=False)

@@ -8,7 +8,7 @@ the data instead, with a comment that says so.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,7 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
-from syncline_design.spec.spec import EffectChoice
+from syncline_design.spec.spec import ClockChoice, EffectChoice
 from syncline_design.spec.yaml_text import KeyPath, parse, plain_scalar
 
 MAX_WIDTH = 96
@@ -34,6 +34,22 @@ class PinnedRole:
     sensor: str
     primitive: str | None = None
     timestamping: str | None = None
+
+
+def pinned(
+    case: Case, roles: Sequence[PinnedRole], clocks: Mapping[int, str] | None = None
+) -> Case:
+    """The case with every choice pinned; its spec is the one that `pinned_spec_text` writes."""
+    stages = list(case.spec.stages)
+    for one in roles:
+        choice = stages[one.stage].role(one.role)
+        assert choice is not None
+        keys = choice.model_copy(update=_pinned_keys(case, one))
+        stages[one.stage] = stages[one.stage].model_copy(update={one.role: keys})
+    for index, clock in (clocks or {}).items():
+        only = ClockChoice(candidates=(clock,))
+        stages[index] = stages[index].model_copy(update={"clock": only})
+    return replace(case, spec=case.spec.model_copy(update={"stages": tuple(stages)}))
 
 
 def pinned_spec_text(
@@ -60,6 +76,12 @@ def _pinned_keys(case: Case, pinned: PinnedRole) -> dict[str, Any]:
     if pinned.timestamping is not None:
         keys["timestamping"] = pinned.timestamping
     return keys
+
+
+def with_effects(case: Case, effects: Sequence[EffectChoice]) -> Case:
+    """The case with known effects added; its spec is the one that `with_effects_text` writes."""
+    spec = case.spec.model_copy(update={"effects": (*case.spec.effects, *effects)})
+    return replace(case, spec=spec)
 
 
 def with_effects_text(case: Case, effects: Sequence[EffectChoice]) -> str:

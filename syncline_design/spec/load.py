@@ -78,11 +78,9 @@ def catalogs_of(document: Document, path: Path, builtin: bool = True) -> Collect
     return collection
 
 
-def load_document(
-    document: Document, path: Path, collection: Collection, builtin: bool = True
-) -> Case:
+def load_document(document: Document, path: Path, collection: Collection) -> Case:
     """A spec that was read already, with catalogs drawn together once for many specs."""
-    return _complete(document, path, collection.copy(), builtin)
+    return _complete(document, path, collection.copy())
 
 
 def load_builtin() -> Catalog:
@@ -101,15 +99,11 @@ def _stop_at(problems: list[Flaw]) -> None:
 def _loaded(document: Document, path: Path, builtin: bool, found: FilesRead | None = None) -> Case:
     if document.data is None:
         raise BadInput(document.problems)
-    return _complete(document, path, catalogs_of(document, path, builtin), builtin, found)
+    return _complete(document, path, catalogs_of(document, path, builtin), found)
 
 
 def _complete(
-    document: Document,
-    path: Path,
-    collection: Collection,
-    builtin: bool,
-    found: FilesRead | None = None,
+    document: Document, path: Path, collection: Collection, found: FilesRead | None = None
 ) -> Case:
     """The case, or every problem of the file; found: what was read since the spec was asked for."""
     filled = fill_empirical(document, path.parent, path.parent, collection)
@@ -122,7 +116,7 @@ def _complete(
     _stop_at(problems + named)
     case = Case(
         spec, collection.catalog(), path, document.positions, document.sha256,
-        collection.sha256(), document.text, collection.origins, builtin,
+        collection.sha256(), document.text, collection.origins,
         () if found is None else _beside(path, found), trajectory,
     )  # fmt: skip
     _stop_at(misfits(document, case) + currency_problems(document, case))

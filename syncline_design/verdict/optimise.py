@@ -26,7 +26,7 @@ from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
 from syncline_design.machine.records import json_of
 from syncline_design.spec.case import Case, StageCase
-from syncline_design.spec.edit import PinnedRole, pinned_spec_text
+from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import MOST_SIMULATED, Simulations
 from syncline_design.verdict.choice_data import (
@@ -298,15 +298,25 @@ def problem_size(problem: Problem) -> str:
 
 def pinned_text(case: Case, problem: Problem, design: Design) -> str:
     """The spec with a design pinned, for `--write-design`."""
+    return pinned_spec_text(case, *_pins(case, problem, design))
+
+
+def pinned_case(case: Case, problem: Problem, design: Design) -> Case:
+    """The case with a design pinned."""
+    return pinned(case, *_pins(case, problem, design))
+
+
+def _pins(case: Case, problem: Problem, design: Design) -> tuple[list[PinnedRole], dict[int, str]]:
+    """Roles and, by stage, clocks of a design."""
     selected = selection_of(problem, design)
-    index = {stage.name: i for i, stage in enumerate(case.spec.stages)}
-    roles = [_pinned(case.stages[index[one.stage]], one) for one in selected.roles]
+    index = {stage.choice.name: stage for stage in case.stages}
+    roles = [_pinned(index[one.stage], one) for one in selected.roles]
     clocks = {
-        i: identity
-        for i, stage in enumerate(case.spec.stages)
-        if stage.clock is not None and (identity := selected.clock(stage.vehicle_name)) is not None
+        stage.index: identity
+        for stage in case.stages
+        if stage.clocks and (identity := selected.clock(stage.choice.vehicle_name)) is not None
     }
-    return pinned_spec_text(case, roles, clocks)
+    return roles, clocks
 
 
 def _pinned(stage: StageCase, one: RoleSelection) -> PinnedRole:
