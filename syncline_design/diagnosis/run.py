@@ -18,7 +18,6 @@ from syncline_design.diagnosis.fitting import WINDOW, Data, data_of, windows
 from syncline_design.diagnosis.gap import block_folds, gap, regime_fold
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
-from syncline_design.diagnosis.linear_algebra import one_thread
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import covariates, first_disagreement_s, strongest, where_map
 from syncline_design.diagnosis.remainder import remainder
@@ -48,6 +47,7 @@ from syncline_design.diagnosis.search import (
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load
 
