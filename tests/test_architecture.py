@@ -1,0 +1,101 @@
+"""The pages about the code are true of the code: rooms, stations of the walks, words."""
+
+from __future__ import annotations
+
+import ast
+import importlib.util
+import re
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGE = ROOT / "syncline_design"
+HOUSE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+STATIONS = sorted(set(re.findall(r"`(\w+/\w+\.py): (\w+)`", HOUSE)))
+
+
+def _drawer() -> ModuleType:
+    found = importlib.util.spec_from_file_location("make_house", ROOT / "docs" / "make_house.py")
+    assert found is not None
+    assert found.loader is not None
+    module = importlib.util.module_from_spec(found)
+    found.loader.exec_module(module)
+    return module
+
+
+@cache
+def _names(path: Path) -> frozenset[str]:
+    """What a file defines at its top."""
+    names = set()
+    for node in ast.parse(path.read_text("utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            names.add(node.name)
+        elif isinstance(node, ast.Assign):
+            names.update(target.id for target in node.targets if isinstance(target, ast.Name))
+        elif isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name):
+            names.add(node.target.id)
+    return frozenset(names)
+
+
+@pytest.mark.parametrize(("file", "name"), STATIONS, ids=lambda part: str(part))
+def test_every_station_exists(file: str, name: str) -> None:
+    assert name in _names(PACKAGE / file)
+
+
+def test_every_file_that_is_named_exists() -> None:
+    files = set(re.findall(r"`(\w+/\w+\.py)`", HOUSE))
+    assert len(STATIONS) > 30
+    assert [file for file in files if not (PACKAGE / file).is_file()] == []
+
+
+def test_the_four_walks_are_there() -> None:
+    walks = HOUSE.partition("## Four walks")[2].split("\n**")[1:]
+    assert len(walks) == 4
+    for walk in walks:
+        assert len(re.findall(r"^\d\. `", walk, re.M)) >= 5, walk
+
+
+def test_table_and_drawing_show_every_room_on_its_floor() -> None:
+    floors = _drawer().floors()
+    rooms = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()}
+    assert {room for floor in floors for room in floor} == rooms
+    table = re.findall(r"^\| (\d) \| (.*?) \|", HOUSE, re.M)
+    assert [int(level) for level, _ in table] == list(range(1, len(floors) + 1))
+    for floor, (_, cell) in zip(floors, table, strict=True):
+        assert set(re.findall(r"`(\w+)`", cell)) - {"api"} == set(floor)
+    picture = (ROOT / "docs" / "images" / "house.svg").read_text("utf-8")
+    assert set(re.findall(r'font-weight="bold">(\w+)<', picture)) == rooms
+
+
+def test_no_import_climbs() -> None:
+    """Those inside functions and for type checkers too, which a contract might be told to skip."""
+    drawer = _drawer()
+    level = {room: number for number, floor in enumerate(drawer.floors()) for room in floor}
+    arrows = {(a, b) for a, b in drawer.arrows() if b in level}
+    assert arrows
+    assert [(a, b) for a, b in arrows if level[a] < level[b]] == []
+
+
+def test_the_words_of_the_glossary_are_names_in_the_code() -> None:
+    page = (ROOT / "docs" / "glossary.md").read_text("utf-8")
+    defined = frozenset().union(*(_names(path) for path in PACKAGE.rglob("*.py")))
+    named = set(re.findall(r"`([A-Z][a-z]\w+)`", page))
+    assert len(named) > 25
+    assert named - defined == set()
+
+
+def test_a_name_of_the_glossary_has_one_home() -> None:
+    """Two classes of one name are two meanings of one word."""
+    homes: dict[str, list[str]] = {}
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.parse(path.read_text("utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(path.relative_to(PACKAGE).as_posix())
+    page = (ROOT / "docs" / "glossary.md").read_text("utf-8")
+    named = set(re.findall(r"`([A-Z][a-z]\w+)`", page))
+    allowed = {"Record"}  # of specs (pydantic) and of results: both are written down as data
+    twice = {name: homes[name] for name in named - allowed if len(homes.get(name, [])) > 1}
+    assert twice == {}
