@@ -6,7 +6,6 @@ import sys
 import time
 from typing import TextIO
 
-from syncline_design.report.study_words import progress_text
 from syncline_design.studies.result import Progress
 
 ON_TERMINAL_S, IN_LOG_S = 0.2, 10.0
@@ -59,3 +58,25 @@ class StepLine:
             self._stream.write("\r\x1b[2K")
             self._stream.flush()
             self._shown = False
+
+
+def progress_text(progress: Progress) -> str:
+    """`180 of 500 cases, 40 already there, 00:12 left`."""
+    parts = [f"{progress.done} of {progress.total} cases"]
+    if progress.reused:
+        parts.append(f"{progress.reused} already there")
+    if progress.retried:
+        parts.append(f"{progress.retried} done again")
+    left = progress.remaining_s
+    if progress.done < progress.total:
+        parts.append("estimating" if left is None else f"{_clock(left)} left")
+    else:
+        parts.append(f"took {_clock(progress.elapsed_s)}")
+    return ", ".join(parts)
+
+
+def _clock(seconds: float) -> str:
+    whole = round(seconds)
+    hours, rest = divmod(whole, 3600)
+    minutes, left = divmod(rest, 60)
+    return f"{hours}:{minutes:02d}:{left:02d}" if hours else f"{minutes:02d}:{left:02d}"

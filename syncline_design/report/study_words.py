@@ -7,7 +7,7 @@ from syncline_design.report.document import Outcome
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list
 from syncline_design.report.words import OUTCOMES, VERBS
-from syncline_design.studies.result import Progress, StudyResult
+from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (
     HeatMap,
     Summary,
@@ -160,25 +160,3 @@ def _with_words(fixed: list[str]) -> str:
     if len(fixed) <= 3:
         return " | ".join(fixed)
     return f"{len(fixed)} combinations, {fixed[0]} to {fixed[-1]}"
-
-
-def progress_text(progress: Progress) -> str:
-    """`180 of 500 cases, 40 already there, 00:12 left`."""
-    parts = [f"{progress.done} of {progress.total} cases"]
-    if progress.reused:
-        parts.append(f"{progress.reused} already there")
-    if progress.retried:
-        parts.append(f"{progress.retried} done again")
-    left = progress.remaining_s
-    if progress.done < progress.total:
-        parts.append("estimating" if left is None else f"{_clock(left)} left")
-    else:
-        parts.append(f"took {_clock(progress.elapsed_s)}")
-    return ", ".join(parts)
-
-
-def _clock(seconds: float) -> str:
-    whole = round(seconds)
-    hours, rest = divmod(whole, 3600)
-    minutes, left = divmod(rest, 60)
-    return f"{hours}:{minutes:02d}:{left:02d}" if hours else f"{minutes:02d}:{left:02d}"
