@@ -21,10 +21,11 @@ from syncline_design.diagnosis.noise import (
     precision,
     spec_bounds,
 )
-from syncline_design.diagnosis.scene import Acting, acting
+from syncline_design.diagnosis.scene import acting
 from syncline_design.diagnosis.scores import Gram, clean_threshold, log_p_of
 from syncline_design.diagnosis.tails import tails_of
 from syncline_design.diagnosis.trajectory import pieces
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import gauss_markov
 from syncline_design.effects.record import Target
 from syncline_design.model.quantity import format_estimate

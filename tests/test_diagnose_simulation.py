@@ -15,9 +15,10 @@ import numpy as np
 import pytest
 
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
-from syncline_design.diagnosis.scene import Acting, scene
+from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
+from syncline_design.effects.acting import Acting
 from syncline_design.spec.edit import with_effects_text, write_spec
 from syncline_design.spec.load import load
 from tests.world import SILENT, Hidden, WorldLog, hidden, make_log, scenario

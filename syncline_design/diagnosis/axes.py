@@ -12,7 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from syncline_design.diagnosis.noise import Structure
-from syncline_design.diagnosis.scene import Acting, scene
+from syncline_design.diagnosis.scene import scene
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import Log
 from syncline_design.model.system import System

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from syncline_design.diagnosis.noise import Directed
-from syncline_design.diagnosis.scene import Acting, Scene
+from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect, Target
 
 STEP_TIMES = 24  # places along the log where a step is looked for at first

@@ -24,7 +24,8 @@ from syncline_design.diagnosis.noise import (
     precision,
     spec_bounds,
 )
-from syncline_design.diagnosis.scene import Acting, Scene
+from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 
 NOISE_ROWS = 800  # rows on which the noise is fitted; stretches spread over the whole log

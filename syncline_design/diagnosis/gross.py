@@ -11,8 +11,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from syncline_design.diagnosis.scene import Acting, Scene, scene
+from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.effects import registry
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect
 from syncline_design.logs.log import GAP_FACTOR, Log, Track
 from syncline_design.logs.merging import hermite

@@ -35,7 +35,7 @@ from syncline_design.diagnosis.result import (
     SpecRead,
     WholeGap,
 )
-from syncline_design.diagnosis.scene import Acting, scene
+from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.search import (
     DiagnosisSettings,
     Progress,
@@ -45,6 +45,7 @@ from syncline_design.diagnosis.search import (
     start_search,
 )
 from syncline_design.diagnosis.system import Measured, measured
+from syncline_design.effects.acting import Acting
 from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread

@@ -16,28 +16,15 @@ import numpy as np
 
 from syncline_design.diagnosis.trajectory import LoggedMotion, pieces
 from syncline_design.effects import registry
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
-from syncline_design.effects.record import Array, Departures, Effect, StageRows, Target
+from syncline_design.effects.record import Array, Departures, StageRows, Target
 from syncline_design.logs.log import Log, Rows, StageLog, Track
 from syncline_design.model import timing
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.chain import rotation_exp
 
 NO_LEVER = (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, slots=True)
-class Acting:
-    """One effect at work: where it acts and its parameters in SI."""
-
-    effect: Effect
-    sensor: Target
-    stage: int
-    values: Mapping[str, float]
-
-    @property
-    def label(self) -> tuple[str, str, int]:
-        return self.effect.name, self.sensor, self.stage
 
 
 @dataclass(frozen=True, slots=True)

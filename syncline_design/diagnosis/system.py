@@ -8,8 +8,7 @@ from pathlib import Path
 
 from syncline_design.choice.problem import build_problem, sole_design, system_of
 from syncline_design.diagnosis.gross import Reread, mended
-from syncline_design.diagnosis.scene import Acting
-from syncline_design.effects import registry
+from syncline_design.effects.acting import Acting, acting_of
 from syncline_design.logs.log import Log
 from syncline_design.logs.reading import read_log
 from syncline_design.model.system import System
@@ -45,7 +44,7 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
     reread = read if len(files) > 1 else None
     system = replace(system, stages=system.stages[: len(log.stages)])
     _demand_fit(case, system, log)
-    known = known_effects(system)
+    known = acting_of(system)
     for one in known:
         if one.effect.kind == "discrete":
             log = mended(log, one, reread)
@@ -81,21 +80,6 @@ def pinned_system(case: Case) -> System:
         )
     problem, design = found
     return system_of(case, problem, design)
-
-
-def known_effects(system: System) -> tuple[Acting, ...]:
-    """The spec's own effects as they act on its stages."""
-    places = {stage.name: k for k, stage in enumerate(system.stages)}
-    return tuple(
-        Acting(
-            registry()[entry.effect],
-            entry.sensor,  # type: ignore[arg-type]  # checked when the spec was read
-            places[entry.stage],
-            dict(entry.parameters),  # type: ignore[arg-type]  # a convention's value is its name
-        )
-        for entry in system.effects
-        if entry.stage in places
-    )
 
 
 def _demand_fit(case: Case, system: System, log: Log) -> None:

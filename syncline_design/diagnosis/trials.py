@@ -15,8 +15,8 @@ import numpy as np
 from syncline_design.diagnosis.candidates import EDGE, STEP_TIMES, Candidate, Signature, zero_values
 from syncline_design.diagnosis.fitting import Data, Model, Opened, adjusted, fit
 from syncline_design.diagnosis.noise import NoiseLevel, precision
-from syncline_design.diagnosis.scene import Acting
 from syncline_design.diagnosis.scores import log_p_of
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 
 AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it

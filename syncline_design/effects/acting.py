@@ -16,6 +16,7 @@ from syncline_design.effects.record import (
     Departures,
     Effect,
     StageRows,
+    Target,
     Values,
 )
 from syncline_design.model.known import Known
@@ -27,31 +28,52 @@ from syncline_design.model.system import SimulationError, System
 
 @dataclass(frozen=True, slots=True)
 class Acting:
-    """One effect where it acts: the record, its sensor, its parameters in SI."""
+    """One effect where it acts: the record, its sensor, the place of its stage, values in SI."""
 
     effect: Effect
-    sensor: str
+    sensor: Target
+    stage: int
     values: Values
+
+    @property
+    def label(self) -> tuple[str, str, int]:
+        """What tells it from others: two of one label are one."""
+        return self.effect.name, self.sensor, self.stage
 
 
 ByStage = Mapping[str, tuple[Acting, ...]]
 
 
+def acting_of(system: System) -> tuple[Acting, ...]:
+    """The known effects of a system's stages, in their order."""
+    if not system.effects:
+        return ()
+    known = registry()
+    places = {stage.name: k for k, stage in enumerate(system.stages)}
+    return tuple(
+        Acting(
+            known[entry.effect],
+            entry.sensor,  # type: ignore[arg-type]  # by the rules of `demand_acting`
+            places[entry.stage],
+            dict(entry.parameters),  # type: ignore[arg-type]  # a convention's value is its name
+        )
+        for entry in system.effects
+        if entry.stage in places
+    )
+
+
 def by_stage(system: System) -> ByStage:
     """Effects of each stage by its name; stages without any are left out."""
-    if not system.effects:
-        return {}
-    known = registry()
     found: dict[str, tuple[Acting, ...]] = {}
-    for entry in system.effects:
-        acting = Acting(known[entry.effect], entry.sensor, dict(entry.parameters))  # type: ignore[arg-type]
-        found[entry.stage] = (*found.get(entry.stage, ()), acting)
+    for one in acting_of(system):
+        name = system.stages[one.stage].name
+        found[name] = (*found.get(name, ()), one)
     return found
 
 
 def tilts(system: System) -> bool:
     """Whether some effect of the system acts by roll and pitch."""
-    return any(one.effect.tilted for acting in by_stage(system).values() for one in acting)
+    return any(one.effect.tilted for one in acting_of(system))
 
 
 def demand_acting(system: System) -> None:
@@ -96,7 +118,7 @@ def departures(
         total = total + one.effect.depart(
             rows,
             one.values,
-            one.sensor,  # type: ignore[arg-type]
+            one.sensor,
             generator,
         )
     return total
@@ -113,7 +135,7 @@ def stage_contributions(system: System, index: int) -> tuple[tuple[Acting, Contr
     """What each effect of a stage adds."""
     stage, basis = system.stages[index], basis_of(system, index)
     return tuple(
-        (one, one.effect.contribute(stage, one.values, one.sensor, basis))  # type: ignore[arg-type]
+        (one, one.effect.contribute(stage, one.values, one.sensor, basis))
         for one in by_stage(system).get(stage.name, ())
     )
 
@@ -126,7 +148,7 @@ def known_of(system: System) -> Known:
         basis = basis_of(system, index)
         for one, added in stage_contributions(system, index):
             if added.tau_s and one.sensor != "target":
-                key: tuple[str, RoleName] = (stage.name, one.sensor)  # type: ignore[assignment]
+                key: tuple[str, RoleName] = (stage.name, one.sensor)
                 extra[key] = extra.get(key, 0.0) + added.tau_s
             if total := added.total_m(basis):
                 systematic.append((f"{one.effect.name} ({one.sensor})", stage.name, total))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from syncline_design.effects.acting import by_stage, tilts
+from syncline_design.effects.acting import acting_of, tilts
 from syncline_design.model.quantity import format_duration
 from syncline_design.model.system import System
 from syncline_design.simulation.draws import entering
@@ -15,7 +15,7 @@ def ensemble_of(
     system: System, envelope: str, of_a_file: bool = False, outside: tuple[str, ...] = ()
 ) -> Ensemble:
     """What is drawn in this envelope; of_a_file: its trajectory is a file's."""
-    acting = [one for effects in by_stage(system).values() for one in effects]
+    acting = acting_of(system)
     drawn = ["noise", "timestamp errors"]
     drawn.append(
         "the moment of the trajectory" if envelope == "trajectory" else "directions of motion"
