@@ -42,15 +42,15 @@ __all__ = [
     "study",
 ]
 
-Spec = str | Path | Case  # a spec file, or one that was loaded before
+SpecOrPath = str | Path | Case  # a spec file, or one that was loaded before
 
 
-def _case(spec: Spec) -> Case:
+def _case(spec: SpecOrPath) -> Case:
     return spec if isinstance(spec, Case) else load(spec)
 
 
 def check(
-    spec: Spec, *, seed: int = 0, method: Road = "auto", time_limit_s: float | None = None,
+    spec: SpecOrPath, *, seed: int = 0, method: Road = "auto", time_limit_s: float | None = None,
     monte_carlo: bool = True, today: date | None = None,
 ) -> Verdict:  # fmt: skip
     """The verdict on a spec.
@@ -66,7 +66,7 @@ def check(
 
 
 def optimize(
-    spec: Spec, *, best: int = 1, every: bool = False, pareto: bool = False,
+    spec: SpecOrPath, *, best: int = 1, every: bool = False, pareto: bool = False,
     resource: ResourceName = "cost", seed: int = 0, method: Road = "auto",
     time_limit_s: float | None = None,
 ) -> Optimisation:  # fmt: skip
@@ -83,7 +83,7 @@ def optimize(
 
 
 def simulate(
-    spec: Spec, *, seed: int = 0, samples: int | None = None, workers: int | None = None,
+    spec: SpecOrPath, *, seed: int = 0, samples: int | None = None, workers: int | None = None,
     time_limit_s: float | None = None,
 ) -> Simulation:  # fmt: skip
     """The nonlinear chain of a spec (its best design where something is open) simulated."""
@@ -94,8 +94,8 @@ def simulate(
 
 
 def diagnose(
-    spec: Spec, logs: Sequence[str | Path] = (), *, seed: int = 0, false_alarm_rate: float = 0.05,
-    max_effects: int = 4, time_limit_s: float | None = None,
+    spec: SpecOrPath, logs: Sequence[str | Path] = (), *, seed: int = 0,
+    false_alarm_rate: float = 0.05, max_effects: int = 4, time_limit_s: float | None = None,
 ) -> DiagnosisAndDesign:  # fmt: skip
     """Where measured logs disagree with a spec, what is missing in it, what that means for it.
 

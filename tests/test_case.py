@@ -22,7 +22,7 @@ from syncline_design.spec import load as load_module
 from syncline_design.spec.catalog import SECTIONS, Catalog
 from syncline_design.spec.load import load
 from syncline_design.spec.spec import EffectChoice
-from syncline_design.spec.yaml_text import Document
+from syncline_design.spec.yaml_text import ParsedFile
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 ROOT = Path(__file__).parents[1]
@@ -70,7 +70,7 @@ def test_what_a_diagnosis_means_is_found_without_reading_anything_again(
     """The measured system and the spec with the findings are cases made from the first one."""
     parsed: Counter[str] = Counter()
 
-    def counted(text: str, file: str = "<text>") -> Document:
+    def counted(text: str, file: str = "<text>") -> ParsedFile:
         parsed[file] += 1
         return plain(text, file)
 

@@ -15,15 +15,15 @@ from typing import Any
 from syncline_design.comparison.difference import Cause, Difference, changes, difference
 from syncline_design.comparison.verdict_file import read_verdict, text_of
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.records import Json
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
 from syncline_design.spec.load import BadInput, catalogs_of, load_document, without_simulated
-from syncline_design.spec.yaml_text import Document, KeyPath, parse
+from syncline_design.spec.yaml_text import KeyPath, ParsedFile, parse
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
-Json = dict[str, Any]
 MOST_TRIED = 8  # changes that are also tried one by one
 _ABSENT = object()
 _NAMED = {"stages": "name", "requirements": "id"}
@@ -37,7 +37,7 @@ class Side:
     file: str
     verdict: Verdict
     case: Case | None = None
-    document: Document | None = None
+    document: ParsedFile | None = None
 
 
 Found = Iterator[tuple[Cause, KeyPath | None]]  # with its place in the old spec, where it has one

@@ -11,9 +11,9 @@ from syncline_design.machine.records import Record, optional
 from syncline_design.spec.effects_listed import EffectChoice
 
 SCHEMA: Final = "syncline-design/diagnosis/v1"
-Outcome = Literal["agrees", "explained", "unexplained"]
+LogOutcome = Literal["agrees", "explained", "unexplained"]
 Severity = Literal["contradiction", "caution"]
-EXIT_CODES: Final[Mapping[Outcome, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
+EXIT_CODES: Final[Mapping[LogOutcome, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
 LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
 
 
@@ -336,7 +336,7 @@ class Diagnosis(Record):
     """
 
     schema: str = SCHEMA
-    verdict: Outcome
+    verdict: LogOutcome
     sound: bool
     checks: tuple[Check, ...]
     findings: tuple[Finding, ...]

@@ -25,10 +25,10 @@ from syncline_design.diagnosis.result import (
     Diagnosis,
     Gap,
     Likelihoods,
+    LogOutcome,
     LogRead,
     Motion,
     Noise,
-    Outcome,
     Provenance,
     Remaining,
     SlowNoise,
@@ -113,7 +113,7 @@ def diagnose_measured(
     left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
     checks = log_checks(view)
     sound = all(c.severity != "contradiction" for c in checks)
-    verdict: Outcome = "unexplained"
+    verdict: LogOutcome = "unexplained"
     if sound and not left:
         verdict = "explained" if result.model.labels or faults else "agrees"
     progress("measuring the gap", 0.8)

@@ -14,9 +14,9 @@ from syncline_design.spec.catalog import SECTIONS, Catalog, CatalogFile
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import (
-    Document,
     Flaw,
     KeyPath,
+    ParsedFile,
     StopReadingError,
     printable,
     read,
@@ -36,7 +36,7 @@ class Collection:
     origins: dict[tuple[str, str], str] = field(
         default_factory=dict
     )  # (section, id) -> file:line:col
-    documents: dict[tuple[str, str], tuple[Document, KeyPath]] = field(default_factory=dict)
+    documents: dict[tuple[str, str], tuple[ParsedFile, KeyPath]] = field(default_factory=dict)
     problems: list[Flaw] = field(default_factory=list)
     digests: list[str] = field(default_factory=list)
 
@@ -60,7 +60,7 @@ class Collection:
 
 
 def problem_at(
-    document: Document, path: KeyPath, message: str, expected: str = "", found: str = "",
+    document: ParsedFile, path: KeyPath, message: str, expected: str = "", found: str = "",
     hint: str = "",
 ) -> Flaw:  # fmt: skip
     """A problem at the place of a key path."""
@@ -80,13 +80,13 @@ def add_builtin(collection: Collection) -> None:
             _add_document(collection, read(path, shown), path.parent, path.parent, shown)
 
 
-def add_own(collection: Collection, spec: Document, folder: Path) -> None:
+def add_own(collection: Collection, spec: ParsedFile, folder: Path) -> None:
     """Draw in the catalogs that a spec names, and those that these name."""
     _add_listed(collection, spec, folder, folder.resolve(), (spec.file,))
 
 
 def _add_listed(
-    collection: Collection, lister: Document, folder: Path, root: Path, chain: tuple[str, ...]
+    collection: Collection, lister: ParsedFile, folder: Path, root: Path, chain: tuple[str, ...]
 ) -> None:
     listed = lister.data.get("catalogs", ()) if isinstance(lister.data, dict) else ()
     for index, name in enumerate(listed if isinstance(listed, tuple) else ()):
@@ -115,7 +115,7 @@ def _add_listed(
 
 
 def inside_folder(
-    document: Document, path: KeyPath, name: str, folder: Path, root: Path
+    document: ParsedFile, path: KeyPath, name: str, folder: Path, root: Path
 ) -> Path | Flaw:
     """The file that a relative name means, if it is inside `root` after following symlinks."""
     wanted = "a file inside the spec's folder"
@@ -142,7 +142,7 @@ def inside_folder(
 
 
 def _add_document(
-    collection: Collection, document: Document, folder: Path, root: Path, name: str
+    collection: Collection, document: ParsedFile, folder: Path, root: Path, name: str
 ) -> None:
     collection.digests.append(f"{document.sha256} {name}")
     collection.problems.extend(document.problems)
@@ -163,7 +163,7 @@ def _add_document(
 
 
 def _add_entry(
-    collection: Collection, document: Document, section: str, identity: str, model: Catalog | None
+    collection: Collection, document: ParsedFile, section: str, identity: str, model: Catalog | None
 ) -> None:
     """Note one entry; a broken one keeps its id so that references to it are not unknown."""
     line, column = document.key_positions.get((section, identity), (1, 1))
@@ -181,7 +181,7 @@ def _add_entry(
         collection.entries[section][identity] = getattr(model, section)[identity]
 
 
-def fill_empirical(document: Document, folder: Path, root: Path, collection: Collection) -> Any:
+def fill_empirical(document: ParsedFile, folder: Path, root: Path, collection: Collection) -> Any:
     """The document's data with the values of empirical error files put in.
 
     Their names are relative to `folder`, where the document lies, and stay inside `root`.
@@ -201,7 +201,7 @@ def fill_empirical(document: Document, folder: Path, root: Path, collection: Col
 
 
 def _empirical_values(
-    document: Document, data: dict[str, Any], path: KeyPath, folders: tuple[Path, Path],
+    document: ParsedFile, data: dict[str, Any], path: KeyPath, folders: tuple[Path, Path],
     collection: Collection,
 ) -> tuple[Quantity, ...] | None:  # fmt: skip
     at = (*path, "file")

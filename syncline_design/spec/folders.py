@@ -11,7 +11,7 @@ from typing import Final
 
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.load import BadInput
-from syncline_design.spec.yaml_text import Document, Flaw, read
+from syncline_design.spec.yaml_text import Flaw, ParsedFile, read
 
 SUFFIXES: Final = (".yaml", ".yml")
 NOT_ENTERED: Final = "a folder with specs that are not checked; name it too"
@@ -130,7 +130,7 @@ def _is_empty(path: Path) -> bool:
         return False
 
 
-def _top_keys(document: Document) -> Iterator[str]:
+def _top_keys(document: ParsedFile) -> Iterator[str]:
     """The keys at the top; of a text that is not YAML as specs have it, what looks like keys."""
     if isinstance(document.data, Mapping):
         yield from (str(key) for key in document.data)

@@ -9,10 +9,10 @@ from syncline_design.model.known import EffectEntry
 from syncline_design.model.quantity import format_estimate
 from syncline_design.spec.files import problem_at
 from syncline_design.spec.spec import EffectChoice, Spec
-from syncline_design.spec.yaml_text import Document, Flaw, KeyPath
+from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
 
 
-def effect_problems(document: Document, spec: Spec) -> Iterator[Flaw]:
+def effect_problems(document: ParsedFile, spec: Spec) -> Iterator[Flaw]:
     """Effects that do not exist, or do not fit where they are said to act."""
     if not spec.effects:
         return
@@ -34,7 +34,7 @@ def effect_problems(document: Document, spec: Spec) -> Iterator[Flaw]:
 
 
 def _transponder_problem(
-    document: Document, at: KeyPath, spec: Spec, effect: EffectChoice, acting: str
+    document: ParsedFile, at: KeyPath, spec: Spec, effect: EffectChoice, acting: str
 ) -> Iterator[Flaw]:
     """A later stage has no position sensor whose stamps or noise an effect could change."""
     names = [stage.name for stage in spec.stages]
@@ -51,7 +51,7 @@ def _transponder_problem(
 
 
 def _problem(
-    document: Document, path: KeyPath, message: str, found: str, known: tuple[str, ...]
+    document: ParsedFile, path: KeyPath, message: str, found: str, known: tuple[str, ...]
 ) -> Flaw:
     close = get_close_matches(found, known, 1)
     hint = f"did you mean {close[0]}?" if close else ""

@@ -29,7 +29,7 @@ from syncline_design.spec.known_effects import effect_problems
 from syncline_design.spec.references import currency_problems, misfits, missing_figures, unknown_ids
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate
-from syncline_design.spec.yaml_text import Document, Flaw, KeyPath, TextPosition, parse, read
+from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile, TextPosition, parse, read
 
 MAX_SHOWN = 50
 MOST_TRAJECTORY_BYTES = 2**28
@@ -69,7 +69,7 @@ def load_text(text: str, path: str | Path, builtin: bool = True) -> Case:
     return _loaded(parse(text, str(path)), Path(path), builtin)
 
 
-def catalogs_of(document: Document, path: Path, builtin: bool = True) -> Collection:
+def catalogs_of(document: ParsedFile, path: Path, builtin: bool = True) -> Collection:
     """The catalogs that a spec draws in: the shipped ones and its own."""
     collection = Collection()
     if builtin:
@@ -78,7 +78,7 @@ def catalogs_of(document: Document, path: Path, builtin: bool = True) -> Collect
     return collection
 
 
-def load_document(document: Document, path: Path, collection: Collection) -> Case:
+def load_document(document: ParsedFile, path: Path, collection: Collection) -> Case:
     """A spec that was read already, with catalogs drawn together once for many specs."""
     return _complete(document, path, collection.copy())
 
@@ -96,14 +96,16 @@ def _stop_at(problems: list[Flaw]) -> None:
         raise BadInput(tuple(problems))
 
 
-def _loaded(document: Document, path: Path, builtin: bool, found: FilesRead | None = None) -> Case:
+def _loaded(
+    document: ParsedFile, path: Path, builtin: bool, found: FilesRead | None = None
+) -> Case:
     if document.data is None:
         raise BadInput(document.problems)
     return _complete(document, path, catalogs_of(document, path, builtin), found)
 
 
 def _complete(
-    document: Document, path: Path, collection: Collection, found: FilesRead | None = None
+    document: ParsedFile, path: Path, collection: Collection, found: FilesRead | None = None
 ) -> Case:
     """The case, or every problem of the file; found: what was read since the spec was asked for."""
     filled = fill_empirical(document, path.parent, path.parent, collection)
@@ -126,7 +128,7 @@ def _complete(
 
 
 def _named_files(
-    document: Document, spec: Spec, folder: Path
+    document: ParsedFile, spec: Spec, folder: Path
 ) -> tuple[list[Flaw], FileContent | None]:
     """Files that the spec names for later: they have to be there, inside its folder.
 
@@ -144,7 +146,9 @@ def _named_files(
     return problems, recorded
 
 
-def _recorded_trajectory(document: Document, spec: Spec, folder: Path) -> FileContent | Flaw | None:
+def _recorded_trajectory(
+    document: ParsedFile, spec: Spec, folder: Path
+) -> FileContent | Flaw | None:
     choice = spec.monte_carlo.trajectory
     if choice is None or choice.file is None:
         return None

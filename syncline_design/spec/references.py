@@ -12,7 +12,7 @@ from syncline_design.spec.case import Case, RoleCase, usable_primitives
 from syncline_design.spec.fields import MAX_SUGGESTIONS, did_you_mean
 from syncline_design.spec.files import Collection, problem_at
 from syncline_design.spec.spec import Query, Spec
-from syncline_design.spec.yaml_text import Document, Flaw, KeyPath
+from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
 
 _WORDS = {
     "platforms": "platform",
@@ -23,7 +23,7 @@ _WORDS = {
 }
 
 
-def unknown_ids(spec: Document, collection: Collection) -> list[Flaw]:
+def unknown_ids(spec: ParsedFile, collection: Collection) -> list[Flaw]:
     """Ids that no catalog has; looked for in the raw data, so that other errors don't hide them."""
     unknown = (
         (path, section, identity)
@@ -41,7 +41,7 @@ def unknown_ids(spec: Document, collection: Collection) -> list[Flaw]:
 
 
 def _unknown(
-    document: Document, path: KeyPath, section: str, identity: str, collection: Collection
+    document: ParsedFile, path: KeyPath, section: str, identity: str, collection: Collection
 ) -> Flaw:
     known = [name for part, name in collection.origins if part == section]
     elsewhere = [part for part, name in collection.origins if name == identity]
@@ -95,7 +95,7 @@ def _choice_ids(section: str, choice: Any, path: KeyPath) -> Iterator[tuple[str,
             yield section, (*path, "candidates", index), identity
 
 
-def misfits(document: Document, case: Case) -> list[Flaw]:
+def misfits(document: ParsedFile, case: Case) -> list[Flaw]:
     """Where valid ids do not fit together."""
     problems: list[Flaw] = []
     for stage in case.stages:
@@ -106,7 +106,7 @@ def misfits(document: Document, case: Case) -> list[Flaw]:
     return problems
 
 
-def _role_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Flaw]:
+def _role_misfits(document: ParsedFile, at: KeyPath, role: RoleCase) -> Iterator[Flaw]:
     name, pinned = role.role, role.choice.primitive
     if not role.sensors:
         message = "no sensor of the catalogs matches this query"
@@ -126,7 +126,7 @@ def _role_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[F
         yield from _method_misfits(document, at, role)
 
 
-def _method_misfits(document: Document, at: KeyPath, role: RoleCase) -> Iterator[Flaw]:
+def _method_misfits(document: ParsedFile, at: KeyPath, role: RoleCase) -> Iterator[Flaw]:
     if not role.methods:
         wanted = (
             "a method id, {candidates: [...]}, or {error: {...}} here, in the stage or the spec"
@@ -151,7 +151,7 @@ def _named(role: RoleCase) -> str:
     return role.sensors[0].id if len(role.sensors) == 1 else "any of the candidates"
 
 
-def _vehicle_misfits(document: Document, spec: Spec) -> Iterator[Flaw]:
+def _vehicle_misfits(document: ParsedFile, spec: Spec) -> Iterator[Flaw]:
     """Stages on one vehicle share its host clock: at most one of them says which."""
     first: dict[str, int] = {}
     for index, stage in enumerate(spec.stages):
@@ -164,7 +164,7 @@ def _vehicle_misfits(document: Document, spec: Spec) -> Iterator[Flaw]:
             yield problem_at(document, path, message, "one clock per vehicle")
 
 
-def _effect_misfits(document: Document, spec: Spec) -> Iterator[Flaw]:
+def _effect_misfits(document: ParsedFile, spec: Spec) -> Iterator[Flaw]:
     names = [stage.name for stage in spec.stages]
     for index, effect in enumerate(spec.effects):
         at: KeyPath = ("effects", index)
@@ -221,7 +221,7 @@ def _hardware(case: Case, at: KeyPath, requires: Iterable[str]) -> Iterator[Part
         yield at, f"shared hardware {identity}", case.hardware[identity].entry
 
 
-def currency_problems(document: Document, case: Case) -> list[Flaw]:
+def currency_problems(document: ParsedFile, case: Case) -> list[Flaw]:
     """Amounts in a currency that the spec gives no rate for."""
     spec, problems = case.spec, []
     for path, what, amount in _amounts(case):
@@ -280,7 +280,7 @@ def _has_options(role: RoleCase) -> bool:
     return sum(len(primitives) for primitives in pairs) > 1
 
 
-def missing_figures(document: Document, case: Case) -> list[Flaw]:
+def missing_figures(document: ParsedFile, case: Case) -> list[Flaw]:
     """Costs, masses and powers that a requirement or the objective needs and a catalog lacks."""
     spec = case.spec
     needed: dict[str, str] = {

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from syncline_design.spec.fields import Record, did_you_mean, kind_of
-from syncline_design.spec.yaml_text import Document, Flaw, KeyPath, printable, show_path
+from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile, printable, show_path
 
 M = TypeVar("M", bound=Record)
 
@@ -29,7 +29,7 @@ _WANTED = {
 }
 
 
-def validate(model: type[M], document: Document, data: Any = None) -> tuple[M | None, list[Flaw]]:
+def validate(model: type[M], document: ParsedFile, data: Any = None) -> tuple[M | None, list[Flaw]]:
     """The model of a document's data, or what is wrong with it.
 
     Places that the reader refused already are not reported a second time.
@@ -45,7 +45,7 @@ def validate(model: type[M], document: Document, data: Any = None) -> tuple[M | 
     return (None if nulls else value), list(nulls.values())
 
 
-def _nulls(document: Document, data: Any, path: KeyPath) -> Iterator[tuple[KeyPath, Flaw]]:
+def _nulls(document: ParsedFile, data: Any, path: KeyPath) -> Iterator[tuple[KeyPath, Flaw]]:
     """Keys and items with nothing in them: a slip more often than a wish for the default."""
     if isinstance(data, dict | tuple):
         for key, item in data.items() if isinstance(data, dict) else enumerate(data):
@@ -56,7 +56,9 @@ def _nulls(document: Document, data: Any, path: KeyPath) -> Iterator[tuple[KeyPa
         yield path, Flaw(document.file, *place, show_path(path), "nothing (null)", hint=hint)
 
 
-def _problems(error: ValidationError, document: Document, refused: set[KeyPath]) -> Iterator[Flaw]:
+def _problems(
+    error: ValidationError, document: ParsedFile, refused: set[KeyPath]
+) -> Iterator[Flaw]:
     for detail in error.errors(include_url=False):
         path = tuple(detail["loc"])
         if any(path[:length] in refused for length in range(1, len(path) + 1)):
@@ -70,7 +72,7 @@ def _had_a_refused_key(path: KeyPath, refused: set[KeyPath]) -> bool:
     return any(len(r) == len(path) + 1 and r[:-1] == path for r in refused)
 
 
-def _problem(detail: dict[str, Any], path: KeyPath, document: Document) -> Flaw:
+def _problem(detail: dict[str, Any], path: KeyPath, document: ParsedFile) -> Flaw:
     line, column = document.position(path)
     kind, context = detail["type"], detail.get("ctx", {})
     if kind in ("unknown_key", "extra_forbidden"):

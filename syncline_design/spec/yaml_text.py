@@ -72,7 +72,7 @@ class Flaw:
 
 
 @dataclass(frozen=True)
-class Document:
+class ParsedFile:
     """One file as plain data.
 
     positions: key path to (line, column) of the value; key_positions: of the key.  Both from 1.
@@ -115,7 +115,7 @@ class StopReadingError(Exception):
     """Reading cannot go on."""
 
 
-def read(path: str | Path, shown_as: str | None = None) -> Document:
+def read(path: str | Path, shown_as: str | None = None) -> ParsedFile:
     """Read one YAML file; problems are in the document, never an exception."""
     file = str(shown_as or path)
     try:
@@ -132,8 +132,8 @@ def read(path: str | Path, shown_as: str | None = None) -> Document:
     return parse(text, file)
 
 
-def _unreadable(problem: Flaw, sha256: str = "") -> Document:
-    return Document(problem.file, None, {}, {}, sha256, "", (problem,), ((),))
+def _unreadable(problem: Flaw, sha256: str = "") -> ParsedFile:
+    return ParsedFile(problem.file, None, {}, {}, sha256, "", (problem,), ((),))
 
 
 def read_bytes(path: Path) -> bytes:
@@ -160,7 +160,7 @@ def _encoding_problem(file: str, raw: bytes, error: UnicodeDecodeError) -> Flaw:
     )  # fmt: skip
 
 
-def parse(text: str, file: str = "<text>") -> Document:
+def parse(text: str, file: str = "<text>") -> ParsedFile:
     """Parse YAML text; line ends and a byte-order mark do not change data or hash."""
     text = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     digest = hashlib.sha256(text.encode("utf-8", "surrogatepass")).hexdigest()
@@ -173,7 +173,7 @@ def parse(text: str, file: str = "<text>") -> Document:
     except yaml.YAMLError as error:
         builder.refuse_syntax(error, text)
         data = None
-    return Document(
+    return ParsedFile(
         file,
         data,
         builder.positions,

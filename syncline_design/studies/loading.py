@@ -20,7 +20,7 @@ from syncline_design.spec.load import BadInput, catalogs_of, load_document
 from syncline_design.spec.references import unknown_ids
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate
-from syncline_design.spec.yaml_text import Document, Flaw, KeyPath, read
+from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile, read
 from syncline_design.studies.definition import (
     MAX_CASES,
     CheckChoice,
@@ -39,7 +39,7 @@ class Base:
     """One base spec: its data, its catalogs drawn together once, where each key path leads."""
 
     path: Path
-    document: Document = field(repr=False)
+    document: ParsedFile = field(repr=False)
     catalogs: Collection = field(repr=False)
     paths: dict[str, KeyPath]
     simulated: tuple[str, ...]  # ids of its monte_carlo requirements
@@ -144,7 +144,7 @@ def _texts(value: Any) -> Iterator[str]:
         yield from (text for item in value for text in _texts(item))
 
 
-def _grid(chosen: StudyFile, document: Document, problems: list[Flaw]) -> Iterator[Factor]:
+def _grid(chosen: StudyFile, document: ParsedFile, problems: list[Flaw]) -> Iterator[Factor]:
     combinations = len(chosen.base) * (chosen.sample.count if chosen.sample is not None else 1)
     for key, value in (chosen.grid or {}).items():
         place: KeyPath = ("grid", key)
@@ -160,7 +160,7 @@ def _grid(chosen: StudyFile, document: Document, problems: list[Flaw]) -> Iterat
         problems.append(problem_at(document, (), "too many cases", f"at most {MAX_CASES}", found))
 
 
-def _sample(chosen: StudyFile, document: Document, problems: list[Flaw]) -> Iterator[Factor]:
+def _sample(chosen: StudyFile, document: ParsedFile, problems: list[Flaw]) -> Iterator[Factor]:
     if chosen.sample is None:
         return
     for key, value in chosen.sample.over.items():
@@ -173,13 +173,13 @@ def _sample(chosen: StudyFile, document: Document, problems: list[Flaw]) -> Iter
         yield Factor(key, values, "sample", place, listed=False)
 
 
-def _factor_problem(document: Document, place: KeyPath, error: FactorError) -> Flaw:
+def _factor_problem(document: ParsedFile, place: KeyPath, error: FactorError) -> Flaw:
     where = (*place, *error.where)
     return problem_at(document, where, error.message, error.expected, error.found)
 
 
 def _check_keys(
-    chosen: StudyFile, document: Document, grid: list[Factor], sample: list[Factor],
+    chosen: StudyFile, document: ParsedFile, grid: list[Factor], sample: list[Factor],
     problems: list[Flaw],
 ) -> None:  # fmt: skip
     both = {factor.key for factor in grid} & {factor.key for factor in sample}
@@ -199,7 +199,7 @@ def _check_keys(
 
 
 def _bases(
-    chosen: StudyFile, document: Document, path: Path, factors: list[Factor],
+    chosen: StudyFile, document: ParsedFile, path: Path, factors: list[Factor],
     problems: list[Flaw],
 ) -> Iterator[Base]:  # fmt: skip
     seen: dict[Path, int] = {}
@@ -225,7 +225,7 @@ def _plain_path(path: Path) -> Path:
 
 
 def _base(
-    target: Path, study: Document, place: KeyPath, factors: list[Factor], problems: list[Flaw]
+    target: Path, study: ParsedFile, place: KeyPath, factors: list[Factor], problems: list[Flaw]
 ) -> Base | None:
     """One base spec; its own errors stand beside the study's, each in its own file."""
     document = read(target)
@@ -253,7 +253,7 @@ def _base(
 
 
 def _paths(
-    spec: Document, study: Document, factors: list[Factor], problems: list[Flaw], name: str
+    spec: ParsedFile, study: ParsedFile, factors: list[Factor], problems: list[Flaw], name: str
 ) -> dict[str, KeyPath]:
     paths: dict[str, KeyPath] = {}
     for factor in factors:
@@ -278,15 +278,15 @@ def _paths(
     return paths
 
 
-def _with_data(document: Document, data: Any) -> Document:
+def _with_data(document: ParsedFile, data: Any) -> ParsedFile:
     """The document with other data; positions still point at the base spec's lines."""
-    return Document(
+    return ParsedFile(
         document.file, data, document.positions, document.key_positions, document.sha256,
         document.text,
     )  # fmt: skip
 
 
-def _check_values(base: Base, study: Study, document: Document, problems: list[Flaw]) -> None:
+def _check_values(base: Base, study: Study, document: ParsedFile, problems: list[Flaw]) -> None:
     """Every value by itself in its base: what is wrong with it is said at its place."""
     for factor in study.factors:
         if factor.key not in base.paths:
@@ -339,7 +339,7 @@ def _value_problems(base: Base, key: str, value: Any) -> list[Flaw]:
     return found + unknown_ids(document, base.catalogs)
 
 
-def override_entry(catalogs: Collection, path: KeyPath, value: Any, spec: Document) -> Collection:
+def override_entry(catalogs: Collection, path: KeyPath, value: Any, spec: ParsedFile) -> Collection:
     """The catalogs with `catalog.SECTION[ID].KEY...` set; BadInput says why that cannot be."""
     section, identity = str(path[1]), str(path[2])
     origin = catalogs.documents.get((section, identity))
@@ -365,14 +365,14 @@ def override_entry(catalogs: Collection, path: KeyPath, value: Any, spec: Docume
 
 
 def _validated(
-    document: Document, place: tuple[str, str], entry: Any, spec: Path, read: Collection
+    document: ParsedFile, place: tuple[str, str], entry: Any, spec: Path, read: Collection
 ) -> tuple[Catalog | None, list[Flaw]]:
     """The entry through the catalog's own model, its errors placed in its own file.
 
     Files are named from the catalog's folder; a shipped catalog has none, the spec's counts.
     """
     section, identity = place
-    single = Document(
+    single = ParsedFile(
         document.file, {section: {identity: entry}}, document.positions, document.key_positions,
         document.sha256, document.text,
     )  # fmt: skip
@@ -383,9 +383,9 @@ def _validated(
     return model, [*problems, *read.problems]
 
 
-def _entry_document(document: Document, at: KeyPath, entry: Any) -> Document:
+def _entry_document(document: ParsedFile, at: KeyPath, entry: Any) -> ParsedFile:
     """The document with one entry changed, so that a further override starts from it."""
-    return Document(
+    return ParsedFile(
         document.file, put(document.data, at, entry), document.positions, document.key_positions,
         document.sha256, document.text,
     )  # fmt: skip

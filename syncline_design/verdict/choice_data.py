@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any
 
 from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem, ResourceName
 from syncline_design.machine.deadline import Pieces
+from syncline_design.machine.records import Json
 from syncline_design.spec.case import Case
 from syncline_design.spec.references import parts_in_use
 from syncline_design.verdict.design_data import design_json
 from syncline_design.verdict.open_choice import Picked
 from syncline_design.verdict.tree import finite
 
-Json = dict[str, Any]
 NEXT_BEST = 5
 MOST_EXCLUDED = 1000  # rows of `excluded` in a verdict
 

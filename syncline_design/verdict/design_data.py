@@ -9,13 +9,12 @@ from typing import Any
 
 from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_options, evaluate
 from syncline_design.choice.table import Design, Option, Problem
+from syncline_design.machine.records import Json
 from syncline_design.model.budget import Budget, SensorRow
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import Entry
 from syncline_design.verdict.tree import Assumption, Source, finite
-
-Json = dict[str, Any]
 
 
 @dataclass(frozen=True, slots=True)

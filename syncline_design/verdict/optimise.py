@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.acceptable import refusals
@@ -24,7 +23,7 @@ from syncline_design.choice.tolerance import (
 )
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
-from syncline_design.machine.records import json_of
+from syncline_design.machine.records import Json, json_of
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.selection import RoleSelection
@@ -42,7 +41,6 @@ from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
 
 SCHEMA = "syncline-design/optimization/v1"
-Json = dict[str, Any]
 # What stands for the tables where time ended before they were made.
 NO_TABLES = Problem((), (), (), (), 0.0, 0.0, Limits(None, 1.0), "syncline", "cost")
 
