@@ -3,6 +3,9 @@
 Results do not depend on which process computes a case, so a retry gives the same numbers.  Each
 worker holds a few cases in hand so that it never waits for the parent.  Workers end with
 the parent, whatever ends it, and do not look for programs in the working folder.
+
+Not `concurrent.futures`: when one of its workers dies, every case not yet done fails with it and
+nothing says which case was to blame, and its workers outlive a parent that is killed.
 """
 
 from __future__ import annotations
