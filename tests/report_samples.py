@@ -309,33 +309,6 @@ def choice_section(total: float) -> dict[str, Any]:
             {"cost": 31_000.0, "tightest_m": 0.42, "looser_than_m": None, "extra": None},
             {"cost": 34_500.0, "tightest_m": 0.21, "looser_than_m": 0.42, "extra": 3_500.0},
         ],
-        "slack": [
-            {
-                "term": "sensor error of sbg_apogee",
-                "stage": "uav",
-                "value": 0.056,
-                "unit": "m",
-                "fails_at": 0.262,
-                "limited_by": "accuracy",
-                "payload_changes_at": None,
-            }
-        ],
-        "tolerances": {
-            "passes": "sometimes",
-            "figures": ["sbg_apogee.sigma_attitude", "riegl_vux1uav.sigma_range"],
-            "deciding": ["sbg_apogee.sigma_attitude"],
-            "alone": True,
-        },
-        "measure_next": [
-            {
-                "figure": "sbg_apogee.sigma_attitude",
-                "value": 0.0005,
-                "at": 0.0006,
-                "assumed_tolerance": True,
-                "becomes": "kongsberg_mru5",
-                "objective_change": 1900.0,
-            }
-        ],
         "next_best": [{"cost": 39_100.0, "error_m": 0.093, "design": front[2]["design"]}],
         "excluded": [
             {

@@ -30,13 +30,13 @@ from syncline_design.choice.variations import (
 )
 from syncline_design.model.known import Known
 from syncline_design.model.quantity import Dimension
+from syncline_design.report import numbers
 from syncline_design.report.choice_csv import designs_csv, front_csv
 from syncline_design.report.on_choice import (
     designs_table,
     front_table,
     slack_table,
     staircase_table,
-    target_text,
 )
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load, load_text
@@ -298,7 +298,7 @@ def test_tables_and_csv(tmp_path: Path) -> None:
     ("value", "text"), [(5.7563287, "5.757 m"), (0.25, "250 mm"), (0.29453366, "294.6 mm")]
 )
 def test_printed_targets_are_ones_that_the_price_buys(value: float, text: str) -> None:
-    assert target_text(value) == text.replace(" ", "\u00a0")
+    assert numbers.target(value) == text.replace(" ", "\u00a0")
 
 
 @pytest.mark.parametrize("name", ["=HYPERLINK(1)", "+1+1", "@SUM(A1)", "-2+3"])

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from html_page import Page
+from syncline_design.report import numbers
 from syncline_design.report.axes import log_ticks
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_verdict import on_verdict
@@ -75,6 +76,12 @@ def test_a_datasheet_figure_reads_as_it_was_written() -> None:
             assert entry[f"{key}_text"] in page
             assert entry[f"{key}_text"] in text
     assert "Figure (SI)" not in page
+    assert found.hinges is not None
+    assert found.hinges.tolerance is not None
+    for told in (" ".join(text.split()), " ".join(page.replace("\u00a0", " ").split())):
+        assert " ".join(found.hinges.tolerance.text.split()) in told
+        for row in found.hinges.slack or ():
+            assert numbers.si_quantity(row.value, row.unit).replace("\u00a0", " ") in told
 
 
 @pytest.mark.parametrize(

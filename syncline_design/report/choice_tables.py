@@ -1,4 +1,4 @@
-"""Tables of the choice: front, price staircase, runners-up, slack, what to measure, exclusions."""
+"""Tables of the choice: front, price staircase, runners-up, exclusions."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ from collections.abc import Mapping
 
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, Tone, table
-from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_tables import currency_of
-from syncline_design.report.verdict_words import Json, items, named, part
-from syncline_design.report.words import KINDS, PRIMITIVES
+from syncline_design.report.verdict_words import Json, items, named
+from syncline_design.report.words import PRIMITIVES
 from syncline_design.verdict.tree import Verdict
 
 
@@ -20,8 +19,6 @@ def choice_tables(verdict: Verdict) -> list[Table]:
         priced(verdict, "front", "Pareto front: cost against error"),
         staircase(verdict),
         priced(verdict, "next_best", "What else almost won"),
-        slack(verdict),
-        measure_next(verdict),
         excluded(verdict),
     )
     return [entry for entry in found if entry is not None]
@@ -32,81 +29,15 @@ def staircase(verdict: Verdict) -> Table | None:
     currency = currency_of(verdict)
     rows = []
     for entry in items(verdict.choice, "staircase"):
-        tight, loose = entry.get("tightest_m"), entry.get("looser_than_m")
-        below = f" to below {numbers.length(loose)}" if loose is not None else " and looser"
+        tight, loose = entry["tightest_m"], entry["looser_than_m"]
+        below = f" to below {numbers.target(loose)}" if loose is not None else " and looser"
         rows.append((
-            Cell(numbers.length(tight) + below, numbers.finite(tight)),
+            Cell(numbers.target(tight) + below, numbers.finite(tight)),
             Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
             Cell(numbers.money(entry.get("extra"), currency), numbers.finite(entry.get("extra"))),
         ))  # fmt: skip
     heads = ("Accuracy targets", "Price #", "More than the step before #")
     return table("Price staircase of accuracy", heads, rows) if rows else None
-
-
-def slack(verdict: Verdict) -> Table | None:
-    """How far each term may grow before the verdict or the payload changes."""
-    rows = []
-    for entry in items(verdict.choice, "slack"):
-        unit = str(entry.get("unit") or "")
-        breaks = KINDS.get(str(entry.get("limited_by")), "")
-        rows.append((
-            f"{entry.get('stage')} \u00b7 {entry.get('term')}",
-            Cell(numbers.si_quantity(entry.get("value"), unit), numbers.finite(entry.get("value"))),
-            _threshold(entry, "fails_at", "verdict", unit),
-            breaks,
-            _threshold(entry, "payload_changes_at", "payload", unit),
-        ))  # fmt: skip
-    heads = ("Term", "Now #", "Verdict fails at #", "What then breaks", "Payload changes at #")
-    return table("Slack: how far each term may grow", heads, rows) if rows else None
-
-
-def _threshold(entry: Json, key: str, what: str, unit: str) -> Cell:
-    """A threshold; without one `never` where that is proven, else how far was looked."""
-    known = numbers.finite(entry.get(key))
-    if known is not None:
-        return Cell(numbers.si_quantity(known, unit), known)
-    if what in (entry.get("never") or ()):
-        return Cell("never", None)
-    searched = numbers.finite(entry.get("searched_to"))
-    if searched is None:
-        return Cell("not known", None)
-    return Cell(f"not up to {numbers.si_quantity(searched, unit)}", None)
-
-
-def measure_next(verdict: Verdict) -> Table | None:
-    """Datasheet figures that alone would flip the choice."""
-    rows = [
-        (
-            str(entry.get("figure")),
-            Cell(_written(entry, "value"), numbers.finite(entry.get("value"))),
-            Cell(_written(entry, "at"), numbers.finite(entry.get("at"))),
-            "20 % tried, the datasheet gives none" if entry.get("assumed_tolerance")
-            else "datasheet tolerance",
-            str(entry.get("becomes") or ""),
-        )
-        for entry in items(verdict.choice, "measure_next")
-    ]  # fmt: skip
-    heads = ("Figure", "Now #", "Flips at #", "Range", "The choice becomes")
-    return table("What to measure next", heads, rows) if rows else None
-
-
-def _written(entry: Json, key: str) -> str:
-    """A datasheet figure in the unit in which it was written."""
-    text = entry.get(f"{key}_text")
-    return str(text) if text else numbers.number(entry.get(key))
-
-
-def tolerance_sentence(verdict: Verdict) -> str:
-    """Whether the design passes always, sometimes or never within the datasheet tolerances."""
-    found = part(verdict.choice, "tolerances")
-    if not found or not found.get("figures"):
-        return ""
-    text = f"Within the datasheet tolerances the design {found.get('passes')} passes"
-    deciding = [str(name) for name in found.get("deciding") or ()]
-    if not deciding:
-        return text + "."
-    verb = "decides it" if found.get("alone") else "decide it together"
-    return f"{text}; {sentence_list(deciding)} {verb}."
 
 
 def is_chosen(verdict: Verdict, entry: Json) -> bool:

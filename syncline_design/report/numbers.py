@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final
 
 from syncline_design.model.quantity import (
@@ -45,6 +46,14 @@ def _shown(value: Any, dimension: Dimension, digits: int, currency: str = "EUR")
 def length(value: Any, digits: int = 4) -> str:
     """Metres as `18.13 mm`."""
     return _shown(value, Dimension.LENGTH, digits)
+
+
+def target(value_m: float) -> str:
+    """A length rounded up to four figures: a target that the printed price does buy."""
+    if not value_m > 0.0 or not math.isfinite(value_m):
+        return length(value_m)
+    scale = Fraction(10) ** (3 - math.floor(math.log10(value_m)))
+    return length(float(math.ceil(Fraction(value_m) * scale) / scale))
 
 
 def time(value: Any, digits: int = 4) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from fractions import Fraction
 
@@ -49,7 +48,7 @@ def on_choice(found: Optimisation) -> Document:
             *_why_not(found),
             *section("designs", "Best designs", show(designs, silent=True)),
             *_front(found),
-            *section("hinges", "What it hinges on", _hinges(found.hinges)),
+            *section("hinges", "What it hinges on", hinges_nodes(found.hinges)),
             *section("incomplete", "Not complete", _items(incomplete_lines(found))),
         ),
         source=str(found.case.path),
@@ -187,25 +186,17 @@ def staircase_table(steps: Sequence[PriceStep], currency: str, resource: Resourc
     rows = []
     for step in steps:
         loose = step.looser_than_m
-        upto = "and looser" if loose is None else f"to below {target_text(loose)}"
+        upto = "and looser" if loose is None else f"to below {numbers.target(loose)}"
         more = Cell("") if step.extra is None else amount_cell(step.extra, resource, currency)
         rows.append([
-            Cell(f"{target_text(step.tightest_m)} {upto}", step.tightest_m),
+            Cell(f"{numbers.target(step.tightest_m)} {upto}", step.tightest_m),
             amount_cell(step.amount, resource, currency), more,
         ])  # fmt: skip
     heads = ("Accuracy target #", f"{resource.capitalize()} #", "More than the step before #")
     return table("What accuracy costs", heads, rows)
 
 
-def target_text(value_m: float) -> str:
-    """A length rounded up to four figures: a target that the printed price does buy."""
-    if not value_m > 0.0 or not math.isfinite(value_m):
-        return numbers.length(value_m)
-    scale = Fraction(10) ** (3 - math.floor(math.log10(value_m)))
-    return numbers.length(float(math.ceil(Fraction(value_m) * scale) / scale))
-
-
-def _hinges(hinges: Hinges | None) -> list[Node]:
+def hinges_nodes(hinges: Hinges | None) -> list[Node]:
     """Slack of every figure, tolerances, what to measure next."""
     if hinges is None:
         return []

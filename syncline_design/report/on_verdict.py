@@ -48,8 +48,11 @@ MOST_OPEN = 12  # rows of a table of the choice that is not folded away
 _PROVEN = muted(" (solved again to prove it)")
 
 
-def on_verdict(verdict: Checked) -> Document:
-    """A verdict as a document; parts that it does not have are left out."""
+def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
+    """A verdict as a document; parts that it does not have are left out.
+
+    more: what else is known of the choice, as `optimize` does.
+    """
     if isinstance(verdict, Refused):
         return _on_refused(verdict)
     return Document(
@@ -70,7 +73,7 @@ def on_verdict(verdict: Checked) -> Document:
             *section("ledger", "Where the error comes from", _ledger(verdict), "Ledger"),
             *section("simulation", "Simulated with the nonlinear chain", _simulation(verdict),
                      "Simulation"),
-            *section("choice", "The choice", _choice(verdict), "Choice"),
+            *section("choice", "The choice", [*_choice(verdict), *more], "Choice"),
             *section("effects", "Known systematic effects taken into account", _effects(verdict),
                      "Known effects"),
             *section("basis", "Assumptions, sources, errata", _basis(verdict), "Basis", "page"),
@@ -252,10 +255,8 @@ def _simulation(verdict: Verdict) -> list[Node]:
 
 
 def _choice(verdict: Verdict) -> list[Node]:
-    choice = verdict.choice or {}
     proof = _proof(verdict)
     nodes: list[Node] = [Text(proof)] if proof else []
-    nodes += [Text((strong(line),), reach="page") for line in choice.get("incomplete") or ()]
     nodes += verdict_figures.choice_chart(verdict)
     for table in choice_tables.choice_tables(verdict):
         nodes += _folded(table)
@@ -280,8 +281,7 @@ def _proof(verdict: Verdict) -> str:
     among = f" among {_grouped(combinations)} combinations" if combinations else ""
     optimal = "proven optimal" if proof.get("optimal") else "not proven optimal"
     checked = ", recomputed exactly afterwards" if proof.get("rechecked") else ""
-    found = f"Found by {method}{among}: {optimal}{checked}."
-    return f"{found} {choice_tables.tolerance_sentence(verdict)}".strip()
+    return f"Found by {method}{among}: {optimal}{checked}."
 
 
 def _grouped(digits: str) -> str:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Final
 
 from syncline_design.report.choice_csv import optimisation_csv
+from syncline_design.report.document import Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.verdict.optimise import (
     Optimisation,
     incomplete_lines,
     optimisation_json,
 )
-
-_HINGES: Final = ("staircase", "slack", "tolerances", "measure_next")
 
 
 def render_optimize(name: str, found: Optimisation) -> str:
@@ -24,12 +22,14 @@ def render_optimize(name: str, found: Optimisation) -> str:
         from syncline_design.report.json_out import json_text
 
         return json_text(optimisation_json(found))
+    from syncline_design.report.on_choice import hinges_nodes
     from syncline_design.report.on_verdict import on_verdict
     from syncline_design.report.render_html import html
 
     assert found.verdict is not None
     told = optimisation_json(found)
     choice = dict(found.verdict.choice or {})
-    choice |= {key: told[key] for key in _HINGES if told.get(key)}
-    choice["incomplete"] = incomplete_lines(found)
-    return html(on_verdict(replace(found.verdict, choice=choice)))
+    choice |= {"staircase": told["staircase"]} if told.get("staircase") else {}
+    more: list[Node] = [Text((strong(line),)) for line in incomplete_lines(found)]
+    more += hinges_nodes(found.hinges)
+    return html(on_verdict(replace(found.verdict, choice=choice), more))
