@@ -44,17 +44,12 @@ CELLS = 4  # regimes per covariate in which a named effect must have the same pa
 class Remainder:
     """p_regimes, p_motion, p_constant: of the energy on the three families (p_constant 1 when
     nothing is named); p_peak: of the largest single regressor of the first two.
-
-    shifted: median energy under circular shifts over its expectation, the largest of the
-    families', limited to 1 .. MOST_INFLATION; energies are divided by it.
     """
 
     p_regimes: float
     p_motion: float
     p_constant: float
     p_peak: float
-    shifted: float
-    freedom: int
 
     @property
     def p(self) -> float:
@@ -78,20 +73,22 @@ def remainder(data: Data, model: Model, rng: np.random.Generator) -> Remainder:
     if model.acting:
         tested.append(_energy(data, model, _constancy_columns(data, model), residual, shifts))
         p_constant = tested[-1].p
-    inflation = max(t.inflation for t in tested)
-    return Remainder(tested[0].p, tested[1].p, p_constant, p_peak, inflation, freedom)
+    return Remainder(tested[0].p, tested[1].p, p_constant, p_peak)
 
 
 @dataclass(frozen=True, slots=True)
 class _Tested:
     p: float
     peak: float
-    inflation: float
     freedom: int
 
 
 def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Shifts) -> _Tested:
-    """Energy of the residual on one family of regressors (n, 3, f)."""
+    """Energy of the residual on one family of regressors (n, 3, f).
+
+    It is divided by the median energy under circular shifts over its expectation, within 1 and
+    MOST_INFLATION.
+    """
     own = np.nan_to_num(slopes(data.view, model.acting))
     columns = np.concatenate([own, family], axis=2)
     normal = inner(columns, model.precision.solve(columns))
@@ -107,7 +104,7 @@ def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Sh
     inflation = float(np.clip(np.median(energies) / max(freedom, 1), 1.0, MOST_INFLATION))
     peak = float(np.max((score * single) ** 2, initial=0.0)) / inflation
     p = float(chi2.sf(float(seen @ seen) / inflation, max(freedom, 1)))
-    return _Tested(p, peak, inflation, freedom)
+    return _Tested(p, peak, freedom)
 
 
 def _regime_columns(view: Scene) -> Array:
