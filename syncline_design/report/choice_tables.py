@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.verdict_tables import currency_of
 from syncline_design.report.verdict_words import Json, items, named
 from syncline_design.report.words import PRIMITIVES
-from syncline_design.verdict.tree import Verdict
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import Verdict
 
 
 def choice_tables(verdict: Verdict) -> list[Table]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 from syncline_design.paper.errata import ERRATA
 from syncline_design.report.verdict_tables import roles
-from syncline_design.verdict.tree import Verdict
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import Verdict
 
 # erratum -> catalog entries that must all be in the design for it to matter
 NEEDED: Final[dict[str, frozenset[str]]] = {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from syncline_design.choice.outcome import ROADS
 from syncline_design.report import (
@@ -42,7 +43,9 @@ from syncline_design.report.simulated import (
 )
 from syncline_design.report.table import Table
 from syncline_design.report.verdict_words import Json, items, part
-from syncline_design.verdict.tree import Checked, Refused, Verdict
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 MOST_OPEN = 12  # rows of a table of the choice that is not folded away
 _PROVEN = muted(" (solved again to prove it)")
@@ -53,7 +56,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
 
     more: what else is known of the choice, as `optimize` does.
     """
-    if isinstance(verdict, Refused):
+    if verdict.verdict == "refused":
         return _on_refused(verdict)
     return Document(
         family="Design report",

@@ -8,10 +8,10 @@ from syncline_design.report import numbers
 from syncline_design.report.document import Chart, Node
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.words import ENVELOPES
-from syncline_design.simulation.results import MonteCarlo, QuantileEstimate
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
+    from syncline_design.simulation.results import MonteCarlo, QuantileEstimate
 
 BEYOND: Final = (
     "Samples exceed a sum of one-sigma terms often (39 % of them where position noise is all there "

@@ -8,10 +8,10 @@ from syncline_design.report import choice_tables, numbers, verdict_tables, verdi
 from syncline_design.report.document import Chart, Explorer, Node
 from syncline_design.report.text import shortened
 from syncline_design.report.verdict_words import items
-from syncline_design.verdict.tree import SynclineFigures, Verdict
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
+    from syncline_design.verdict.tree import SynclineFigures, Verdict
 
 # What draws is imported where it draws: ElementTree and matplotlib hide behind it.
 

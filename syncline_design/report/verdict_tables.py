@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, table
@@ -19,7 +20,9 @@ from syncline_design.report.verdict_words import (
     waiver_text,
 )
 from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, TIMELINES
-from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
 
 def roles(verdict: Verdict) -> Iterator[tuple[str, str, Json]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
@@ -18,7 +18,9 @@ from syncline_design.report.words import (
     STATUSES,
     TERMS,
 )
-from syncline_design.verdict.tree import Checked, LedgerRow, Refused, RequirementResult, Verdict
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import Checked, LedgerRow, RequirementResult, Verdict
 
 Json = Mapping[str, Any]
 
@@ -50,7 +52,7 @@ def outcome(verdict: Checked) -> Outcome:
     A design that meets while a larger figure of its own does not says so in the same breath.
     """
     found = OUTCOMES[verdict.verdict]
-    if isinstance(verdict, Refused):
+    if verdict.verdict == "refused":
         return found
     return replace(found, word=found.word + qualification(verdict))
 
@@ -127,7 +129,7 @@ def role_phrase(entry: Json) -> str:
 
 def design_sentence(verdict: Checked) -> str:
     """The design in one sentence; without one, what stands in the way."""
-    if isinstance(verdict, Refused):
+    if verdict.verdict == "refused":
         plural = "problem" if len(verdict.problems) == 1 else "problems"
         return f"{len(verdict.problems)} {plural} in the file; nothing was computed."
     stages = items(verdict.design, "stages")
