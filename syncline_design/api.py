@@ -79,7 +79,7 @@ def optimize(
 
     settings = optimise.OptimizeSettings(best, pareto, resource, method, seed=seed, every=every)
     with within_s(time_limit_s):
-        return optimise.optimize(_case(spec), settings)
+        return optimise.optimize(_case(spec), settings).result
 
 
 def simulate(

@@ -100,7 +100,8 @@ def test_strictly_below_the_limit_or_not_at_all(seed: int, tmp_path: Path) -> No
 def test_optimize_and_check_agree_at_the_limit(seed: int, tmp_path: Path) -> None:
     texts, tau = tie_case(random.Random(100 + seed))
     spec = loaded(tmp_path, texts, tau, "tie, safe")
-    found = optimize(spec, OptimizeSettings(pareto=True))
+    found = optimize(spec, OptimizeSettings(pareto=True)).result
     verdict = check_loaded(spec, CheckSettings(monte_carlo=False)).to_json()
     assert found.exit_code == (0 if verdict["verdict"] == "meets" else 1)
+    assert found.front is not None
     assert len(found.front) <= 1  # the sensor at the limit is on no front

@@ -17,7 +17,7 @@ import pytest
 import yaml
 
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.optimise import OptimizeSettings, optimisation_json, optimize
+from syncline_design.verdict.optimise import OptimizeSettings, optimize
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 SPEED, TURN_DEG, DISTANCE = 4.0, 6.0, 30.0
@@ -354,7 +354,7 @@ def test_one_combination_is_judged_alike_by_check_and_optimize(
     text = ALONE.replace("LIMIT", limit).replace("WRITTEN", written)
     loaded = load_text(text, tmp_path / "spec.yaml")
     verdict = check_loaded(loaded, CheckSettings(monte_carlo=False)).to_json()
-    chosen = optimisation_json(optimize(loaded, OptimizeSettings()))
+    chosen = optimize(loaded, OptimizeSettings()).result.to_json()
     if meets:
         assert verdict["verdict"] == chosen["verdict"] == "meets"
     else:

@@ -84,14 +84,15 @@ def total_m(sensor: str, factor: float, speed: float = 2.0, distance: float = 10
 
 
 def found(loaded: Case) -> Optimisation:
-    return optimize(loaded, OptimizeSettings(pareto=True, count=2))
+    return optimize(loaded, OptimizeSettings(pareto=True, count=2)).result
 
 
 @pytest.mark.parametrize("factor", [1.5, 4.0, 11.0])
 def test_front_and_designs_carry_an_effect_of_the_sensor(tmp_path: Path, factor: float) -> None:
     loaded = spec(tmp_path, ["{id: S, kind: sync, limit: 4}"], [UNDERSTATED.format(factor)])
     result = found(loaded)
-    assert [(float(p.amount), p.error_m) for p in result.front] == [
+    assert result.front is not None
+    assert [(p.cost, p.error_m) for p in result.front] == [
         (PRICE[name] + 20, pytest.approx(total_m(name, factor), rel=1e-12))
         for name in ("coarse", "fine")
     ]
@@ -155,9 +156,9 @@ def test_an_effect_grows_with_the_distance_in_fixes_and_ledger(tmp_path: Path) -
     slope = (total_m("coarse", 1.0) - rigid) / 10.0 + 0.01
     limit = rigid + slope * 16.0
     loaded = spec(tmp_path, [f"{{id: A, kind: accuracy, limit: {limit!r} m}}"], effects)
-    hinges = found(loaded).hinges
-    assert hinges is not None
-    (row,) = [row for row in hinges.slack if row.term == "distance"]
+    slack = found(loaded).slack
+    assert slack is not None
+    (row,) = [row for row in slack if row.term == "distance"]
     assert row.fails_at == pytest.approx(16.0, rel=2e-4)
 
 
@@ -173,9 +174,8 @@ def test_understated_noise_grows_with_the_sensor_error_in_the_ledger(
     effects = [UNDERSTATED.format(factor) for factor in factors]
     loaded = spec(tmp_path, [f"{{id: A, kind: accuracy, limit: {limit!r} m}}"], effects)
     result = found(loaded)
-    assert result.hinges is not None
-    assert result.hinges.slack is not None
-    (row,) = [row for row in result.hinges.slack if row.term == "position sensor error"]
+    assert result.slack is not None
+    (row,) = [row for row in result.slack if row.term == "position sensor error"]
     assert row.fails_at == pytest.approx(1.4 * sigma, rel=1e-9)
     assert row.payload_changes_at == pytest.approx(1.4 * sigma, rel=1e-5)
     assert row.limited_by == "accuracy"

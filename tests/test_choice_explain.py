@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 
 from syncline_design.choice.decide import choose
-from syncline_design.choice.explain import Explanation, explain
-from syncline_design.choice.fixes import Fix
-from syncline_design.choice.outcome import Choice, Infeasible
+from syncline_design.choice.explain import explain
+from syncline_design.choice.outcome import Choice, Explanation, Fix, Infeasible
 from syncline_design.choice.parts import is_feasible, solve
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import with_limits
@@ -77,9 +76,9 @@ def test_feasible_to_begin_with(tmp_path: Path) -> None:
 
 def test_conflict_of_two_is_named_with_its_lines_and_is_minimal(tmp_path: Path) -> None:
     found = explained(spec(tmp_path, cost="40000 EUR"))
-    assert [(m.id, m.line) for m in found.conflict] == [("ACC", 4), ("COST", 5)]
-    assert found.minimal
-    assert "ACC (line 4) and COST (line 5) cannot hold together" in "\n".join(found.lines())
+    assert [(m.id, m.line) for m in found.conflict.requirements] == [("ACC", 4), ("COST", 5)]
+    assert found.conflict.minimal
+    assert "ACC (line 4) and COST (line 5) cannot hold together" in "\n".join(found.text)
 
 
 def test_each_member_of_the_conflict_left_out_makes_it_feasible(tmp_path: Path) -> None:
@@ -99,11 +98,11 @@ def with_mass(folder: Path, mass: str, **changes: str) -> Case:
 def test_two_conflicts_are_both_named_and_lifted_together(tmp_path: Path) -> None:
     """Neither budget alone is the reason, so no single change helps; both do, and less does not."""
     found = explained(with_mass(tmp_path, "2 kg", cost="20000 EUR"))
-    conflicts = [{m.id for m in members} for members in (found.conflict, *found.further)]
+    conflicts = [{m.id for m in members} for members in found.conflicts]
     assert sorted(conflicts, key=str) == [{"COST"}, {"MASS"}]
     assert found.fixes == ()
-    (together,) = found.joint
-    changed = {fix.requirement: fix.after for fix in together}
+    (together,) = found.joint_fixes
+    changed = {fix.requirement: fix.to for fix in together}
     cost, mass = changed["COST"], changed["MASS"]
     assert cost is not None
     assert mass is not None
@@ -112,7 +111,7 @@ def test_two_conflicts_are_both_named_and_lifted_together(tmp_path: Path) -> Non
     ):  # fmt: skip
         other = with_mass(tmp_path, f"{mass - less_mass!r} kg", cost=f"{cost - less_cost!r} EUR")
         assert isinstance(choose(build_problem(other)), expected)
-    text = "\n".join(found.lines())
+    text = "\n".join(found.text)
     assert "Apart from that, " in text
     assert " and ".join(fix.text for fix in together) in text
 
@@ -121,15 +120,15 @@ def test_fixes_are_the_smallest_and_each_holds(tmp_path: Path) -> None:
     """The remedy makes the spec feasible, and a slightly smaller one does not."""
     found = explained(spec(tmp_path, cost="40000 EUR"))
     cost = fix_of(found, "cost")
-    assert (cost.before, cost.requirement) == (40000.0, "COST")
-    assert cost.after is not None
-    for amount, expected in ((cost.after, Choice), (cost.after - 1, Infeasible)):
+    assert (cost.from_, cost.requirement) == (40000.0, "COST")
+    assert cost.to is not None
+    for amount, expected in ((cost.to, Choice), (cost.to - 1, Infeasible)):
         other = spec(tmp_path, cost=f"{amount:.0f} EUR")
         assert isinstance(choose(build_problem(other)), expected)
     accuracy = fix_of(found, "accuracy")
-    assert accuracy.after is not None
+    assert accuracy.to is not None
     for share, expected in ((1.0, Choice), (0.99, Infeasible)):
-        other = spec(tmp_path, cost="40000 EUR", accuracy=f"{accuracy.after * share!r} m")
+        other = spec(tmp_path, cost="40000 EUR", accuracy=f"{accuracy.to * share!r} m")
         assert isinstance(choose(build_problem(other)), expected)
 
 
@@ -149,10 +148,10 @@ def test_platform_fix_holds_and_is_the_largest(tmp_path: Path) -> None:
     found = explained(loaded)
     platform = [fix for fix in found.fixes if fix.kind == "platform" and "speed" in fix.text]
     for fix in platform:
-        assert fix.after is not None
+        assert fix.to is not None
         accuracy = loaded.spec.requirements[0].limit.text  # type: ignore[attr-defined]
         for share, expected in ((1.0, Choice), (1.02, Infeasible)):
-            text = {"speed": f"{fix.after * share!r} m/s", "accuracy": accuracy}
+            text = {"speed": f"{fix.to * share!r} m/s", "accuracy": accuracy}
             other = spec(tmp_path, **(tight | text))
             assert isinstance(choose(build_problem(other)), expected)
     assert platform
@@ -160,19 +159,19 @@ def test_platform_fix_holds_and_is_the_largest(tmp_path: Path) -> None:
 
 def test_role_without_options_names_the_nearest_and_what_would_serve(tmp_path: Path) -> None:
     found = explained(spec(tmp_path, methods="arrival"))
-    gap = found.gaps[0]
+    gap = found.roles_without_options[0]
     assert (gap.stage, gap.role) == ("uav", "position")
     assert gap.nearest is not None
     assert gap.misses_by == pytest.approx(0.016 * 20.0 / (0.01 * 3**0.5))
-    assert [m.kind for m in found.conflict] == ["sync"]
-    assert found.conflict[0].id is None  # implied: the spec has no sync requirement
+    assert [m.kind for m in found.conflict.requirements] == ["sync"]
+    assert found.conflict.requirements[0].id is None  # implied: the spec has no sync requirement
 
 
 def test_role_whose_signals_no_method_serves(tmp_path: Path) -> None:
     found = explained(spec(tmp_path, methods="ptp"))
-    assert all(gap.nearest is None for gap in found.gaps)
-    assert "ptp serves network" in found.gaps[0].text
-    assert found.conflict == ()
+    assert all(gap.nearest is None for gap in found.roles_without_options)
+    assert "ptp serves network" in found.roles_without_options[0].text
+    assert found.conflict.requirements == ()
 
 
 def test_sync_fix_is_the_least_ratio(tmp_path: Path) -> None:
@@ -180,8 +179,8 @@ def test_sync_fix_is_the_least_ratio(tmp_path: Path) -> None:
     loaded = load_text(text, ROOT / "specs" / "infeasible_no_option.yaml")
     fix = fix_of(explained(loaded), "sync")
     problem = build_problem(loaded)
-    assert fix.after is not None
-    for limit, expected in ((fix.after, True), (fix.after * 0.99, False)):
+    assert fix.to is not None
+    for limit, expected in ((fix.to, True), (fix.to * 0.99, False)):
         limits = replace(problem.limits, sync=limit)
         assert is_feasible(with_limits(problem, limits)) is expected
 
@@ -209,11 +208,11 @@ def test_shipped_infeasible_specs_read_like_a_colleague(name: str) -> None:
     assert data["fixes"]
     assert all(fix["proven"] for fix in data["fixes"])
     assert data["conflict"]["minimal"]
-    text = "\n".join(found.lines())
+    text = "\n".join(found.text)
     assert text.startswith("No design meets this spec.")
     for word in ("HiGHS", "solver", "status", "nan", "None", "Fraction"):
         assert word not in text
-    for member in found.conflict:
+    for member in found.conflict.requirements:
         if member.line is not None:
             line = loaded.text.splitlines()[member.line - 1]
             assert str(member.id) in line

@@ -5,18 +5,19 @@ from __future__ import annotations
 import csv
 import io
 import itertools
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 
+import jsonschema
 import pytest
 
 from syncline_design.choice.decide import best, choose
 from syncline_design.choice.evaluate import broken, evaluate
-from syncline_design.choice.front import front
-from syncline_design.choice.outcome import Choice, Infeasible
-from syncline_design.choice.prices import PriceStep, staircase
+from syncline_design.choice.front import front, staircase
+from syncline_design.choice.outcome import Choice, Infeasible, PriceStep
 from syncline_design.choice.problem import build_problem, selection_of
 from syncline_design.choice.slack import Slack, payload, same_design, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem
@@ -28,6 +29,7 @@ from syncline_design.choice.variations import (
     with_figure,
     with_platform_figure,
 )
+from syncline_design.machine.records import read_as
 from syncline_design.model.known import Known
 from syncline_design.model.quantity import Dimension
 from syncline_design.report import numbers
@@ -38,8 +40,10 @@ from syncline_design.report.on_choice import (
     slack_table,
     staircase_table,
 )
+from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load, load_text
+from syncline_design.verdict.optimise import Optimisation, OptimizeSettings, optimize
 from syncline_design.verdict.recheck import recheck
 from test_choice_explain import spec
 from test_front import one_stage, option
@@ -54,13 +58,19 @@ def chosen(loaded: Case) -> tuple[Problem, Design]:
     return problem, found.design
 
 
+def price_of(steps: Sequence[PriceStep], target_m: float) -> PriceStep | None:
+    """The step that buys an accuracy target; None where no design reaches it."""
+    return next((step for step in steps if step.tightest_m <= target_m), None)
+
+
 @pytest.mark.parametrize("name", ["uav_corridor", "subsea_survey_small_sv"])
 def test_staircase_is_what_solving_again_gives(name: str) -> None:
     """At every breakpoint, just above it and just below it: no duals, only optima."""
     problem = build_problem(load(ROOT / "specs" / f"{name}.yaml"))
     problem = replace(problem, limits=replace(problem.limits, accuracy_m=None, cost=None))
-    steps = staircase(front(problem))
-    assert len(steps) > 3
+    points = front(problem)
+    steps, exact = staircase(points), {float(point.amount): point.amount for point in points}
+    assert len(steps) == len(exact) > 3
     for step in steps:
         for factor in (1.0, 1.0 + 1e-9, 1.0 - 1e-9):
             target = step.tightest_m * factor
@@ -72,7 +82,7 @@ def test_staircase_is_what_solving_again_gives(name: str) -> None:
                 assert isinstance(solved, Infeasible)
             else:
                 assert isinstance(solved, Choice)
-                assert evaluate(problem, solved.design).cost == priced.amount
+                assert evaluate(problem, solved.design).cost == exact[priced.cost]
 
 
 def test_steps_join_without_gaps() -> None:
@@ -80,17 +90,15 @@ def test_steps_join_without_gaps() -> None:
         [option(f"{n}{k}", 0.5 / (k + 1), 0.0, Fraction(10 * k, 3)) for k in range(4)]
         for n in "abc"
     ]
-    steps = staircase(front(one_stage(roles, Limits(None, 1.0), 1.0, 1.0)))
+    points = front(one_stage(roles, Limits(None, 1.0), 1.0, 1.0))
+    steps = staircase(points)
+    assert [step.cost for step in steps] == [float(point.amount) for point in points]
     for before, after in itertools.pairwise(steps):
         assert after.looser_than_m == before.tightest_m
-        assert after.extra == after.amount - before.amount > 0
+    for step, (before, after) in zip(steps[1:], itertools.pairwise(points), strict=True):
+        assert step.extra == float(after.amount - before.amount) > 0
     assert steps[0].looser_than_m is None
     assert price_of(steps, 0.0) is None
-
-
-def price_of(steps: Sequence[PriceStep], target_m: float) -> PriceStep | None:
-    """The step that buys an accuracy target; None where no design reaches it."""
-    return next((step for step in steps if step.tightest_m <= target_m), None)
 
 
 def row_of(rows: tuple[Slack, ...], term: str) -> Slack:
@@ -207,13 +215,13 @@ def test_passes_always_sometimes_or_never(position: str, accuracy: str, word: st
     loaded = tolerant(position, "0.01 deg", accuracy)
     problem = build_problem(loaded)
     design = Design((0, 0, 0), (0,))
-    assert tolerance_verdict(loaded, problem, design).word == word
+    assert tolerance_verdict(loaded, problem, design).passes == word
 
 
 def test_deciding_tolerance_is_named() -> None:
     loaded = tolerant("1 cm +/- 20 %", "0.01 deg +/- 1 %", "3 cm")
     found = tolerance_verdict(loaded, build_problem(loaded), Design((0, 0, 0), (0,)))
-    assert found.word == "sometimes"
+    assert found.passes == "sometimes"
     assert found.alone
     assert found.deciding == ("hull.position sigma_position",)
     assert "hull.position sigma_position decides it" in found.text
@@ -236,14 +244,14 @@ def test_word_agrees_with_trying_values_inside() -> None:
                     tried = with_figure(tried, figure, value)
                 outcomes.add(recheck(tried, selection).passed)
         word = {(True,): "always", (False,): "never"}.get(tuple(outcomes), "sometimes")
-        assert tolerance_verdict(loaded, problem, design).word == word
+        assert tolerance_verdict(loaded, problem, design).passes == word
 
 
 def test_better_sensor_can_fail_sync_within_its_tolerance() -> None:
     """At the lower end tau_crit shrinks below tau: accuracy passes throughout, sync does not."""
     loaded = tolerant("20 um +/- 90 %", "0.01 deg", "4 cm")
     found = tolerance_verdict(loaded, build_problem(loaded), Design((0, 0, 0), (0,)))
-    assert found.word == "sometimes"
+    assert found.passes == "sometimes"
 
 
 def test_measure_next_names_what_flips_the_choice(tmp_path: Path) -> None:
@@ -308,3 +316,23 @@ def test_csv_runs_no_formula(name: str) -> None:
     text = front_csv(problem, front(problem), "cost")
     assert f"'{name}" in text
     assert not any(cell.startswith(("=", "+", "@", "-2")) for cell in text.split(","))
+
+
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        ("position_track", OptimizeSettings(count=2, pareto=True)),
+        ("position_track", OptimizeSettings(pareto=True, resource="mass")),
+        ("position_track", OptimizeSettings(time_limit_s=1e-6)),
+        ("infeasible_no_option", OptimizeSettings(pareto=True)),
+        ("usv_wire_missing", OptimizeSettings()),
+    ],
+)
+def test_what_optimize_writes_is_what_its_schema_says(
+    name: str, settings: OptimizeSettings
+) -> None:
+    found = optimize(load(ROOT / "specs" / f"{name}.yaml"), settings).result
+    data = found.to_json()
+    jsonschema.validate(data, result_schema("optimisation"))
+    again = read_as(Optimisation, json.dumps(data)).to_json()
+    assert again == {key: value for key, value in data.items() if value is not None or key in again}

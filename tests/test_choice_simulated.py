@@ -28,7 +28,6 @@ from syncline_design.verdict import optimise as optimisation
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.optimise import (
     OptimizeSettings,
-    optimisation_json,
     optimize,
 )
 from syncline_design.verdict.verify import CheckSettings, check_loaded
@@ -127,7 +126,7 @@ def test_everything_that_is_listed_meets_the_simulated_limit(
     assert steps == front
     listed = {position(d["design"]) for d in verdict["choice"]["next_best"]}
     assert listed == set(names) - {cheapest}
-    found = optimisation_json(optimize(loaded, OptimizeSettings(count=9, pareto=True)))
+    found = optimize(loaded, OptimizeSettings(count=9, pareto=True)).result.to_json()
     assert {position(d["design"]) for d in found["designs"]} == set(names)
     assert [(p["cost"], p["error_m"]) for p in found["front"]] == front
 
@@ -142,8 +141,8 @@ def test_no_design_passes_is_infeasible_in_check_and_optimize(tmp_path: Path) ->
     loaded = spec(tmp_path, [simulated(0.10), sums("accuracy", "5 m", "ACC")])
     verdict = check_loaded(loaded, CheckSettings())
     found = optimize(loaded, OptimizeSettings())
-    assert (verdict.verdict, verdict.exit_code, found.exit_code) == ("infeasible", 1, 1)
-    data = optimisation_json(found)
+    assert (verdict.verdict, verdict.exit_code, found.result.exit_code) == ("infeasible", 1, 1)
+    data = found.result.to_json()
     assert data["verdict"] == "infeasible"
     assert data["designs"] == []
     for why in (verdict["infeasibility"], data["infeasibility"]):
@@ -223,8 +222,8 @@ def test_a_design_that_its_samples_leave_open_carries_the_requirement(
 def test_nothing_but_an_open_design_is_no_verdict(tmp_path: Path) -> None:
     limit = FACTOR[0.95] * SENSORS["f"][0] * (1 + 1e-9)
     found = optimize(spec(tmp_path, [simulated(limit)]), OptimizeSettings())
-    data = optimisation_json(found)
-    assert (data["verdict"], found.exit_code) == ("indeterminate", 3)
+    data = found.result.to_json()
+    assert (data["verdict"], found.result.exit_code) == ("indeterminate", 3)
     assert data["designs"][0]["undecided"] == ["MC"]
 
 
@@ -241,7 +240,7 @@ def test_a_known_effect_decides_in_simulation_too(tmp_path: Path) -> None:
 def test_measured_figures_flip_the_choice_by_simulation(tmp_path: Path) -> None:
     """c just keeps the limit: 20 % more noise and it fails, as nothing but simulation says."""
     loaded = spec(tmp_path, [simulated(FACTOR[0.95] * 0.15 * 1.05)])
-    data = optimisation_json(optimize(loaded, OptimizeSettings()))
+    data = optimize(loaded, OptimizeSettings()).result.to_json()
     flips = {one["figure"]: one for one in data["measure_next"]}
     assert "c sigma_position" in flips
     assert flips["c sigma_position"]["at"] == pytest.approx(0.18)
@@ -251,8 +250,8 @@ def test_the_ledger_ends_where_simulation_fails(tmp_path: Path) -> None:
     """c's noise may grow until its quantile is the limit; accuracy would allow far more."""
     requirements = [simulated(FACTOR[0.95] * 0.18), sums("accuracy", "3 m", "ACC")]
     found = optimize(spec(tmp_path, requirements), OptimizeSettings())
-    assert found.hinges is not None
-    (row,) = [row for row in found.hinges.slack if row.term == "position sensor error"]
+    assert found.result.slack is not None
+    (row,) = [row for row in found.result.slack if row.term == "position sensor error"]
     assert row.limited_by == "monte_carlo"
     assert row.fails_at == pytest.approx(math.sqrt(3) * 0.18, rel=0.03)
     assert row.payload_changes_at == pytest.approx(row.fails_at, rel=0.03)
@@ -289,7 +288,7 @@ def test_the_word_on_tolerances_asks_simulation(
     data = {"c": ("0.12 m .. 0.18", 1)}
     loaded = spec(tmp_path, [simulated(limit)], sensors=data, effects=effects)
     found = tolerances_of_c(loaded)
-    assert found.word == word
+    assert found.passes == word
     assert found.deciding == (("c sigma_position",) if word != "always" else ())
 
 
@@ -304,7 +303,7 @@ def test_the_word_on_tolerances_counts_an_effect_at_the_same_end(
     limit = f"{3 * 0.15 * math.sqrt(3) * share!r} m"
     data = {"c": ("0.12 m .. 0.18", 1)}
     loaded = spec(tmp_path, [sums("accuracy", limit, "A")], sensors=data, effects=effects)
-    assert tolerances_of_c(loaded).word == word
+    assert tolerances_of_c(loaded).passes == word
 
 
 def test_lists_that_simulation_cuts_short_say_so(
@@ -318,11 +317,11 @@ def test_lists_that_simulation_cuts_short_say_so(
     loaded = spec(tmp_path, [simulated(0.9)])
     whole = optimize(loaded, OptimizeSettings(count=9, pareto=True))
     assert "gave up" not in console(on_choice(whole))
-    assert optimisation_json(whole)["gave_up"] == []
+    assert whole.result.gave_up == ()
     monkeypatch.setattr(optimisation, "Simulations", few)
     monkeypatch.setattr(verify, "Simulations", few)
     found = optimize(loaded, OptimizeSettings(count=9, pareto=True))
-    data = optimisation_json(found)
+    data = found.result.to_json()
     assert len(data["designs"]) <= 3
     assert {"front", "next best designs"} <= set(data["gave_up"])
     assert "not complete: front, next best designs" in console(on_choice(found))

@@ -166,7 +166,7 @@ def test_limit_value_and_margin_share_one_currency(tmp_path: Path, pinned: bool)
 Points = list[tuple[float, float]]
 
 
-def front_of(path: Path, resource: Any) -> tuple[Points, list[str]]:
+def front_of(path: Path, resource: Any) -> tuple[Points, tuple[str, ...]]:
     """Points of the front, and what is not on it."""
     loaded = load(path)
     problem = build_problem(loaded)
@@ -198,8 +198,8 @@ def test_what_does_not_say_is_not_on_that_front(
     expected, nothing = front_of(written(tmp_path, text.replace(*drop), catalog()), resource)
     assert found == expected
     assert expected
-    assert missing == [label]
-    assert nothing == []
+    assert missing == (label,)
+    assert nothing == ()
     said = [w["message"] for w in verdict["warnings"] if w["code"] == "unpriced"]
     wanted = f"not on the front of cost: {label} gives no cost"
     assert said == ([wanted] if resource == "cost" else [])

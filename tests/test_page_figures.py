@@ -20,7 +20,6 @@ from syncline_design.report.render_html import html
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.optimise import (
     OptimizeSettings,
-    optimisation_json,
     optimize,
 )
 from syncline_design.verdict.verify import CheckSettings, check_file
@@ -65,16 +64,17 @@ def test_the_page_says_in_words_how_the_choice_was_proven(method: Any) -> None:
 def test_a_datasheet_figure_reads_as_it_was_written() -> None:
     loaded = load_text(MULTIROTOR.read_text("utf-8"), MULTIROTOR)
     found = optimize(loaded, OptimizeSettings(report=True))
-    entries = optimisation_json(found)["measure_next"]
-    assert {entry["value_text"] for entry in entries} >= {"2 cm", "0.2 deg"}
-    text, page = console(on_choice(found)), Page(render_optimize("html", found)).text
+    entries = found.result.measure_next
+    assert entries is not None
+    assert {entry.value_text for entry in entries} >= {"2 cm", "0.2 deg"}
+    said, page = console(on_choice(found)), Page(render_optimize("html", found)).text
     for entry in entries:
-        for key in ("value", "at"):
-            number, unit = entry[f"{key}_text"].split(" ")
-            assert float(number) * UNITS[unit] == pytest.approx(entry[key], rel=5e-4)
-            assert unit == entry["value_text"].split(" ")[1]
-            assert entry[f"{key}_text"] in page
-            assert entry[f"{key}_text"] in text
+        for value, text in ((entry.value, entry.value_text), (entry.at, entry.at_text)):
+            number, unit = text.split(" ")
+            assert float(number) * UNITS[unit] == pytest.approx(value, rel=5e-4)
+            assert unit == entry.value_text.split(" ")[1]
+            assert text in page
+            assert text in said
     assert "Figure (SI)" not in page
     assert found.hinges is not None
     assert found.hinges.tolerance is not None

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from study_specs import SPEC, STUDY, write
+from syncline_design.machine.records import json_of
 from syncline_design.report.study_rows import columns, study_csv, study_parquet
 from syncline_design.spec.keys import KeyPathError, label, put, resolve, split_key
 from syncline_design.spec.load import BadInput
@@ -136,7 +137,7 @@ def test_every_case_is_what_the_spec_written_out_gives(result: StudyResult, tmp_
             "requirements[ACC-1].limit": limit,
         }
         assert case.verdict == expected["verdict"]
-        assert case.record.design == expected["design"]
+        assert json_of(case.record.design) == expected["design"]
         assert case.record.error_m == (expected["syncline"] or {}).get("total_m")
 
 
@@ -206,7 +207,7 @@ def test_a_catalog_figure_can_vary(tmp_path: Path) -> None:
     first, second = cheap.record.cost, dear.record.cost
     assert first is not None
     assert second is not None
-    picked = cheap.record.design["stages"][0]["roles"]["attitude"]["sensor"]
+    picked = cheap.record.design.stages[0].roles["attitude"].sensor
     assert picked == "sbg_apogee"
     assert second - first == pytest.approx(5000.50, abs=1e-6)
 
@@ -245,7 +246,7 @@ def test_lists_of_candidates_vary_as_a_whole(tmp_path: Path) -> None:
     grid = '"timestamping.candidates": [[hardware], [gpio]]'
     done = run_study(write(tmp_path, f"study: 1\nname: L\nbase: spec.yaml\ngrid: {{{grid}}}\n"))
     methods = [
-        {role["timestamping"] for role in case.record.design["stages"][0]["roles"].values()}
+        {role.timestamping for role in case.record.design.stages[0].roles.values()}
         for case in done.cases()
     ]
     assert methods == [{"hardware"}, {"gpio"}]

@@ -156,8 +156,8 @@ def test_delays_that_a_catalog_entry_takes_from_the_grid_count_too(folder: Path)
         edit(folder / "more" / "slow.txt", (folder / "more" / "slow.txt").read_text()[3:5], text)
         result = run(folder)
         assert result.counts["meets"] == 2
-        stages = [case.record.design["stages"][0] for case in result.cases()]
-        taus.append([stage["roles"]["attitude"]["tau_s"] for stage in stages])
+        stages = [case.record.design.stages[0] for case in result.cases()]
+        taus.append([stage.roles["attitude"].tau_s for stage in stages])
     assert taus == [pytest.approx([7.1e-6, 90e-6]), pytest.approx([7.1e-6, 99e-6])]
 
 

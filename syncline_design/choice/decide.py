@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 
 from syncline_design.choice.acceptable import iter_acceptable, iter_judged, judgement
 from syncline_design.choice.anytime import in_hand, unproven
@@ -69,14 +70,15 @@ def _simulated(problem: Problem, first: Choice, deadline: Deadline) -> Choice | 
             return first
         for design, found in iter_judged(problem, deadline):
             if found.passed:
-                return Choice(design, proof, _before(problem, design, deadline))
+                place = _before(problem, design, deadline)
+                return Choice(design, replace(proof, passed_over=place))
             if left_open is None and not found.failed:
                 place = _before(problem, design, deadline)
-                left_open = Choice(design, proof, place, found.undecided)
+                left_open = Choice(design, replace(proof, passed_over=place), found.undecided)
             tried += 1
     except Unfinished:
-        return Choice(first.design, proof, tried, exhausted=False)
-    return left_open or Infeasible(proof, passed_over=tried)
+        return Choice(first.design, replace(proof, passed_over=tried), exhausted=False)
+    return left_open or Infeasible(replace(proof, passed_over=tried))
 
 
 def _before(problem: Problem, design: Design, deadline: Deadline) -> int:

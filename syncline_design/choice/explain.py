@@ -3,14 +3,21 @@ cannot hold together, and the smallest single changes that help."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from typing import Any, TypeVar
+from dataclasses import replace
+from typing import TypeVar
 
-from syncline_design.choice.fixes import Fix, method_fixes, requirement_fixes, with_requirements
+from syncline_design.choice.fixes import method_fixes, requirement_fixes, with_requirements
 from syncline_design.choice.joint import joint_fixes
-from syncline_design.choice.outcome import NoVerdict
+from syncline_design.choice.outcome import (
+    Conflict,
+    ConflictMember,
+    Explanation,
+    Members,
+    NoVerdict,
+    RoleGap,
+)
 from syncline_design.choice.parts import Part, is_feasible, lifted, parts_of
 from syncline_design.choice.platform_fixes import platform_fixes
 from syncline_design.choice.problem import build_problem
@@ -22,102 +29,35 @@ from syncline_design.spec.case import Case
 Found = TypeVar("Found")
 
 
-@dataclass(frozen=True, slots=True)
-class RoleGap:
-    """A role that no candidate can take; misses_by: tau over the tau it may have at most."""
-
-    stage: str
-    role: str
-    nearest: str | None
-    misses_by: float | None
-    text: str
-
-    def to_json(self) -> dict[str, Any]:
-        """The entry under `roles_without_options`."""
-        return {
-            "stage": self.stage,
-            "role": self.role,
-            "nearest": self.nearest,
-            "misses_by": self.misses_by,
-            "text": self.text,
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class ConflictMember:
-    """A requirement of the conflict; id None and no line: the implied sync limit."""
-
-    kind: str
-    id: str | None
-    line: int | None
-
-    @property
-    def words(self) -> str:
-        """`ACC-1 (line 4)`."""
-        if self.id is None:
-            return "the implied sync requirement"
-        return self.id if self.line is None else f"{self.id} (line {self.line})"
+def _text(found: Explanation, each_suffices: bool) -> Iterator[str]:
+    """each_suffices: whether the spec has a design without any one requirement of the conflict."""
+    yield "No design meets this spec."
+    yield from (f"  {gap.text}" for gap in found.roles_without_options)
+    if found.conflict.requirements:
+        yield f"  {_conflict_text(found.conflict, each_suffices)}"
+    for members in found.further_conflicts:
+        yield f"  Apart from that, {_conflict_text(Conflict(members, True), False)}"
+    if found.fixes:
+        yield "Any one of these changes makes it feasible (each solved again):"
+        yield from (f"  - {fix.text}" for fix in found.fixes)
+    elif not found.cut_short:
+        yield "No single change of a requirement, platform or method was found to help."
+    if found.joint_fixes:
+        yield "Changes that do so together (solved again):"
+        yield from ("  - " + " and ".join(f.text for f in fixes) for fixes in found.joint_fixes)
+    if found.cut_short:
+        which = "further" if found.fixes or found.joint_fixes else "any"
+        yield (
+            f"The time limit ended the search for reasons and remedies: whether {which} change "
+            "would help was not worked out."
+        )
 
 
-@dataclass(frozen=True, slots=True)
-class Explanation:
-    """Why a spec is infeasible.  minimal: proven that any one of the conflict left out helps.
-
-    further: conflicts that remain once the first is lifted; where there are any, no requirement
-    alone can be moved far enough.  joint: changes that help together.  each_suffices: whether the
-    spec has a design without any one requirement of the conflict.  cut_short: the time limit ended
-    the search for reasons and remedies, so what is not there may still exist.
-    """
-
-    gaps: tuple[RoleGap, ...]
-    conflict: tuple[ConflictMember, ...]
-    minimal: bool
-    fixes: tuple[Fix, ...]
-    further: tuple[tuple[ConflictMember, ...], ...] = ()
-    joint: tuple[tuple[Fix, ...], ...] = ()
-    each_suffices: bool = False
-    cut_short: bool = False
-
-    def to_json(self) -> dict[str, Any]:
-        """The value of `infeasibility`."""
-        return {
-            "roles_without_options": [gap.to_json() for gap in self.gaps],
-            "conflict": {"requirements": _members_json(self.conflict), "minimal": self.minimal},
-            "further_conflicts": [_members_json(one) for one in self.further],
-            "fixes": [fix.to_json() for fix in self.fixes],
-            "joint_fixes": [[fix.to_json() for fix in together] for together in self.joint],
-            "cut_short": self.cut_short,
-        }
-
-    def lines(self) -> list[str]:
-        """The explanation as text."""
-        out = ["No design meets this spec."]
-        out += [f"  {gap.text}" for gap in self.gaps]
-        if self.conflict:
-            out.append(f"  {_conflict_text(self.conflict, self.minimal, self.each_suffices)}")
-        out += [f"  Apart from that, {_conflict_text(one, True, False)}" for one in self.further]
-        if self.fixes:
-            out.append("Any one of these changes makes it feasible (each solved again):")
-            out += [f"  - {fix.text}" for fix in self.fixes]
-        elif not self.cut_short:
-            out.append("No single change of a requirement, platform or method was found to help.")
-        if self.joint:
-            out.append("Changes that do so together (solved again):")
-            out += ["  - " + " and ".join(f.text for f in together) for together in self.joint]
-        if self.cut_short:
-            which = "further" if self.fixes or self.joint else "any"
-            out.append(
-                f"The time limit ended the search for reasons and remedies: whether {which} change "
-                "would help was not worked out."
-            )
-        return out
-
-
-def _conflict_text(members: Sequence[ConflictMember], minimal: bool, each_suffices: bool) -> str:
-    names = [member.words for member in members]
+def _conflict_text(conflict: Conflict, each_suffices: bool) -> str:
+    names = [member.words for member in conflict.requirements]
     if len(names) == 1:
         return f"{names[0]} alone cannot be met by any combination of the candidates."
-    if not minimal:
+    if not conflict.minimal:
         return f"{_listed(names)} cannot all hold together (a smaller set was not ruled out)."
     ending = "; without any one of them a design exists" if each_suffices else ""
     return f"{_listed(names)} cannot hold together{ending}."
@@ -125,10 +65,6 @@ def _conflict_text(members: Sequence[ConflictMember], minimal: bool, each_suffic
 
 def _listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-def _members_json(members: Sequence[ConflictMember]) -> list[dict[str, Any]]:
-    return [{"id": m.id, "kind": m.kind, "line": m.line} for m in members]
 
 
 def explain(case: Case, problem: Problem, build: Build = build_problem) -> Explanation:
@@ -148,16 +84,16 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
         joint = joint_fixes(case, problem, build)
     fixes += _proven(lambda: method_fixes(case, build, problem))
     fixes += _proven(lambda: platform_fixes(case, build))
-    return Explanation(
+    each_suffices = _each_suffices(case, problem, build, conflict)
+    found = Explanation(
         gaps,
-        tuple(_member(case, part) for part in conflict),
-        minimal,
+        Conflict(_members(case, conflict), minimal),
+        tuple(_members(case, parts) for parts in further),
         tuple(fixes),
-        tuple(tuple(_member(case, part) for part in parts) for parts in further),
         joint,
-        _each_suffices(case, problem, build, conflict),
         cut_short=in_force().is_over,  # once over, every search after it ended without an answer
     )
+    return replace(found, text=tuple(_text(found, each_suffices)))
 
 
 def _proven(source: Callable[[], Iterable[Found]]) -> list[Found]:
@@ -253,10 +189,14 @@ def _conflict(problem: Problem) -> tuple[tuple[Part, ...], bool]:
     return tuple(active), minimal
 
 
+def _members(case: Case, parts: Iterable[Part]) -> Members:
+    return tuple(_member(case, part) for part in parts)
+
+
 def _member(case: Case, part: Part) -> ConflictMember:
     line = None
     for index, requirement in enumerate(case.spec.requirements):
         if requirement.id == part.id:
             place = case.positions.get(("requirements", index))
             line = place[0] if place else None
-    return ConflictMember(part.kind, part.id, line)
+    return ConflictMember(part.id, part.kind, line)

@@ -7,11 +7,10 @@ made anew, simulation and known effects included, before it is offered.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
-from typing import Any, Literal
 
-from syncline_design.choice.outcome import NoVerdict
+from syncline_design.choice.outcome import Fix, NoVerdict
 from syncline_design.choice.parts import SIMULATED, Part, is_feasible, least, parts_of, solve
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build, with_methods
@@ -20,9 +19,6 @@ from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.spec.case import Case, usable_primitives
 from syncline_design.spec.spec import Requirement
 
-FixKind = Literal[
-    "accuracy", "sync", "cost", "mass", "power", "monte_carlo", "platform", "timestamping"
-]
 MOST_METHODS = 3
 TRIES = 6
 WIDENING = Fraction(1, 100)  # by which a simulated limit is widened when it does not hold yet
@@ -34,39 +30,6 @@ DIMENSIONS = {
     "power": Dimension.POWER,
 }
 UNITS_OF = {"accuracy": "m", "monte_carlo": "m", "sync": "1", "mass": "kg", "power": "W"}
-
-
-@dataclass(frozen=True, slots=True)
-class Fix:
-    """One change that was solved again and does make the spec feasible.
-
-    requirement: id of the requirement it changes, None where it changes something else; figure and
-    stage: of the platform figure that it changes.  before, after: the figure in SI or the spec's
-    currency (None: not a figure), unit: theirs.
-    """
-
-    kind: FixKind
-    requirement: str | None
-    before: float | None
-    after: float | None
-    text: str
-    figure: str | None = None
-    stage: str | None = None
-    unit: str | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """The entry under `fixes`."""
-        return {
-            "kind": self.kind,
-            "requirement": self.requirement,
-            "figure": self.figure,
-            "stage": self.stage,
-            "from": self.before,
-            "to": self.after,
-            "unit": self.unit,
-            "text": self.text,
-            "proven": True,
-        }
 
 
 Move = tuple[Requirement | None, float, Quantity]  # requirement (None: implied), before, after
@@ -166,13 +129,13 @@ def _fix(case: Case, move: Move) -> Fix:
             f"the implied sync limit from {before:.6g} to {after.text}: "
             f"write {{kind: sync, limit: {after.text}}}"
         )
-        return Fix("sync", None, before, float(after), text, unit="1")
+        return Fix("sync", None, None, None, before, float(after), "1", text)
     name, kind = requirement.id, requirement.kind
     written = getattr(requirement.limit, "text", f"{before:.6g}")
     unit = UNITS_OF.get(kind, case.spec.currency)
     if kind != "cost":
         text = f"{name} from {written} to {after.text}"
-        return Fix(kind, name, before, float(after), text, unit=unit)
+        return Fix(kind, name, None, None, before, float(after), unit, text)
     exact = requirement.limit.exact if isinstance(requirement.limit, Quantity) else Fraction(0)
     currency = after.currency or case.spec.currency
     shown = [
@@ -180,7 +143,8 @@ def _fix(case: Case, move: Move) -> Fix:
         for v in (after.exact - exact, exact, after.exact)
     ]
     text = f"{name} by {shown[0]}, from {shown[1]} to {shown[2]}"
-    return Fix(kind, name, before, float(case.spec.in_currency(after)), text, unit=unit)
+    to = float(case.spec.in_currency(after))
+    return Fix(kind, name, None, None, before, to, unit, text)
 
 
 def method_fixes(case: Case, build: Build, problem: Problem) -> Iterator[Fix]:
@@ -203,4 +167,4 @@ def method_fixes(case: Case, build: Build, problem: Problem) -> Iterator[Fix]:
                 found.append((float(best.cost or 0), name))
         for _, name in sorted(found)[:MOST_METHODS]:
             text = f"let {table.role} of {table.stage_name} be stamped by {name}"
-            yield Fix("timestamping", None, None, None, text, stage=table.stage_name)
+            yield Fix("timestamping", None, None, table.stage_name, None, None, None, text)

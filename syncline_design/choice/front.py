@@ -16,20 +16,26 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
 
 from syncline_design.choice.arrays import MARGIN, Tables, tabulate, tie_order, useful_options
-from syncline_design.choice.evaluate import Rank, error_key, evaluate, known_or_more, rank
+from syncline_design.choice.evaluate import (
+    Rank,
+    error_key,
+    evaluate,
+    known_or_more,
+    rank,
+    total_error_m,
+)
 from syncline_design.choice.labels import Labels, concatenate, total_m
 from syncline_design.choice.merge import Ceiling, Merge, lowered
 from syncline_design.choice.narrowed import says_all, stated
-from syncline_design.choice.outcome import Deadline, FrontPoint, TooLarge
+from syncline_design.choice.outcome import Deadline, FrontPoint, PriceStep, TooLarge
 from syncline_design.choice.pareto import Bools, Columns, Floats, Indices, undominated
-from syncline_design.choice.rounded_once import total_errors_m
 from syncline_design.choice.table import ClockOption, Design, Problem, ResourceName, is_empty
 from syncline_design.machine.deadline import in_force, within
 
@@ -58,6 +64,26 @@ def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint
 
         points = accepted_front(priced.problem, resource, points)
     return tuple(replace(point, design=priced.whole(point.design)) for point in points)
+
+
+def staircase(points: Sequence[FrontPoint]) -> tuple[PriceStep, ...]:
+    """What accuracy costs, by falling target, breakpoints exact: one step per point of the front.
+
+    Duals of a mixed-integer program mean nothing; the front is the price list itself.
+    """
+    steps = []
+    before: FrontPoint | None = None
+    for point in points:
+        steps.append(
+            PriceStep(
+                float(point.amount),
+                point.error_m,
+                before.error_m if before else None,
+                float(point.amount - before.amount) if before else None,
+            )
+        )
+        before = point
+    return tuple(steps)
 
 
 def merged_front(
@@ -238,7 +264,7 @@ def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoin
     """Front points of complete designs, by rising amount; errors exact, rounded once."""
     kept = np.flatnonzero(rows)
     designs = _designs(tables, finished, kept)
-    errors = total_errors_m(tables.problem, designs)
+    errors = [total_error_m(tables.problem, design) for design in designs]
     bottom = tables.keys[0].denominator
     amounts = [
         a if math.isinf(a) else Fraction(a, bottom)

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Iterator
 from fractions import Fraction
 
-from syncline_design.choice.fixes import Fix, as_written, proven
-from syncline_design.choice.outcome import NoVerdict
+from syncline_design.choice.fixes import as_written, proven
+from syncline_design.choice.outcome import Fix, NoVerdict
 from syncline_design.choice.parts import Part, is_feasible, least, lifted, moved, parts_of
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build

@@ -10,8 +10,12 @@ from syncline_design.choice.table import Design
 from syncline_design.machine.deadline import Deadline as Deadline
 from syncline_design.machine.deadline import NoVerdict as NoVerdict
 from syncline_design.machine.deadline import OutOfTime as OutOfTime
+from syncline_design.machine.records import Record
 
 Road = Literal["auto", "front", "milp", "enumerate"]
+FixKind = Literal[
+    "accuracy", "sync", "cost", "mass", "power", "monte_carlo", "platform", "timestamping"
+]
 METHODS: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
 # The roads in words, for every text that says how a design was proven best.
 ROADS: dict[str, str] = {
@@ -44,26 +48,28 @@ class FrontPoint:
 
 
 @dataclass(frozen=True, slots=True)
-class Proof:
+class Proof(Record):
     """How a choice was proven.
 
     method: the road.  rechecked: every sum and constraint of the design was recomputed in exact
-    fractions.  agrees_with: further roads that gave the same answer.  gap: of a design that is not
-    proven optimal, the share of its objective that the optimum may lie below it at most.
+    fractions.  gap: of a design that is not proven optimal, the share of its objective that the
+    optimum may lie below it at most.  agrees_with: further roads that gave the same answer.
+    passed_over: how many designs keep every sum, come before this one (or are all there are) and
+    fail in simulation, or are left open by it.
     """
 
     method: str
     optimal: bool
     rechecked: bool
-    agrees_with: tuple[str, ...] = ()
     gap: float | None = None
+    agrees_with: tuple[str, ...] = ()
+    passed_over: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Choice:
     """The best design.
 
-    passed_over: how many better ones by the sums fail in simulation, or are left open by it.
     undecided: ids of simulated requirements that are open for the design itself; then no design
     is known to meet them.  exhausted: False when the search ended before every design was tried;
     the design is then the first by the sums alone.
@@ -71,7 +77,6 @@ class Choice:
 
     design: Design
     proof: Proof
-    passed_over: int = 0
     undecided: tuple[str, ...] = ()
     exhausted: bool = True
 
@@ -85,10 +90,105 @@ class Choice:
 class Infeasible:
     """No design meets every requirement.
 
-    proof: the road that showed it; empty_roles: roles that have no option at all; passed_over: how
-    many designs keep every sum and fail in simulation.
+    proof: the road that showed it; empty_roles: roles that have no option at all.
     """
 
     proof: Proof
     empty_roles: tuple[int, ...] = ()
-    passed_over: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class PriceStep(Record):
+    """One step: `cost` buys every accuracy target from `tightest_m` up to `looser_than_m`.
+
+    looser_than_m: error of the next cheaper point, where that one takes over (None: the cheapest).
+    extra: what this step costs more than the one before it (None: the cheapest).
+    Of a front of mass or power, `cost` and `extra` are amounts of that.
+    """
+
+    cost: float
+    tightest_m: float
+    looser_than_m: float | None
+    extra: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Fix(Record):
+    """One change that was solved again and does make the spec feasible.
+
+    requirement: id of the requirement it changes, None where it changes something else; figure and
+    stage: of the platform figure that it changes.  from_, to: the figure in SI or the spec's
+    currency (None: not a figure), unit: theirs.
+    """
+
+    kind: FixKind
+    requirement: str | None
+    figure: str | None
+    stage: str | None
+    from_: float | None
+    to: float | None
+    unit: str | None
+    text: str
+    proven: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class RoleGap(Record):
+    """A role that no candidate can take; misses_by: tau over the tau it may have at most."""
+
+    stage: str
+    role: str
+    nearest: str | None
+    misses_by: float | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ConflictMember(Record):
+    """A requirement of the conflict; id None and no line: the implied sync limit."""
+
+    id: str | None
+    kind: str
+    line: int | None
+
+    @property
+    def words(self) -> str:
+        """`ACC-1 (line 4)`."""
+        if self.id is None:
+            return "the implied sync requirement"
+        return self.id if self.line is None else f"{self.id} (line {self.line})"
+
+
+Members = tuple[ConflictMember, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Conflict(Record):
+    """Requirements that cannot hold together.  minimal: proven that any one left out helps."""
+
+    requirements: Members
+    minimal: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Explanation(Record):
+    """Why a spec is infeasible: the `infeasibility` of a verdict.
+
+    further_conflicts: those that remain once the first is lifted; where there are any, no
+    requirement alone can be moved far enough.  joint_fixes: changes that help together.  cut_short:
+    the time limit ended the search for reasons and remedies, so what is not there may still exist.
+    text: the whole in words, line by line.
+    """
+
+    roles_without_options: tuple[RoleGap, ...]
+    conflict: Conflict
+    further_conflicts: tuple[Members, ...]
+    fixes: tuple[Fix, ...]
+    joint_fixes: tuple[tuple[Fix, ...], ...]
+    cut_short: bool
+    text: tuple[str, ...] = ()
+
+    @property
+    def conflicts(self) -> tuple[Members, ...]:
+        """The first conflict and those that remain without it."""
+        return (self.conflict.requirements, *self.further_conflicts)

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
 from syncline_design.choice.acceptable import without_simulation
-from syncline_design.choice.fixes import Fix
+from syncline_design.choice.outcome import Fix
 from syncline_design.choice.parts import CLOSE, is_feasible
 from syncline_design.choice.table import Option, Pair, Problem, RoleTable, sync_ratio, with_limits
 from syncline_design.choice.variations import (
@@ -55,8 +55,8 @@ def platform_fixes(case: Case, build: Build) -> Iterator[Fix]:
                 if after is not None:
                     text = f"{words} of {stage.name} from {_shown(before, dimension)}"
                     yield Fix(
-                        "platform", None, float(before), float(after), f"{text} to {after.text}",
-                        figure, stage.name, UNITS_OF[figure],
+                        "platform", None, figure, stage.name, float(before), float(after),
+                        UNITS_OF[figure], f"{text} to {after.text}",
                     )  # fmt: skip
 
 

@@ -11,7 +11,6 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from typing import Any
 
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.decide import choose
@@ -30,6 +29,7 @@ from syncline_design.choice.variations import (
     with_platform_figure,
 )
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.records import Record
 from syncline_design.spec.case import Case
 
 # Values tried, over the term's own: from a nudge that only settles ties to a million times.
@@ -41,7 +41,7 @@ SIMULATED_CLOSE = 1e-2  # simulation tells values apart no better at a bearable 
 
 
 @dataclass(frozen=True, slots=True)
-class Slack:
+class Slack(Record):
     """One term: its value, and the values at which verdict and payload change.
 
     None: not up to searched_to (None: no value was left out).  limited_by: kind of the requirement
@@ -58,20 +58,6 @@ class Slack:
     payload_changes_at: float | None
     searched_to: float | None = None
     never: tuple[str, ...] = ()
-
-    def to_json(self) -> dict[str, Any]:
-        """The entry under `slack`."""
-        return {
-            "term": self.term,
-            "stage": self.stage,
-            "value": self.value,
-            "unit": self.unit,
-            "fails_at": self.fails_at,
-            "limited_by": self.limited_by,
-            "payload_changes_at": self.payload_changes_at,
-            "searched_to": self.searched_to,
-            "never": list(self.never),
-        }
 
 
 def slack_ledger(

@@ -13,7 +13,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Literal
+from typing import Literal
 
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.decide import choose
@@ -29,6 +29,7 @@ from syncline_design.choice.variations import (
     sigma_figures,
     with_figure,
 )
+from syncline_design.machine.records import Record
 from syncline_design.model.quantity import format_like
 from syncline_design.spec.case import Case
 from syncline_design.spec.selection import RoleSelection
@@ -38,33 +39,24 @@ ASSUMED_SPREAD = Fraction(1, 5)  # where a datasheet gives no tolerance, for `me
 
 
 @dataclass(frozen=True, slots=True)
-class ToleranceVerdict:
+class ToleranceVerdict(Record):
     """Whether a design passes for every, some or no value within the datasheet tolerances.
 
     deciding: the figures that decide; alone: the first of them settles it once it is known to be
     nominal, otherwise they decide together, the widest first.
     """
 
-    word: HowOften
+    passes: HowOften
     figures: tuple[str, ...]
     deciding: tuple[str, ...]
     alone: bool
-
-    def to_json(self) -> dict[str, Any]:
-        """The value of `tolerances`."""
-        return {
-            "passes": self.word,
-            "figures": list(self.figures),
-            "deciding": list(self.deciding),
-            "alone": self.alone,
-        }
 
     @property
     def text(self) -> str:
         """One sentence."""
         if not self.figures:
             return "No datasheet figure of this design carries a tolerance."
-        out = f"Within the datasheet tolerances the design {self.word} passes"
+        out = f"Within the datasheet tolerances the design {self.passes} passes"
         if not self.deciding:
             return out + "."
         names = ", ".join(self.deciding)
@@ -178,34 +170,21 @@ def _span(
 
 
 @dataclass(frozen=True, slots=True)
-class Measurement:
+class Measurement(Record):
     """A datasheet figure that alone changes the choice when it lies at one end of its range.
 
     value and at are in SI; value_text is the figure as written, at_text the other end in its unit.
-    assumed: the datasheet gives no tolerance and 20 % to either side was tried.
+    assumed_tolerance: the datasheet gives no tolerance and 20 % to either side was tried.
     """
 
     figure: str
     value: float
     at: float
-    assumed: bool
-    becomes: str
-    objective_change: float | None
     value_text: str
     at_text: str
-
-    def to_json(self) -> dict[str, Any]:
-        """The entry under `measure_next`."""
-        return {
-            "figure": self.figure,
-            "value": self.value,
-            "at": self.at,
-            "value_text": self.value_text,
-            "at_text": self.at_text,
-            "assumed_tolerance": self.assumed,
-            "becomes": self.becomes,
-            "objective_change": self.objective_change,
-        }
+    assumed_tolerance: bool
+    becomes: str
+    objective_change: float | None
 
 
 def measure_next(
@@ -269,8 +248,8 @@ def _measurement(
 ) -> Measurement:
     value = figure.quantity
     return Measurement(
-        figure.name, float(value), end, assumed, becomes, change, value.text,
-        format_like(value.text, end),
+        figure.name, float(value), end, value.text, format_like(value.text, end), assumed, becomes,
+        change,
     )  # fmt: skip
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -29,6 +29,9 @@ from syncline_design.cli.shared import (
     watched,
 )
 from syncline_design.machine.streams import say
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.optimise import Optimised
 
 
 @guarded
@@ -119,10 +122,10 @@ def optimize(
         if write_design is not None:
             _refuse_elsewhere(write_design, case.spec.catalogs)
         found = optimize(case, settings)
-    if write_design is not None and found.exit_code == 0:
+    if write_design is not None and found.result.exit_code == 0:
         _write_design(found, write_design)
     emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet)
-    return found.exit_code
+    return found.result.exit_code
 
 
 def _refuse_elsewhere(path: Path, catalogs: Sequence[str]) -> None:
@@ -135,7 +138,7 @@ def _refuse_elsewhere(path: Path, catalogs: Sequence[str]) -> None:
             )
 
 
-def _write_design(found: Any, path: Path) -> None:
+def _write_design(found: Optimised, path: Path) -> None:
     from syncline_design.spec.edit import write_spec
     from syncline_design.verdict.optimise import pinned_text
 

@@ -53,6 +53,7 @@ def schema(
             "study",
             "diagnosis",
             "difference",
+            "optimisation",
             "reproduction",
             "simulation",
             "study-result",

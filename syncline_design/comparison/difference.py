@@ -158,9 +158,8 @@ Amount = tuple[float | None, str]  # with its unit
 
 
 def _sums(verdict: Verdict) -> dict[str, Amount]:
-    design = verdict.design or dict.fromkeys(("cost", "mass", "power"))
     units = {"cost": verdict.spec.currency, "mass": "kg", "power": "W"}
-    return {name: (design[name], unit) for name, unit in units.items()}
+    return {name: (getattr(verdict.design, name, None), unit) for name, unit in units.items()}
 
 
 def _total(verdict: Verdict) -> float | None:
@@ -185,11 +184,8 @@ def _payload(old: Verdict, new: Verdict) -> Iterator[RoleChange]:
 
 def _picks(verdict: Verdict) -> dict[str, Pick]:
     return {
-        f"{stage['name']}.{role}": Pick(
-            entry["sensor"], entry["name"], entry["primitive"], entry["timestamping"]
-        )
-        for stage in (verdict.design["stages"] if verdict.design is not None else ())
-        for role, entry in stage["roles"].items()
+        f"{stage.name}.{role}": Pick(one.sensor, one.name, one.primitive, one.timestamping)
+        for stage, role, one in (verdict.design.roles if verdict.design is not None else ())
     }
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
-from typing import Any
 
 from syncline_design.choice.effect_tables import NoBudget
+from syncline_design.choice.outcome import Explanation
 from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.records import Record, optional
@@ -17,7 +17,14 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice
 from syncline_design.verdict.optimise import pinned_case
-from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
+from syncline_design.verdict.tree import (
+    MissionHorizon,
+    NamedDesign,
+    RequirementResult,
+    Verdict,
+    Word,
+    finite,
+)
 from syncline_design.verdict.verified import frame
 from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
 
@@ -63,8 +70,8 @@ class Summary(Record):
 
     verdict: Word
     requirements: tuple[RequirementResult, ...]
-    design: Mapping[str, Any] | None
-    infeasibility: Mapping[str, Any] | None = optional()
+    design: NamedDesign | None
+    infeasibility: Explanation | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +249,7 @@ def _figure(value: float, unit: str) -> str:
 def _payload_lines(before: Verdict, after: Verdict) -> Iterator[str]:
     """Which candidates meet the requirements now."""
     if after.infeasibility is not None:
-        yield from after.infeasibility["text"]
+        yield from after.infeasibility.text
         return
     old, new = _payload(before), _payload(after)
     changes = [f"{role}: {old[role]} -> {new[role]}" for role in new if old.get(role) != new[role]]
@@ -253,16 +260,16 @@ def _payload_lines(before: Verdict, after: Verdict) -> Iterator[str]:
     yield from (f"  {change}" for change in changes)
     if before.design is None or after.design is None:
         return
-    costs = [verdict["cost"] for verdict in (before.design, after.design)]
-    if None not in costs:
-        currency = after.design["currency"]
-        change = format_quantity(abs(costs[1] - costs[0]), Dimension.MONEY, currency=currency)
-        yield f"  {change} {'more' if costs[1] >= costs[0] else 'less'}"
+    old_cost, new_cost, currency = before.design.cost, after.design.cost, after.design.currency
+    if old_cost is not None and new_cost is not None:
+        change = format_quantity(abs(new_cost - old_cost), Dimension.MONEY, currency=currency)
+        yield f"  {change} {'more' if new_cost >= old_cost else 'less'}"
 
 
 def _payload(verdict: Verdict) -> dict[str, str]:
+    if verdict.design is None:
+        return {}
     return {
-        f"{stage['name']} {role}": f"{entry['sensor']} by {entry['timestamping']}"
-        for stage in (verdict.design or {"stages": []})["stages"]
-        for role, entry in stage["roles"].items()
+        f"{stage.name} {role}": f"{taken.sensor} by {taken.timestamping}"
+        for stage, role, taken in verdict.design.roles
     }

@@ -10,15 +10,15 @@ from fractions import Fraction
 from syncline_design.choice.evaluate import chosen_clocks, chosen_options, evaluate
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem, ResourceName
-from syncline_design.verdict.optimise import Optimisation
+from syncline_design.verdict.optimise import Optimised
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
-def optimisation_csv(found: Optimisation) -> str:
+def optimisation_csv(found: Optimised) -> str:
     """The front with --pareto, else the designs."""
     if found.settings.pareto:
-        return front_csv(found.problem, found.front, found.settings.resource)
+        return front_csv(found.problem, found.points, found.settings.resource)
     return designs_csv(found.problem, found.designs)
 
 

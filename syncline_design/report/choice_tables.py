@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.verdict_tables import currency_of
-from syncline_design.report.verdict_words import Json, items, named
+from syncline_design.report.verdict_words import Json, items, named, plain
 from syncline_design.report.words import PRIMITIVES
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def staircase(verdict: Verdict) -> Table | None:
 
 def is_chosen(verdict: Verdict, entry: Json) -> bool:
     """Whether a point of the front is the chosen design: same price, same error."""
-    cost = (verdict.design or {}).get("cost")
+    cost = plain(verdict.design).get("cost")
     error = numbers.finite(entry.get("error_m"))
     if cost is None or verdict.syncline is None or error is None or entry.get("cost") != cost:
         return False

@@ -15,6 +15,7 @@ from syncline_design.report.verdict_words import (
     obstacle_sentence,
     outcome,
     part,
+    plain,
     requirement_name,
     waiver_text,
 )
@@ -91,7 +92,7 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
 
 def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:
     """Ids of the conflict that a requirement is part of; empty where it is in none."""
-    why = verdict.infeasibility or {}
+    why = plain(verdict.infeasibility)
     further = why.get("further_conflicts") or ()
     for members in (items(part(why, "conflict"), "requirements"), *further):
         ids = [requirement_name(entry) for entry in members]
@@ -111,7 +112,7 @@ def _fixes(verdict: Verdict) -> str:
     if texts:
         lead = "This" if len(texts) == 1 else "Any one of these"
         return f" {lead} would do: {'; '.join(texts)}."
-    joint = (verdict.infeasibility or {}).get("joint_fixes")
+    joint = plain(verdict.infeasibility).get("joint_fixes")
     sets = [" and ".join(str(f.get("text")) for f in fixes) for fixes in joint or ()]
     return f" Together these would do: {'; or '.join(sets)}." if sets else ""
 

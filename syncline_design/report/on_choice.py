@@ -7,8 +7,7 @@ from fractions import Fraction
 
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.evaluate import chosen_options, evaluate
-from syncline_design.choice.outcome import ROADS, FrontPoint
-from syncline_design.choice.prices import PriceStep
+from syncline_design.choice.outcome import ROADS, FrontPoint, PriceStep
 from syncline_design.choice.slack import Slack
 from syncline_design.choice.table import Design, Problem, ResourceName
 from syncline_design.report import numbers
@@ -24,18 +23,12 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
-from syncline_design.verdict.choice_data import left_out, left_out_text
-from syncline_design.verdict.open_choice import Picked
-from syncline_design.verdict.optimise import (
-    Hinges,
-    Optimisation,
-    incomplete_lines,
-    problem_size,
-    unfinished_line,
-)
+from syncline_design.verdict.acceptance import MOST_SIMULATED
+from syncline_design.verdict.choice_data import left_out_text
+from syncline_design.verdict.optimise import Optimisation, Optimised
 
 
-def on_choice(found: Optimisation) -> Document:
+def on_choice(found: Optimised) -> Document:
     """The best designs of a spec as a document, or why there is none."""
     designs = designs_table(found.problem, found.designs, found.case.spec.currency)
     return Document(
@@ -45,11 +38,11 @@ def on_choice(found: Optimisation) -> Document:
         sentences=tuple(_sentences(found)),
         facts=(),
         sections=(
-            *_why_not(found),
+            *_why_not(found.result),
             *section("designs", "Best designs", show(designs, silent=True)),
             *_front(found),
-            *section("hinges", "What it hinges on", hinges_nodes(found.hinges)),
-            *section("incomplete", "Not complete", _items(incomplete_lines(found))),
+            *section("hinges", "What it hinges on", hinges_nodes(found.result)),
+            *section("incomplete", "Not complete", _items(incomplete_lines(found.result))),
         ),
         source=str(found.case.path),
     )
@@ -59,27 +52,24 @@ def _items(lines: Sequence[str]) -> list[Node]:
     return [Items(tuple(lines))] if lines else []
 
 
-def _outcome(found: Optimisation) -> Outcome:
-    if found.explanation is not None:
-        return OUTCOMES["infeasible"]
-    if found.exit_code != 0 or found.picked is None:
-        return OUTCOMES["indeterminate"]
+def _outcome(found: Optimised) -> Outcome:
+    if found.result.verdict != "meets":
+        return OUTCOMES[found.result.verdict]
     objective = found.case.spec.objective
     best = OBJECTIVES.get(objective, objective)
-    how = "proven" if found.picked.choice.proof.optimal else "not proven optimal"
+    how = "proven" if found.result.proof.optimal else "not proven optimal"
     return Outcome("good", "\u2713", f"Design of {best}, {how}")
 
 
-def _sentences(found: Optimisation) -> list[str]:
+def _sentences(found: Optimised) -> list[str]:
     """How it is known, or why it is not."""
-    if found.unfinished:
-        return [unfinished_line(found)]
-    return [_proof(found, found.picked)] if found.picked is not None and found.designs else []
+    if found.result.message is not None:
+        return [found.result.message]
+    return [_proof(found.result, found.case.spec.objective)] if found.designs else []
 
 
-def _proof(found: Optimisation, picked: Picked) -> str:
-    proof, size = picked.choice.proof, problem_size(found.problem)
-    objective = found.case.spec.objective
+def _proof(result: Optimisation, objective: str) -> str:
+    proof, size = result.proof, _size(result.combinations or "")
     if not proof.optimal:
         gap = "" if proof.gap is None else f": the optimum is at most {100 * proof.gap:.3g} % lower"
         return (
@@ -88,7 +78,7 @@ def _proof(found: Optimisation, picked: Picked) -> str:
         )
     confirmed = " and ".join(ROADS.get(road, road) for road in proof.agrees_with)
     others = f", confirmed by {confirmed}" if confirmed else ""
-    passed = picked.passed_over
+    passed = proof.passed_over
     skipped = f"; {passed} better ones fail the Monte Carlo requirements" if passed else ""
     return (
         f"Best of {size} combinations by {objective}: proven by "
@@ -96,12 +86,30 @@ def _proof(found: Optimisation, picked: Picked) -> str:
     )
 
 
-def _why_not(found: Optimisation) -> list[Section]:
+def _size(combinations: str) -> str:
+    """How many combinations there are: plain up to a million, then as a power."""
+    return combinations if len(combinations) < 7 else f"{int(combinations):.2e}"
+
+
+def incomplete_lines(result: Optimisation) -> list[str]:
+    """Which parts lack designs: by the time limit, or because simulation is bounded."""
+    lines = []
+    if result.cut_short and result.message is None:
+        lines.append(f"The time limit ended this too early: {', '.join(result.cut_short)}.")
+    if result.gave_up:
+        lines.append(
+            f"After {MOST_SIMULATED} simulated designs the search gave up; not complete: "
+            f"{', '.join(result.gave_up)}."
+        )
+    return lines
+
+
+def _why_not(result: Optimisation) -> list[Section]:
     """The explanation's own lines: those with a dash are a list."""
-    if found.explanation is None:
+    if result.infeasibility is None:
         return []
     nodes: list[Node] = []
-    for line in found.explanation.lines()[1:]:
+    for line in result.infeasibility.text[1:]:
         text = line.strip()
         nodes.append(Items((text[2:],)) if text.startswith("- ") else Text(text))
     return section("infeasibility", "Why no design meets the requirements", nodes)
@@ -151,16 +159,15 @@ def _open_text(requirements: Sequence[str]) -> str:
     return f"{', '.join(requirements)} undecided" if requirements else ""
 
 
-def _front(found: Optimisation) -> list[Section]:
+def _front(found: Optimised) -> list[Section]:
     """The exact front and what each accuracy costs on it."""
     resource, currency = found.settings.resource, found.case.spec.currency
     nodes: list[Node] = []
-    if found.front:
-        nodes += show(front_table(found.problem, found.front, resource, currency), silent=True)
-        nodes += show(staircase_table(found.prices, currency, resource))
-    if found.settings.pareto and found.picked is not None:
-        missing = left_out(found.case, found.problem, resource)
-        nodes += [Text(left_out_text(missing, resource))] if missing else []
+    if found.points:
+        nodes += show(front_table(found.problem, found.points, resource, currency), silent=True)
+        nodes += show(staircase_table(found.result.staircase or (), currency, resource))
+    if found.result.front_left_out:
+        nodes.append(Text(left_out_text(found.result.front_left_out, resource)))
     return section("front", f"Exact front of {resource} against error, all else met", nodes)
 
 
@@ -190,19 +197,17 @@ def staircase_table(steps: Sequence[PriceStep], currency: str, resource: Resourc
         more = Cell("") if step.extra is None else amount_cell(step.extra, resource, currency)
         rows.append([
             Cell(f"{numbers.target(step.tightest_m)} {upto}", step.tightest_m),
-            amount_cell(step.amount, resource, currency), more,
+            amount_cell(step.cost, resource, currency), more,
         ])  # fmt: skip
     heads = ("Accuracy target #", f"{resource.capitalize()} #", "More than the step before #")
     return table("What accuracy costs", heads, rows)
 
 
-def hinges_nodes(hinges: Hinges | None) -> list[Node]:
+def hinges_nodes(hinges: Optimisation) -> list[Node]:
     """Slack of every figure, tolerances, what to measure next."""
-    if hinges is None:
-        return []
     nodes = [] if hinges.slack is None else show(slack_table(hinges.slack))
-    if hinges.tolerance is not None:
-        nodes.append(Text(hinges.tolerance.text))
+    if hinges.tolerances is not None:
+        nodes.append(Text(hinges.tolerances.text))
     if hinges.measure_next is None:
         return nodes
     if not hinges.measure_next:
@@ -210,7 +215,7 @@ def hinges_nodes(hinges: Hinges | None) -> list[Node]:
         return [*nodes, Text(words)]
     rows = [
         (one.figure, one.value_text, one.at_text,
-         "20 % assumed" if one.assumed else "datasheet tolerance", one.becomes)
+         "20 % assumed" if one.assumed_tolerance else "datasheet tolerance", one.becomes)
         for one in hinges.measure_next
     ]  # fmt: skip
     heads = ("Figure", "Now", "Flips at", "Range", "The choice becomes")

@@ -42,7 +42,7 @@ from syncline_design.report.simulated import (
     simulation_facts,
 )
 from syncline_design.report.table import Table
-from syncline_design.report.verdict_words import Json, items, part
+from syncline_design.report.verdict_words import Json, items, part, plain
 
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import Checked, Refused, Verdict
@@ -100,7 +100,7 @@ def _on_refused(refused: Refused) -> Document:
 
 def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     """Price, error, tightest margin: the answer in figures."""
-    design = verdict.design or {}
+    design = plain(verdict.design)
     facts = []
     if design.get("cost") is not None:
         currency = verdict_tables.currency_of(verdict)
@@ -132,7 +132,7 @@ def problems(refused: Refused) -> list[Node]:
 
 
 def _why_not(verdict: Verdict) -> list[Node]:
-    why = verdict.infeasibility
+    why = plain(verdict.infeasibility)
     if not why:
         return []
     told = [str(line).strip() for line in why.get("text") or ()]

@@ -2,34 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from syncline_design.report.choice_csv import optimisation_csv
 from syncline_design.report.document import Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
-from syncline_design.verdict.optimise import (
-    Optimisation,
-    incomplete_lines,
-    optimisation_json,
-)
+from syncline_design.verdict.optimise import Optimised
 
 
-def render_optimize(name: str, found: Optimisation) -> str:
+def render_optimize(name: str, found: Optimised) -> str:
     """The text of one format; html is the design report with all that the choice hinges on."""
     if name == "csv":
         return optimisation_csv(found)
     if name == "json":
         from syncline_design.report.json_out import json_text
 
-        return json_text(optimisation_json(found))
-    from syncline_design.report.on_choice import hinges_nodes
+        return json_text(found.result.to_json())
+    from syncline_design.report.on_choice import hinges_nodes, incomplete_lines
     from syncline_design.report.on_verdict import on_verdict
     from syncline_design.report.render_html import html
 
     assert found.verdict is not None
-    told = optimisation_json(found)
-    choice = dict(found.verdict.choice or {})
-    choice |= {"staircase": told["staircase"]} if told.get("staircase") else {}
-    more: list[Node] = [Text((strong(line),)) for line in incomplete_lines(found)]
-    more += hinges_nodes(found.hinges)
-    return html(on_verdict(replace(found.verdict, choice=choice), more))
+    more: list[Node] = [Text((strong(line),)) for line in incomplete_lines(found.result)]
+    return html(on_verdict(found.verdict, [*more, *hinges_nodes(found.result)]))

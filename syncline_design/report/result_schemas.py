@@ -12,14 +12,22 @@ from syncline_design.paper import reproduce
 from syncline_design.report import study_data
 from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
+from syncline_design.verdict import optimise
 from syncline_design.verdict import tree as verdict
 
 ResultName = Literal[
-    "diagnosis", "difference", "reproduction", "simulation", "study-result", "verdict"
+    "diagnosis",
+    "difference",
+    "optimisation",
+    "reproduction",
+    "simulation",
+    "study-result",
+    "verdict",
 ]
 _RESULTS: Final[Mapping[ResultName, tuple[type[Record], str]]] = {
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
+    "optimisation": (optimise.Optimisation, optimise.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),
     "study-result": (study_data.StudyData, study_data.SCHEMA),

@@ -94,7 +94,7 @@ def row(case: CaseResult, units: Mapping[str, str | None]) -> Row:
 
 def _figures(record: CaseRecord) -> tuple[float | None, ...]:
     design, syncline = record.design, record.syncline
-    sums = (None,) * 3 if design is None else (design["cost"], design["mass"], design["power"])
+    sums = (None,) * 3 if design is None else (design.cost, design.mass, design.power)
     if syncline is None:
         return (*sums, None, None, None, None, None)
     return (
@@ -110,10 +110,10 @@ def reason(case: CaseResult) -> str:
         return record.reason
     if record.problems:
         return "; ".join(f"{problem.path}: {problem.message}" for problem in record.problems)
-    if record.verdict != "infeasible":
+    why = record.infeasibility
+    if why is None:
         return ""
-    why = record.infeasibility or {}
-    fixes = [fix["text"] for fix in why["fixes"]]
+    fixes = [fix.text for fix in why.fixes]
     would = f" Either would do: {'; '.join(fixes)}." if fixes else ""
     return obstacle_sentence(why) + would
 

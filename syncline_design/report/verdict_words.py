@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from syncline_design.choice.outcome import Explanation
+from syncline_design.machine.records import Record
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
 from syncline_design.report.text import sentence_list, visible
@@ -25,19 +27,24 @@ if TYPE_CHECKING:
 Json = Mapping[str, Any]
 
 
-def part(source: Json | None, key: str) -> Json:
+def plain(source: Record | Json | None) -> Json:
+    """A part of a verdict as plain data; of what is missing, nothing."""
+    return source.to_json() if isinstance(source, Record) else source or {}
+
+
+def part(source: Record | Json | None, key: str) -> Json:
     """A nested mapping, empty when missing or null."""
-    value = None if source is None else source.get(key)
+    value = plain(source).get(key)
     return value if isinstance(value, Mapping) else {}
 
 
-def items(source: Json | None, key: str) -> list[Json]:
+def items(source: Record | Json | None, key: str) -> list[Json]:
     """A nested list of mappings, empty when missing or null."""
-    value = None if source is None else source.get(key)
+    value = plain(source).get(key)
     return [entry for entry in value or [] if isinstance(entry, Mapping)]
 
 
-def named(source: Json | None, key: str) -> list[tuple[str, Json]]:
+def named(source: Record | Json | None, key: str) -> list[tuple[str, Json]]:
     """The entries of a nested mapping that are mappings themselves, with their names."""
     return [
         (str(name), entry)
@@ -151,7 +158,7 @@ def requirement_name(entry: Json) -> str:
     return str(entry.get("id") or "the implied sync requirement")
 
 
-def obstacle_sentence(infeasibility: Json | None) -> str:
+def obstacle_sentence(infeasibility: Explanation | None) -> str:
     """What stands in the way of a design, in one sentence."""
     members = items(part(infeasibility, "conflict"), "requirements")
     conflict = [requirement_name(member) for member in members]

@@ -21,7 +21,7 @@ from syncline_design.spec.yaml_text import Flaw
 from syncline_design.studies.inputs import canonical, inputs_of
 from syncline_design.studies.loading import Base, Study
 from syncline_design.studies.record import SCHEMA, CaseFigures, CaseRecord, FrontPoint, lost
-from syncline_design.verdict.tree import FileProblem, SynclineFigures, Verdict
+from syncline_design.verdict.tree import ChoiceResult, FileProblem, SynclineFigures, Verdict
 
 # Layers that a check cannot import: they show its results.
 ABOVE_CHECKS = ("__main__.py", "cli", "comparison", "diagnosis", "logs", "paper", "report")
@@ -167,16 +167,18 @@ def _problem(problem: Flaw) -> FileProblem:
 
 def _record(verdict: Verdict, left_out: tuple[str, ...]) -> CaseRecord:
     """What a study keeps of a verdict."""
-    choice = verdict.choice or {}
+    choice = verdict.choice or ChoiceResult()
     return CaseRecord(
         verdict=verdict.verdict,
         requirements=verdict.requirements,
         design=verdict.design,
         syncline=None if verdict.syncline is None else _figures(verdict.syncline),
-        front=tuple(FrontPoint(p["cost"], p["error_m"]) for p in choice.get("front", ())),
+        front=tuple(
+            FrontPoint(p.cost, p.error_m) for p in choice.front or () if p.cost is not None
+        ),
         infeasibility=verdict.infeasibility,
         not_simulated=left_out,
-        provisional=choice.get("proof", {}).get("optimal") is False,
+        provisional=choice.proof is not None and not choice.proof.optimal,
     )
 
 

@@ -5,13 +5,14 @@ All that the tables and findings of a study need of a verdict, no more.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
+from syncline_design.choice.outcome import Explanation
 from syncline_design.machine.records import Record
 from syncline_design.studies.inputs import Inputs
-from syncline_design.verdict.tree import FileProblem, RequirementResult
+from syncline_design.verdict.tree import FileProblem, NamedDesign, RequirementResult
 
 SCHEMA = "syncline-design/study-case/v1"
 CaseWord = Literal["meets", "fails", "infeasible", "refused", "indeterminate"]
@@ -60,10 +61,10 @@ class CaseRecord(Record):
 
     verdict: CaseWord
     requirements: tuple[RequirementResult, ...] = ()
-    design: Mapping[str, Any] | None = None
+    design: NamedDesign | None = None
     syncline: CaseFigures | None = None
     front: tuple[FrontPoint, ...] = ()
-    infeasibility: Mapping[str, Any] | None = None
+    infeasibility: Explanation | None = None
     not_simulated: tuple[str, ...] = ()
     problems: tuple[FileProblem, ...] = ()
     reason: str = ""
@@ -85,7 +86,7 @@ class CaseRecord(Record):
     @property
     def cost(self) -> float | None:
         """Of the design; None where there is none, or where its price is unknown."""
-        return None if self.design is None else self.design["cost"]
+        return None if self.design is None else self.design.cost
 
     @property
     def error_m(self) -> float | None:
@@ -95,11 +96,10 @@ class CaseRecord(Record):
     @property
     def picks(self) -> Iterator[Pick]:
         """What fills the roles of the case's design."""
-        for stage in self.design["stages"] if self.design is not None else ():
-            for role, entry in stage["roles"].items():
-                stamping = f"{entry['timestamping']} ({entry['primitive']})"
-                sensor = str(entry["sensor"])
-                yield Pick(f"{stage['name']}.{role}", sensor, entry["name"] or sensor, stamping)
+        for stage, role, taken in self.design.roles if self.design is not None else ():
+            stamping = f"{taken.timestamping} ({taken.primitive})"
+            name = taken.name or taken.sensor
+            yield Pick(f"{stage.name}.{role}", taken.sensor, name, stamping)
 
 
 def lost(reason: str) -> CaseRecord:

@@ -63,7 +63,7 @@ class StudyResult:
         """One case by its index, from 0."""
         place, settings = self.study.case(index)
         base, record = self.study.bases[place], self._record(index)
-        currency = base.currency if record.design is None else record.design["currency"]
+        currency = base.currency if record.design is None else record.design.currency
         return CaseResult(index + 1, place, str(base.path), base.name, currency, settings, record)
 
     def _record(self, index: int) -> CaseRecord:

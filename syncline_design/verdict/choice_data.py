@@ -3,33 +3,43 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
+from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem, ResourceName
 from syncline_design.machine.deadline import Pieces
-from syncline_design.machine.records import Json
 from syncline_design.spec.case import Case
 from syncline_design.spec.references import parts_in_use
-from syncline_design.verdict.design_data import design_json
-from syncline_design.verdict.open_choice import Picked
-from syncline_design.verdict.tree import finite
+from syncline_design.verdict.design_data import named_design
+from syncline_design.verdict.tree import (
+    ChoiceResult,
+    Exclusion,
+    Figure,
+    FrontDesign,
+    NamedDesign,
+    RankedDesign,
+    finite,
+)
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.open_choice import Picked
 
 NEXT_BEST = 5
 MOST_EXCLUDED = 1000  # rows of `excluded` in a verdict
 
 
-def choice_json(
+def choice_of(
     case: Case,
     problem: Problem,
     picked: Picked,
     pieces: Pieces | None = None,
     points: Sequence[FrontPoint] | None = None,
-) -> Json:
-    """The `choice` key of a verdict; the front is of cost against error where costs are known."""
+) -> ChoiceResult:
+    """What was chosen among what; points: the front of cost, where it is known."""
     from syncline_design.choice.decide import best
-    from syncline_design.choice.front import front
-    from syncline_design.choice.prices import staircase
+    from syncline_design.choice.front import front, staircase
 
     assert picked.verified is not None
     chosen = picked.verified.design
@@ -43,88 +53,69 @@ def choice_json(
         points = pieces.made("front", lambda: front(problem), nothing)
     following = pieces.listed("next best designs", lambda: others(every=False))
     ranked = pieces.listed("next best of every design", lambda: others(every=True))
-    return {
-        "proof": proof_json(picked),
-        "front": front_json(case, problem, points),
-        "front_left_out": left_out(case, problem, "cost"),
-        "staircase": [step.to_json() for step in staircase([p for p in points if not p.undecided])],
-        "next_best": designs_json(case, problem, following[:NEXT_BEST]),
-        "next_best_every": designs_json(case, problem, ranked[:NEXT_BEST]),
-        **excluded_json(problem),
-    }
+    excluded, count = ruled_out(problem)
+    return ChoiceResult(
+        picked.choice.proof,
+        front_designs(case, problem, points),
+        left_out(case, problem, "cost"),
+        staircase([p for p in points if not p.undecided]),
+        ranked_designs(case, problem, following[:NEXT_BEST]),
+        ranked_designs(case, problem, ranked[:NEXT_BEST]),
+        excluded,
+        count,
+    )
 
 
-def proof_json(picked: Picked) -> Json:
-    """How the choice was proven."""
-    proof = picked.choice.proof
-    return {
-        "method": proof.method,
-        "optimal": proof.optimal,
-        "rechecked": proof.rechecked,
-        "gap": proof.gap,
-        "agrees_with": list(proof.agrees_with),
-        "passed_over": picked.passed_over,
-    }
+def without_choice(problem: Problem) -> ChoiceResult:
+    """Where there was nothing to choose, or no design to be had: what was ruled out."""
+    excluded, count = ruled_out(problem)
+    return ChoiceResult(excluded=excluded, excluded_count=count)
 
 
-def unproven_json(method: str) -> Json:
-    """The proof of a search that ended before it found any design."""
-    return {
-        "method": method,
-        "optimal": False,
-        "rechecked": False,
-        "gap": None,
-        "agrees_with": [],
-        "passed_over": 0,
-    }
-
-
-def front_json(
+def front_designs(
     case: Case,
     problem: Problem,
     points: Iterable[FrontPoint],
-    resource: str = "cost",
-) -> list[Json]:
+    resource: ResourceName = "cost",
+) -> tuple[FrontDesign, ...]:
     """The points of a front with their designs, by rising amount of the resource."""
-    return [
-        {
-            resource: float(point.amount),
-            "error_m": point.error_m,
-            "design": full_design(case, problem, point.design),
-        }
-        | _undecided(problem, point.design)
+    return tuple(
+        FrontDesign(
+            **{resource: float(point.amount)},
+            error_m=point.error_m,
+            design=full_design(case, problem, point.design),
+            undecided=_undecided(problem, point.design),
+        )
         for point in points
-    ]
+    )
 
 
-def designs_json(case: Case, problem: Problem, designs: Iterable[Design]) -> list[Json]:
+def full_design(case: Case, problem: Problem, design: Design) -> NamedDesign:
+    """A design in names, with its own errors."""
+    return named_design(case, problem, design, design_budget(case, problem, design))
+
+
+def ranked_designs(
+    case: Case, problem: Problem, designs: Iterable[Design]
+) -> tuple[RankedDesign, ...]:
     """Designs with what they cost and reach, in the order given."""
-    return [_with_error(case, problem, design) for design in designs]
+    return tuple(_ranked(case, problem, design) for design in designs)
 
 
-def full_design(case: Case, problem: Problem, design: Design) -> Json:
-    """A design as the `design` key writes it."""
+def _ranked(case: Case, problem: Problem, design: Design) -> RankedDesign:
     figures = design_budget(case, problem, design)
-    return design_json(case, problem, design, figures)
-
-
-def _with_error(case: Case, problem: Problem, design: Design) -> Json:
-    figures = design_budget(case, problem, design)
-    shown = design_json(case, problem, design, figures)
+    shown = named_design(case, problem, design, figures)
     error = figures.total(case.spec.sync_model)
-    sums = {key: shown[key] for key in ("cost", "mass", "power")}
-    return sums | {"error_m": error, "design": shown} | _undecided(problem, design)
+    left_open = _undecided(problem, design)
+    return RankedDesign(shown.cost, shown.mass, shown.power, error, shown, left_open)
 
 
-def _undecided(problem: Problem, design: Design) -> Json:
+def _undecided(problem: Problem, design: Design) -> tuple[str, ...] | None:
     """Simulated requirements that a design's samples leave open, where there are any."""
-    from syncline_design.choice.acceptable import judgement
-
-    found = judgement(problem, design).undecided
-    return {"undecided": list(found)} if found else {}
+    return judgement(problem, design).undecided or None
 
 
-def left_out(case: Case, problem: Problem, resource: ResourceName) -> list[str]:
+def left_out(case: Case, problem: Problem, resource: ResourceName) -> tuple[str, ...]:
     """What has no place on a front of a resource because its entry does not say how much it takes.
 
     In words, as in `sensor my_gnss`; only entries that a design may use.
@@ -133,11 +124,11 @@ def left_out(case: Case, problem: Problem, resource: ResourceName) -> list[str]:
     usable |= {f"shared hardware {item.id}" for item in problem.infrastructure}
     for option in (option for table in problem.roles for option in table.options):
         usable |= {f"sensor {option.sensor}", f"timestamping method {option.method}"}
-    return [
+    return tuple(
         label
         for _, label, entry in parts_in_use(case)
         if label in usable and getattr(entry, resource) is None
-    ]
+    )
 
 
 def left_out_text(labels: Sequence[str], resource: ResourceName) -> str:
@@ -149,49 +140,40 @@ def left_out_text(labels: Sequence[str], resource: ResourceName) -> str:
     )
 
 
-def excluded_json(problem: Problem) -> Json:
-    """`excluded`: what was ruled out before the choice, and `excluded_count`, how much that is.
+def ruled_out(problem: Problem) -> tuple[tuple[Exclusion, ...], int]:
+    """What was ruled out before the choice, MOST_EXCLUDED rows at most, and how much that is.
 
-    One row a sensor where the reason is the sensor's (primitive and method null), else one an
-    option; clocks have the role `clock`.  At most MOST_EXCLUDED rows.
+    One row a sensor where the reason is the sensor's, else one an option; then clocks.
     """
     rows = [*_excluded_options(problem), *_excluded_clocks(problem)]
-    return {"excluded": rows[:MOST_EXCLUDED], "excluded_count": len(rows)}
+    return tuple(rows[:MOST_EXCLUDED]), len(rows)
 
 
-def _excluded_options(problem: Problem) -> Iterator[Json]:
+def _excluded_options(problem: Problem) -> Iterator[Exclusion]:
     for table in problem.roles:
         for gone in table.excluded:
-            yield {
-                "stage": table.stage_name,
-                "role": table.role,
-                "sensor": gone.sensor,
-                "primitive": gone.primitive or None,
-                "method": gone.method or None,
-                "reason": gone.reason,
-                "code": gone.code,
-                "figure": _plain(gone.figure),
-                "limit": _plain(gone.limit),
-            }
+            yield Exclusion(
+                table.stage_name,
+                table.role,
+                gone.sensor,
+                gone.primitive or None,
+                gone.method or None,
+                gone.reason,
+                gone.code,
+                _plain(gone.figure),
+                _plain(gone.limit),
+            )
 
 
-def _excluded_clocks(problem: Problem) -> Iterator[Json]:
+def _excluded_clocks(problem: Problem) -> Iterator[Exclusion]:
     names = {table.stage: table.stage_name for table in problem.roles}
     for vehicle in problem.vehicles:
+        stage = names.get(vehicle.stages[0], vehicle.name)
         for gone in vehicle.excluded:
-            yield {
-                "stage": names.get(vehicle.stages[0], vehicle.name),
-                "role": "clock",
-                "sensor": gone.clock.id,
-                "primitive": None,
-                "method": None,
-                "reason": gone.reason,
-                "code": gone.code,
-                "figure": _plain(gone.figure),
-                "limit": _plain(gone.limit),
-            }
+            why = (gone.reason, gone.code, _plain(gone.figure), _plain(gone.limit))
+            yield Exclusion(stage, "clock", gone.clock.id, None, None, *why)
 
 
-def _plain(figure: float | str | None) -> float | str | None:
+def _plain(figure: Figure) -> Figure:
     """JSON has no infinity."""
     return figure if isinstance(figure, str) else finite(figure)

@@ -9,12 +9,21 @@ from typing import Any
 
 from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_options, evaluate
 from syncline_design.choice.table import Design, Option, Problem
-from syncline_design.machine.records import Json
 from syncline_design.model.budget import Budget, SensorRow
 from syncline_design.model.quantity import Quantity
+from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import Entry
-from syncline_design.verdict.tree import Assumption, Source, finite
+from syncline_design.verdict.tree import (
+    Assumption,
+    HostClock,
+    NamedDesign,
+    NamedRole,
+    NamedStage,
+    SharedHardware,
+    Source,
+    finite,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,93 +36,84 @@ class UsedEntry:
 
 
 def number(amount: Fraction | None) -> float | None:
-    """An exact sum for JSON; None where a catalog entry does not say."""
+    """An exact sum as written; None where a catalog entry does not say."""
     return None if amount is None else float(amount)
 
 
-def design_json(case: Case, problem: Problem, design: Design, figures: Budget) -> Json:
-    """The `design` key of a verdict."""
+def named_design(case: Case, problem: Problem, design: Design, figures: Budget) -> NamedDesign:
+    """A design in names."""
     sums = evaluate(problem, design)
     rows = {(row.stage, row.role): row for row in figures.sensors}
-    return {
-        "cost": number(sums.cost),
-        "mass": number(sums.mass),
-        "power": number(sums.power),
-        "currency": case.spec.currency,
-        "infrastructure": _shared(case, problem, sums),
-        "clocks": _clocks(case, problem, design),
-        "stages": [
-            {
-                "name": stage.choice.name,
-                "vehicle": stage.choice.vehicle_name,
-                "platform": stage.platform.id,
-                "roles": dict(_roles(stage, problem, design, rows)),
-            }
+    return NamedDesign(
+        number(sums.cost),
+        number(sums.mass),
+        number(sums.power),
+        case.spec.currency,
+        tuple(_shared(case, problem, sums)),
+        tuple(_clocks(case, problem, design)),
+        tuple(
+            NamedStage(
+                stage.choice.name,
+                stage.choice.vehicle_name,
+                stage.platform.id,
+                dict(_roles(stage, problem, design, rows)),
+            )
             for stage in case.stages
-        ],
-    }
+        ),
+    )
 
 
 def _roles(
     stage: StageCase,
     problem: Problem,
     design: Design,
-    rows: Mapping[tuple[str, Any], SensorRow],
-) -> Iterator[tuple[str, Json]]:
+    rows: Mapping[tuple[str, RoleName], SensorRow],
+) -> Iterator[tuple[str, NamedRole]]:
     for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
         role = stage.role(table.role)
         if table.stage == stage.index and role is not None:
             yield table.role, _role(role, option, rows[table.stage_name, table.role])
 
 
-def _role(role: RoleCase, option: Option, row: SensorRow) -> Json:
+def _role(role: RoleCase, option: Option, row: SensorRow) -> NamedRole:
     sensor, method = role.sensor(option.sensor), role.method(option.method)
-    return {
-        "sensor": option.sensor,
-        "name": (sensor.name if sensor is not None else "") or option.sensor,
-        "primitive": option.primitive,
-        "timestamping": option.method,
-        "timestamping_name": method.name if method is not None else "given in the spec",
-        "timeline": option.timeline,
-        "tau_s": row.tau_s,
-        "tau_crit_s": finite(row.tau_crit_s),
-        "tau_crit_lever_arm_s": finite(row.tau_crit_lever_arm_s),
-        "sensor_error_m": row.sensor_error_m,
-        "cost": number(option.resources.cost),
-        "mass": number(option.resources.mass),
-        "power": number(option.resources.power),
-    }
+    return NamedRole(
+        sensor=option.sensor,
+        name=(sensor.name if sensor is not None else "") or option.sensor,
+        primitive=option.primitive,
+        timestamping=option.method,
+        timestamping_name=method.name if method is not None else "given in the spec",
+        timeline=option.timeline,
+        tau_s=row.tau_s,
+        tau_crit_s=finite(row.tau_crit_s),
+        tau_crit_lever_arm_s=finite(row.tau_crit_lever_arm_s),
+        sensor_error_m=row.sensor_error_m,
+        cost=number(option.resources.cost),
+        mass=number(option.resources.mass),
+        power=number(option.resources.power),
+    )
 
 
-def _shared(case: Case, problem: Problem, sums: Evaluation) -> list[Json]:
-    found = []
+def _shared(case: Case, problem: Problem, sums: Evaluation) -> Iterator[SharedHardware]:
     for units in sums.units:
         item = problem.infrastructure[units.infrastructure]
         cost = item.resources.cost
-        found.append(
-            {
-                "id": item.id,
-                "name": case.hardware[item.id].entry.name or item.id,
-                "vehicle": problem.vehicles[units.vehicle].name,
-                "count": units.count,
-                "cost": None if cost is None else float(cost * units.count),
-            }
+        yield SharedHardware(
+            item.id,
+            case.hardware[item.id].entry.name or item.id,
+            problem.vehicles[units.vehicle].name,
+            units.count,
+            None if cost is None else float(cost * units.count),
         )
-    return found
 
 
-def _clocks(case: Case, problem: Problem, design: Design) -> list[Json]:
-    return [
-        {
-            "vehicle": vehicle.name,
-            "id": clock.id,
-            "name": entry.name or clock.id,
-            "offset_bound_s": clock.offset_bound_s,
-            "cost": number(clock.resources.cost),
-        }
-        for vehicle, clock in zip(problem.vehicles, chosen_clocks(problem, design), strict=True)
-        if (entry := case.clock(vehicle.name, clock.id)) is not None
-    ]
+def _clocks(case: Case, problem: Problem, design: Design) -> Iterator[HostClock]:
+    for vehicle, clock in zip(problem.vehicles, chosen_clocks(problem, design), strict=True):
+        entry = case.clock(vehicle.name, clock.id)
+        if entry is not None and clock.id is not None:
+            cost = number(clock.resources.cost)
+            name = entry.name or clock.id
+            yield HostClock(vehicle.name, clock.id, name, clock.offset_bound_s, cost)
 
 
 def used_entries(case: Case, problem: Problem, design: Design) -> list[UsedEntry]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Picked:
-    """What the choice came to: a verified design, with how many better ones failed simulation.
+    """What the choice came to: a verified design, or none.
 
     exhausted: False when the search ended before every design was simulated; the verified one is
     then the first by the sums.
@@ -23,7 +23,6 @@ class Picked:
 
     choice: Choice | Infeasible
     verified: Verified | None
-    passed_over: int = 0
     exhausted: bool = True
 
 
@@ -42,8 +41,8 @@ def pick(
 
     choice = choose(problem, method, time_limit_s)
     if isinstance(choice, Infeasible):
-        return Picked(choice, None, choice.passed_over)
+        return Picked(choice, None)
     verified = verify(choice.design)
     if verified.word == "fails" and choice.exhausted:
         raise NoVerdict("the chosen design does not stand up to the independent recheck")
-    return Picked(choice, verified, choice.passed_over, choice.exhausted)
+    return Picked(choice, verified, choice.exhausted)

@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.decide import best
-from syncline_design.choice.explain import Explanation, explain
-from syncline_design.choice.front import front
-from syncline_design.choice.outcome import FrontPoint, Road, Unfinished
-from syncline_design.choice.prices import PriceStep, staircase
+from syncline_design.choice.explain import explain
+from syncline_design.choice.front import front, staircase
+from syncline_design.choice.outcome import (
+    Explanation,
+    FrontPoint,
+    PriceStep,
+    Proof,
+    Road,
+    Unfinished,
+)
 from syncline_design.choice.problem import selection_of
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem, ResourceName
@@ -23,21 +30,27 @@ from syncline_design.choice.tolerance import (
 )
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
-from syncline_design.machine.records import Json, json_of
+from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.selection import RoleSelection
-from syncline_design.verdict.acceptance import MOST_SIMULATED, Simulations
+from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.choice_data import (
-    designs_json,
-    excluded_json,
-    front_json,
+    front_designs,
     left_out,
-    proof_json,
-    unproven_json,
+    ranked_designs,
+    ruled_out,
 )
 from syncline_design.verdict.open_choice import Picked, pick
-from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.tree import (
+    EXIT_CODES,
+    Exclusion,
+    FrontDesign,
+    RankedDesign,
+    Verdict,
+    Word,
+)
 from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
 
 SCHEMA = "syncline-design/optimization/v1"
@@ -63,56 +76,93 @@ class OptimizeSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Hinges:
-    """What the chosen design hinges on: slack of every figure, tolerances, what to measure.
+class SpecName(Record):
+    """Which spec."""
 
-    None: not worked out within the time limit.
+    name: str
+    file: str
+
+
+@dataclass(frozen=True, slots=True)
+class MadeFrom(Record):
+    """What the choice depends on."""
+
+    version: str
+    spec_sha256: str
+    catalogs_sha256: str
+    files: tuple[FileRead, ...]
+    seed: int
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Optimisation(Record):
+    """What `optimize` says: the best designs, or why there is none.
+
+    cut_short: what the time limit left out or incomplete; gave_up: what lacks designs because too
+    many were simulated; message: what ended a search that found no design; front: with `--pareto`,
+    `front_left_out` what has no place on it; slack, tolerances, measure_next: of a design that
+    meets, null where that was not worked out.
     """
 
+    schema: str = SCHEMA
+    verdict: Word
+    spec: SpecName
+    proof: Proof
+    combinations: str | None
+    designs: tuple[RankedDesign, ...] = ()
+    excluded: tuple[Exclusion, ...]
+    excluded_count: int
+    cut_short: tuple[str, ...] = ()
+    gave_up: tuple[str, ...] = ()
+    provenance: MadeFrom
+    message: str | None = optional()
+    front: tuple[FrontDesign, ...] | None = optional()
+    front_left_out: tuple[str, ...] | None = optional()
+    staircase: tuple[PriceStep, ...] | None = optional()
+    slack: tuple[Slack, ...] | None = optional()
+    tolerances: ToleranceVerdict | None = optional()
+    measure_next: tuple[Measurement, ...] | None = optional()
+    infeasibility: Explanation | None = optional()
+
+    @property
+    def exit_code(self) -> int:
+        """0: a design; 1: none; 3: the search for one was cut short."""
+        return EXIT_CODES[self.verdict]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Hinged(Optimisation):
+    """Of a design that meets: with what it hinges on, None where that was not worked out."""
+
     slack: tuple[Slack, ...] | None
-    tolerance: ToleranceVerdict | None
+    tolerances: ToleranceVerdict | None
     measure_next: tuple[Measurement, ...] | None
 
 
 @dataclass(frozen=True, slots=True)
-class Optimisation:
-    """The best designs, or why there is none.
+class Optimised:
+    """An optimisation with what it was made from.
 
-    picked: None when the time limit came before any design; `unfinished` says so.
+    designs, points: of the result, by their places in the problem's tables; verdict: the whole one
+    on the same design, where a page is wanted.
     """
 
     case: Case
     problem: Problem
     settings: OptimizeSettings
-    picked: Picked | None
     designs: tuple[Design, ...]
-    front: tuple[FrontPoint, ...]
-    prices: tuple[PriceStep, ...]
-    hinges: Hinges | None
-    explanation: Explanation | None
-    cut_short: tuple[str, ...] = ()  # what the time limit left out or incomplete
-    gave_up: tuple[str, ...] = ()  # what lacks designs because too many were simulated
+    points: tuple[FrontPoint, ...]
+    result: Optimisation
     verdict: Verdict | None = None
-    unfinished: str = ""
-
-    @property
-    def exit_code(self) -> int:
-        """0: a design; 1: none; 3: the search for one was cut short."""
-        if self.picked is None:
-            return 3
-        found = self.picked.verified
-        if found is None:
-            return 1
-        return 0 if found.word == "meets" else 3
 
 
-def optimize(case: Case, settings: OptimizeSettings) -> Optimisation:
+def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best designs of a spec; pinned roles stay as they are."""
     with within_s(settings.time_limit_s):
         return _optimize(case, settings)
 
 
-def _optimize(case: Case, settings: OptimizeSettings) -> Optimisation:
+def _optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     build = Simulations(settings.seed).problem_of
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
@@ -130,27 +180,31 @@ def _optimize(case: Case, settings: OptimizeSettings) -> Optimisation:
         )
     except OutOfTime as error:
         return _unfinished(case, problem, settings, checking, str(error))
-    pieces, nothing = Pieces(lambda: refusals(problem)), _no_points()
-    points = nothing
-    if settings.pareto:
-        points = pieces.made("front", lambda: front(problem, settings.resource), nothing)
+    pieces = Pieces(lambda: refusals(problem))
+    points = _points(problem, settings, pieces)
     designs: tuple[Design, ...] = ()
-    hinges = explanation = None
+    kind: type[Optimisation] = Optimisation
+    more: dict[str, Any] = {}
     if picked.verified is None:
-        explanation = explain(case, problem, build)
+        more = _reasons(case, problem, build, pieces)
     elif picked.exhausted:
-        chosen = picked.verified.design
-        designs = _designs(problem, chosen, settings, pieces)
+        designs = _designs(problem, picked.verified.design, settings, pieces)
         if picked.verified.word == "meets":
-            hinges = _hinges((case, problem, chosen, build), pieces)
-    if explanation is not None and explanation.cut_short:
-        pieces.cut_short.append("reasons and remedies")
-    steps = staircase([point for point in points if not point.undecided])
-    found = Optimisation(
-        case, problem, settings, picked, designs, points, steps, hinges,
-        explanation, tuple(pieces.cut_short), tuple(pieces.gave_up),
-    )  # fmt: skip
-    return replace(found, verdict=_verdict(found, checking)) if settings.report else found
+            kind, more = Hinged, _hinges((case, problem, designs[0], build), pieces)
+    result = kind(
+        verdict=_word(picked),
+        **_frame(case, problem, settings, picked.choice.proof),
+        designs=ranked_designs(case, problem, designs),
+        cut_short=tuple(pieces.cut_short),
+        gave_up=tuple(pieces.gave_up),
+        **_front(case, problem, settings, points),
+        **more,
+    )
+    found = Optimised(case, problem, settings, designs, points, result)
+    if not settings.report:
+        return found
+    of_cost = points if settings.pareto and settings.resource == "cost" else None
+    return replace(found, verdict=open_verdict(case, problem, picked, checking, points=of_cost))
 
 
 def _unfinished(
@@ -159,28 +213,62 @@ def _unfinished(
     settings: OptimizeSettings,
     checking: CheckSettings,
     why: str,
-) -> Optimisation:
+) -> Optimised:
     """What there is to say when the time limit came before any design."""
     known = None if problem is NO_TABLES else problem
     verdict = unfinished_verdict(case, known, checking, why) if settings.report else None
-    return Optimisation(
-        case,
-        problem,
-        settings,
-        None,
-        (),
-        (),
-        (),
-        None,
-        None,
-        ("choosing",),
-        verdict=verdict,
-        unfinished=why,
+    result = Optimisation(
+        verdict="indeterminate",
+        **_frame(case, problem, settings, Proof(settings.method, False, False)),
+        cut_short=("choosing",),
+        message=f"No verdict: {why}; no design was found by then.",
+        **_front(case, problem, settings, ()),
     )
+    return Optimised(case, problem, settings, (), (), result, verdict)
 
 
-def _no_points() -> tuple[FrontPoint, ...]:
-    return ()
+def _word(picked: Picked) -> Word:
+    """Whether there is a design; open where simulation leaves it open."""
+    if picked.verified is None:
+        return "infeasible"
+    return "meets" if picked.verified.word == "meets" else "indeterminate"
+
+
+def _frame(
+    case: Case, problem: Problem, settings: OptimizeSettings, proof: Proof
+) -> dict[str, Any]:
+    """The parts that every result has."""
+    excluded, count = ruled_out(problem)
+    return {
+        "spec": SpecName(case.spec.name, str(case.path)),
+        "proof": proof,
+        "combinations": None if problem is NO_TABLES else str(problem.combinations),
+        "excluded": excluded,
+        "excluded_count": count,
+        "provenance": MadeFrom(
+            __version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed
+        ),
+    }
+
+
+def _points(problem: Problem, settings: OptimizeSettings, pieces: Pieces) -> tuple[FrontPoint, ...]:
+    nothing: tuple[FrontPoint, ...] = ()
+    if not settings.pareto:
+        return nothing
+    return pieces.made("front", lambda: front(problem, settings.resource), nothing)
+
+
+def _front(
+    case: Case, problem: Problem, settings: OptimizeSettings, points: Sequence[FrontPoint]
+) -> dict[str, Any]:
+    """The parts that `--pareto` asks for."""
+    if not settings.pareto:
+        return {}
+    return {
+        "front": front_designs(case, problem, points, settings.resource),
+        "front_left_out": left_out(case, problem, settings.resource),
+        "staircase": staircase([point for point in points if not point.undecided]),
+    }
 
 
 def _designs(
@@ -197,12 +285,21 @@ def _designs(
     return (chosen, *pieces.listed("next best designs", others)[: count - 1])
 
 
-def _hinges(given: tuple[Case, Problem, Design, Build], pieces: Pieces) -> Hinges:
-    return Hinges(
-        pieces.made("slack ledger", lambda: slack_ledger(*given), None),
-        pieces.made("tolerances", lambda: _tolerances(*given), None),
-        pieces.made("what to measure next", lambda: measure_next(*given), None),
-    )
+def _reasons(case: Case, problem: Problem, build: Build, pieces: Pieces) -> dict[str, Any]:
+    """Why there is no design."""
+    found = explain(case, problem, build)
+    if found.cut_short:
+        pieces.cut_short.append("reasons and remedies")
+    return {"infeasibility": found}
+
+
+def _hinges(given: tuple[Case, Problem, Design, Build], pieces: Pieces) -> dict[str, Any]:
+    """What a design hinges on: slack of every figure, tolerances, what to measure."""
+    return {
+        "slack": pieces.made("slack ledger", lambda: slack_ledger(*given), None),
+        "tolerances": pieces.made("tolerances", lambda: _tolerances(*given), None),
+        "measure_next": pieces.made("what to measure next", lambda: measure_next(*given), None),
+    }
 
 
 def _tolerances(
@@ -213,85 +310,6 @@ def _tolerances(
         return tolerance_verdict(case, problem, design, build)
     except Unfinished:
         return None
-
-
-def _verdict(found: Optimisation, checking: CheckSettings) -> Verdict:
-    """The verdict of the same design, for a page: nothing is chosen a second time."""
-    assert found.picked is not None
-    points = found.front if found.settings.pareto and found.settings.resource == "cost" else None
-    return open_verdict(found.case, found.problem, found.picked, checking, points=points)
-
-
-def optimisation_json(found: Optimisation) -> Json:
-    """Everything as plain data; `designs` best first, `front` with --pareto."""
-    case, problem = found.case, found.problem
-    data: Json = {
-        "schema": SCHEMA,
-        "verdict": "infeasible" if found.exit_code == 1 else "meets",
-        "spec": {"name": case.spec.name, "file": str(case.path)},
-        "proof": _proof(found),
-        "combinations": None if problem is NO_TABLES else str(problem.combinations),
-        "designs": designs_json(case, problem, found.designs),
-        **excluded_json(problem),
-        "cut_short": list(found.cut_short),
-        "gave_up": list(found.gave_up),
-        "provenance": {
-            "version": __version__,
-            "spec_sha256": case.spec_sha256,
-            "catalogs_sha256": case.catalogs_sha256,
-            "files": json_of(case.files),
-            "seed": found.settings.seed,
-        },
-    }
-    if found.exit_code == 3:
-        data["verdict"] = "indeterminate"
-    if found.unfinished:
-        data["message"] = unfinished_line(found)
-    if found.settings.pareto:
-        data["front"] = front_json(case, problem, found.front, found.settings.resource)
-        data["front_left_out"] = left_out(case, problem, found.settings.resource)
-        data["staircase"] = [step.to_json() for step in found.prices]
-    if found.hinges is not None:
-        hinges = found.hinges
-        data["slack"] = None if hinges.slack is None else [row.to_json() for row in hinges.slack]
-        data["tolerances"] = None if hinges.tolerance is None else hinges.tolerance.to_json()
-        data["measure_next"] = (
-            None if hinges.measure_next is None else [m.to_json() for m in hinges.measure_next]
-        )
-    if found.explanation is not None:
-        data["infeasibility"] = found.explanation.to_json() | {"text": found.explanation.lines()}
-    return data
-
-
-def _proof(found: Optimisation) -> Json:
-    if found.picked is None:
-        return unproven_json(found.settings.method)
-    return proof_json(found.picked)
-
-
-def unfinished_line(found: Optimisation) -> str:
-    """What is said where the time limit came before any design."""
-    return f"No verdict: {found.unfinished}; no design was found by then."
-
-
-def incomplete_lines(found: Optimisation) -> list[str]:
-    """Which parts lack designs: by the time limit, or because simulation is bounded."""
-    lines = []
-    if found.cut_short and not found.unfinished:
-        lines.append(f"The time limit ended this too early: {', '.join(found.cut_short)}.")
-    return [*lines, gave_up_line(found.gave_up)] if found.gave_up else lines
-
-
-def gave_up_line(pieces: Sequence[str]) -> str:
-    """What is not complete because simulation is bounded."""
-    names = ", ".join(pieces)
-    return f"After {MOST_SIMULATED} simulated designs the search gave up; not complete: {names}."
-
-
-def problem_size(problem: Problem) -> str:
-    """How many combinations there are: plain up to a million, then as a power."""
-    count = problem.combinations
-    return f"{count}" if count < 1_000_000 else f"{count:.2e}"
 
 
 def pinned_text(case: Case, problem: Problem, design: Design) -> str:

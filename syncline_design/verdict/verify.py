@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
+from syncline_design.choice.outcome import Proof
 from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.choice.table import Design, Problem
 from syncline_design.effects.acting import known_of
@@ -30,12 +31,14 @@ from syncline_design.verdict.acceptance import (
     simulation_settings,
 )
 from syncline_design.verdict.cautions import cautions
-from syncline_design.verdict.design_data import assumptions, design_json, sources, used_entries
+from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
+from syncline_design.verdict.design_data import assumptions, named_design, sources, used_entries
 from syncline_design.verdict.recheck import Recheck, recheck
 from syncline_design.verdict.tree import (
     UNITS,
     Caution,
     Checked,
+    ChoiceResult,
     Refused,
     RequirementResult,
     Status,
@@ -127,21 +130,17 @@ def _sole_verdict(case: Case, problem: Problem, settings: CheckSettings, build: 
     """
     sole = sole_design(problem)
     assert sole is not None
-    from syncline_design.verdict.choice_data import excluded_json
-
     everything, design = sole
     verified = verify(case, everything, design, settings)
     if verified.word == "fails" and names_candidates(case):
         return _infeasible(case, problem, settings, build)
-    return _verdict(case, everything, verified, settings, excluded_json(problem))
+    return _verdict(case, everything, verified, settings, without_choice(problem))
 
 
 def unfinished_verdict(
     case: Case, problem: Problem | None, settings: CheckSettings, why: str
 ) -> Verdict:
     """A verdict that the time limit left without a design."""
-    from syncline_design.verdict.choice_data import unproven_json
-
     return Verdict(
         verdict="indeterminate",
         **frame(case, problem, settings.seed),
@@ -150,7 +149,7 @@ def unfinished_verdict(
             for index, one in enumerate(case.spec.requirements)
         ),
         warnings=(Caution("time-limit", f"{why}; no design was found by then"),),
-        choice={"proof": unproven_json(settings.method)},
+        choice=ChoiceResult(Proof(settings.method, False, False)),
     )
 
 
@@ -202,17 +201,15 @@ def open_verdict(
     points: Sequence[FrontPoint] | None = None,
 ) -> Verdict:
     """The verdict on what was picked for a spec; points: its front of cost, where known."""
-    from syncline_design.verdict.choice_data import choice_json, left_out_text
-
     build = build or _build(settings)
     if sole_design(problem) is not None:
         return _sole_verdict(case, problem, settings, build)
     if picked.verified is None:
         return _infeasible(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
-    choice = choice_json(case, problem, picked, pieces, points)
+    choice = choice_of(case, problem, picked, pieces, points)
     found = _verdict(case, problem, picked.verified, settings, choice)
-    missing = choice["front_left_out"]
+    missing = choice.front_left_out
     warnings = (
         *_passed_over(picked),
         *_unproven(picked),
@@ -236,21 +233,21 @@ def _unproven(picked: Picked) -> Iterator[Caution]:
 def _infeasible(case: Case, problem: Problem, settings: CheckSettings, build: Build) -> Verdict:
     """Why there is no design, and which single changes would help."""
     from syncline_design.choice.explain import explain
-    from syncline_design.verdict.choice_data import excluded_json
 
     found = explain(case, problem, build)
-    conflict = {m.id for members in (found.conflict, *found.further) for m in members}
+    conflict = {member.id for members in found.conflicts for member in members}
+    minimal = found.conflict.minimal
     late = Caution("time-limit", "the time limit ended the search for reasons and remedies")
     return Verdict(
         verdict="infeasible",
         **frame(case, problem, settings.seed),
         requirements=tuple(
-            _placed(case, i, one, _unmet(case, one, one.id in conflict, found.minimal), settings)
+            _placed(case, i, one, _unmet(case, one, one.id in conflict, minimal), settings)
             for i, one in enumerate(case.spec.requirements)
         ),
         warnings=(late,) if found.cut_short else (),
-        infeasibility=found.to_json() | {"text": found.lines()},
-        choice=excluded_json(problem),
+        infeasibility=found,
+        choice=without_choice(problem),
     )
 
 
@@ -273,9 +270,10 @@ def _unmet(
 
 
 def _passed_over(picked: Picked) -> Iterator[Caution]:
-    if not picked.passed_over:
+    passed_over = picked.choice.proof.passed_over
+    if not passed_over:
         return
-    count = f"{picked.passed_over} design{'s' if picked.passed_over > 1 else ''}"
+    count = f"{passed_over} design{'s' if passed_over > 1 else ''}"
     message = f"{count} that come before this one keep every sum but not the Monte Carlo limits"
     if not picked.exhausted:
         message = (
@@ -407,7 +405,7 @@ def _verdict(
     problem: Problem,
     verified: Verified,
     settings: CheckSettings,
-    choice: Mapping[str, Any],
+    choice: ChoiceResult,
 ) -> Verdict:
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
@@ -415,7 +413,7 @@ def _verdict(
         verdict=verified.word,
         **frame(case, problem, settings.seed),
         requirements=verified.requirements,
-        design=design_json(case, problem, verified.design, verified.figures),
+        design=named_design(case, problem, verified.design, verified.figures),
         syncline=syncline_figures(verified, case.spec.sync_model),
         monte_carlo=verified.monte_carlo,
         warnings=cautions(case, verified, assumed),
