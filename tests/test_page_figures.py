@@ -35,7 +35,8 @@ UNITS = {"m": 1.0, "cm": 0.01, "mm": 0.001, "deg": math.pi / 180.0, "mdeg": math
 def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
     """Every role, every shared piece and every clock: to the cent."""
     verdict = check_file(ROOT / "specs" / f"{name}.yaml", PLAIN)
-    assert any(clock["cost"] for clock in verdict.design["clocks"])
+    assert verdict.design is not None
+    assert any(clock.cost for clock in verdict.design.clocks)
     cells: list[str] = []
     text = html(on_verdict(verdict))
     for caption in ("Payload and timestamping", "Shared hardware and clocks"):
@@ -46,14 +47,16 @@ def test_the_costs_on_the_page_sum_to_the_price(name: str) -> None:
         assert body.count("<tr>") == len(amounts), "a row without a cost"
         cells += amounts
     total = sum(float(cell.replace("\u00a0", "")) for cell in cells)
-    assert total == pytest.approx(verdict.design["cost"], abs=0.005)
+    assert total == pytest.approx(verdict.design.cost, abs=0.005)
 
 
 @pytest.mark.parametrize("method", ["front", "milp", "enumerate"])
 def test_the_page_says_in_words_how_the_choice_was_proven(method: Any) -> None:
     words = {"front": "Pareto front", "milp": "integer program", "enumerate": "enumeration of all"}
     verdict = check_file(MULTIROTOR, CheckSettings(method=method, monte_carlo=False))
-    assert verdict.choice["proof"]["method"] == method
+    assert verdict.choice is not None
+    assert verdict.choice.proof is not None
+    assert verdict.choice.proof.method == method
     sentence = re.search(r"Found by [^<]*", Page(html(on_verdict(verdict))).text)
     assert sentence is not None
     assert words[method] in sentence[0]
