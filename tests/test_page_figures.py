@@ -79,11 +79,11 @@ def test_a_datasheet_figure_reads_as_it_was_written() -> None:
             assert text in page
             assert text in said
     assert "Figure (SI)" not in page
-    assert found.hinges is not None
-    assert found.hinges.tolerance is not None
-    for told in (" ".join(text.split()), " ".join(page.replace("\u00a0", " ").split())):
-        assert " ".join(found.hinges.tolerance.text.split()) in told
-        for row in found.hinges.slack or ():
+    tolerances = found.result.tolerances
+    assert tolerances is not None
+    for told in (" ".join(said.split()), " ".join(page.replace("\u00a0", " ").split())):
+        assert " ".join(tolerances.text.split()) in told
+        for row in found.result.slack or ():
             assert numbers.si_quantity(row.value, row.unit).replace("\u00a0", " ") in told
 
 
