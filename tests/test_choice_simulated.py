@@ -145,7 +145,7 @@ def test_no_design_passes_is_infeasible_in_check_and_optimize(tmp_path: Path) ->
     data = found.result.to_json()
     assert data["verdict"] == "infeasible"
     assert data["designs"] == []
-    for why in (verdict["infeasibility"], data["infeasibility"]):
+    for why in (verdict.to_json()["infeasibility"], data["infeasibility"]):
         assert why["conflict"] == {
             "requirements": [{"id": "MC", "kind": "monte_carlo", "line": 6}],
             "minimal": True,
@@ -315,12 +315,12 @@ def test_lists_that_simulation_cuts_short_say_so(
         return Simulations(*given, most=3)
 
     loaded = spec(tmp_path, [simulated(0.9)])
-    whole = optimize(loaded, OptimizeSettings(count=9, pareto=True))
+    whole = optimize(loaded, OptimizeSettings(count=9, pareto=True, report=True))
     assert "gave up" not in console(on_choice(whole))
     assert whole.result.gave_up == ()
     monkeypatch.setattr(optimisation, "Simulations", few)
     monkeypatch.setattr(verify, "Simulations", few)
-    found = optimize(loaded, OptimizeSettings(count=9, pareto=True))
+    found = optimize(loaded, OptimizeSettings(count=9, pareto=True, report=True))
     data = found.result.to_json()
     assert len(data["designs"]) <= 3
     assert {"front", "next best designs"} <= set(data["gave_up"])
