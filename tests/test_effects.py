@@ -30,6 +30,7 @@ from syncline_design.effects.record import (
 from syncline_design.model.system import Platform, Sensor, Stage
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.chain import ConstantTwist, stage_error
+from syncline_design.spec.edit import with_effects_text
 from syncline_design.spec.load import load
 from tests.simulation_systems import no_noise
 from tests.world import hidden, make_log, scenario
@@ -316,8 +317,9 @@ def test_a_new_effect_is_a_new_file(twin: str, tmp_path: Path) -> None:
     found = diagnose(spec, [data], DiagnosisSettings(exclude_effects=others))
     assert [f.effect for f in found.findings] == [twin]
     assert found.findings[0].parameters["age_s"].value == pytest.approx(0.1, abs=0.01)
-    means = meaning(load(spec), found.effects_entries())
+    case, entries = load(spec), found.effects_entries()
+    means = meaning(case, entries)
     assert means is not None
-    for figure in means.design.figures:
+    for figure in means.figures:
         assert (figure.after_m or 0.0) > 2.0 * (figure.before_m or 0.0), figure
-    assert f"effect: {twin}" in means.spec_text
+    assert f"effect: {twin}" in with_effects_text(case, entries)

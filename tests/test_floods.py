@@ -84,9 +84,9 @@ def test_nor_does_a_case_whose_file_the_grid_names(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "others.txt")
     result = run_study(path, StudySettings(workers=1))
     assert result.counts["refused"] == 2
-    problems = [p for c in result.cases() for p in c.record.get("problems", ())]
+    problems = [p for c in result.cases() for p in c.record.problems]
     assert problems
-    assert all("not a regular file" in problem["message"] for problem in problems)
+    assert all("not a regular file" in problem.message for problem in problems)
 
 
 def test_thousands_of_effects_are_refused() -> None:

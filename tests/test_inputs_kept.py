@@ -190,7 +190,7 @@ def test_a_link_stays_and_what_it_leads_to_is_replaced(tmp_path: Path) -> None:
 KILLED = """\
 import os, signal, sys
 from pathlib import Path
-from syncline_design import result_files
+from syncline_design.machine import result_files
 result_files.os.fsync = lambda _: os.kill(os.getpid(), signal.SIGKILL)
 result_files.write_file(sys.argv[1], b"x" * 100)
 """

@@ -218,15 +218,16 @@ def test_same_input_same_bytes(make: Any) -> None:
 
 def test_same_bytes_in_another_process() -> None:
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1]); import report_samples, hashlib\n"
+        "import sys; sys.path.insert(0, sys.argv[1]); import hashlib\n"
+        "from tests import report_samples\n"
         "from syncline_design.report.on_verdict import on_verdict\n"
         "from syncline_design.report.render_html import html\n"
         "page = html(on_verdict(report_samples.fixed_wing()))\n"
         "print(hashlib.sha256(page.encode()).hexdigest())"
     )
-    tests = str(__import__("pathlib").Path(__file__).parent)
+    root = str(__import__("pathlib").Path(__file__).parents[1])
     out = subprocess.run(
-        [sys.executable, "-c", code, tests],
+        [sys.executable, "-c", code, root],
         env={"PYTHONHASHSEED": "7", "PATH": "/usr/bin:/bin", "TZ": "Asia/Tokyo"},
         capture_output=True,
         text=True,

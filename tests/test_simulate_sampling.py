@@ -405,6 +405,8 @@ def test_every_effect_of_the_dictionary_acts_and_is_bounded(name: str) -> None:
                 size = {"position": "enu", "attitude": "yaw_180"}.get(role, "azimuth_sign")
             elif parameter.located:
                 size = 0.5  # a moment within the manoeuvre
+            elif parameter.whole:
+                size = float(round(size))
             parameters.append((parameter.name, size))
         entry = EffectEntry(name, role, "uav", tuple(parameters))
         system = dataclasses.replace(fixed_wing(), effects=(entry,))
