@@ -70,8 +70,8 @@ def test_a_long_simulation_ends_with_its_processes(workers: str) -> None:
 @pytest.mark.parametrize("command", ["check", "diagnose", "diff", "study"])
 def test_reading_counts_too(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file that takes long to read: no step of that looks at the clock by itself."""
-    monkeypatch.setattr("syncline_design.machine.deadline.OVERDUE_S", 0.0)  # quick machines too
-    # an alarm that finds the interpreter in a weak reference's callback is lost: the next one counts
+    monkeypatch.setattr("syncline_design.machine.deadline.OVERDUE_S", 0.01)  # quick machines too
+    # an alarm inside a weak reference's callback is lost: the next one counts
     monkeypatch.setattr("syncline_design.machine.deadline.AGAIN_S", 0.05)
     large = tmp_path / "large.yaml"
     entries = "".join(f"  k{i}: {{a: {i}, b: [1, 2, 3]}}\n" for i in range(44_000))
