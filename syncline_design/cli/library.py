@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 import typer
 
 from syncline_design.cli.shared import guarded, refuse, show
+from syncline_design.report.formats import FileName, ResultName
 
 
 @guarded
@@ -47,18 +48,7 @@ def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
 @guarded
 def schema(
     name: Annotated[
-        Literal[
-            "spec",
-            "catalog",
-            "study",
-            "diagnosis",
-            "difference",
-            "optimisation",
-            "reproduction",
-            "simulation",
-            "study-result",
-            "verdict",
-        ],
+        Literal[FileName, ResultName],
         typer.Argument(help="A kind of file (spec, catalog, study) or of result (the others)."),
     ],
 ) -> int:

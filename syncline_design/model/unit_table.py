@@ -118,6 +118,14 @@ LADDERS: dict[Dimension, tuple[str, ...]] = {
     _D.ACCELERATION: ("m/s^2",),
 }
 
+# how tables of figures in SI name each dimension
+SI_UNITS = {
+    Dimension.LENGTH: "m", Dimension.TIME: "s", Dimension.ANGLE: "rad", Dimension.SPEED: "m/s",
+    Dimension.ANGULAR_RATE: "rad/s", Dimension.MASS: "kg", Dimension.POWER: "W",
+    Dimension.RATIO: "1", Dimension.DIMENSIONLESS: "1", Dimension.FREQUENCY: "Hz",
+    Dimension.ACCELERATION: "m/s^2",
+}  # fmt: skip
+
 # Suffixes of column and parameter names; the first is the SI one of its dimension.
 SUFFIXES: dict[str, str] = {
     "_s": "s",

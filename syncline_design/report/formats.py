@@ -1,8 +1,8 @@
-"""Which output formats each command knows; nothing is imported here, so that help stays quick."""
+"""Which output formats and schemas there are; nothing is imported here: help stays quick."""
 
 from __future__ import annotations
 
-from typing import Final
+from typing import Final, Literal
 
 CHECK_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown", "csv")
 OPTIMIZE_FORMATS: Final = ("json", "html", "csv")
@@ -16,3 +16,15 @@ REPRODUCE_FORMATS: Final = ("json", "html")
 
 # Pages and binary tables are for files; a bare format name does not send them to a terminal.
 NOT_FOR_A_TERMINAL: Final = ("html", "parquet")
+
+# Kinds of files and of results that have a JSON Schema.
+FileName = Literal["spec", "catalog", "study"]
+ResultName = Literal[
+    "diagnosis",
+    "difference",
+    "optimisation",
+    "reproduction",
+    "simulation",
+    "study-result",
+    "verdict",
+]

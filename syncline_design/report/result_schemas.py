@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final, Literal, get_args
+from typing import Any, Final, get_args
 
 from syncline_design.comparison import difference, meaning
 from syncline_design.diagnosis import result as diagnosis
 from syncline_design.machine.records import Record, schema_of
 from syncline_design.paper import reproduce
 from syncline_design.report import study_data
+from syncline_design.report.formats import ResultName
 from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
 from syncline_design.verdict import optimise
 from syncline_design.verdict import tree as verdict
 
-ResultName = Literal[
-    "diagnosis",
-    "difference",
-    "optimisation",
-    "reproduction",
-    "simulation",
-    "study-result",
-    "verdict",
-]
 _RESULTS: Final[Mapping[ResultName, tuple[type[Record], str]]] = {
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),

@@ -8,21 +8,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import Any, Final, Literal
+from typing import Any, Final
 
 from pydantic import BaseModel
 
 from syncline_design.model.quantity import Dimension
+from syncline_design.report.formats import FileName
 from syncline_design.report.key_glossary import KEYS, STUDY_KEYS
 from syncline_design.spec.fields import quantity_schema
 from syncline_design.spec.spec import LIMIT_DIMENSIONS
 
-SchemaName = Literal["spec", "catalog", "study"]
 _TITLES: Final = {"spec": "system spec", "catalog": "catalog", "study": "trade study"}
 DRAFT = "http://json-schema.org/draft-07/schema#"
 
 
-def json_schema(name: SchemaName) -> dict[str, Any]:
+def json_schema(name: FileName) -> dict[str, Any]:
     """The schema of one kind of file as plain data."""
     model = _model(name)
     words = {**KEYS, **STUDY_KEYS} if name == "study" else KEYS
@@ -41,7 +41,7 @@ def json_schema(name: SchemaName) -> dict[str, Any]:
     }
 
 
-def _model(name: SchemaName) -> type[BaseModel]:
+def _model(name: FileName) -> type[BaseModel]:
     from syncline_design.spec.catalog import CatalogFile
     from syncline_design.spec.spec import Spec
     from syncline_design.studies.definition import StudyFile
@@ -50,7 +50,7 @@ def _model(name: SchemaName) -> type[BaseModel]:
     return models[name]
 
 
-def schema_text(name: SchemaName) -> str:
+def schema_text(name: FileName) -> str:
     """The schema as JSON text."""
     return json.dumps(json_schema(name), indent=2, ensure_ascii=False) + "\n"
 

@@ -5,19 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from syncline_design.model.quantity import Dimension
+from syncline_design.model.unit_table import SI_UNITS
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import obstacle_sentence
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.record import CaseRecord
 from syncline_design.studies.result import CaseResult, StudyResult
 
-_SI_UNITS = {
-    Dimension.LENGTH: "m", Dimension.TIME: "s", Dimension.ANGLE: "rad", Dimension.SPEED: "m/s",
-    Dimension.ANGULAR_RATE: "rad/s", Dimension.MASS: "kg", Dimension.POWER: "W",
-    Dimension.RATIO: "1", Dimension.DIMENSIONLESS: "1", Dimension.FREQUENCY: "Hz",
-    Dimension.ACCELERATION: "m/s^2",
-}  # fmt: skip
 FIGURES = (
     "cost", "mass_kg", "power_w", "error_m", "sensor_error_m", "sync_error_m", "tau_s",
     "tau_crit_s",
@@ -33,7 +27,7 @@ def si_unit(factor: Factor) -> str | None:
     if len(kinds) != 1 or "" in kinds:
         return None
     kind = kinds.pop()
-    return next((unit for d, unit in _SI_UNITS.items() if d.value == kind), kind)
+    return next((unit for d, unit in SI_UNITS.items() if d.value == kind), kind)
 
 
 def columns(result: StudyResult) -> list[str]:
