@@ -357,6 +357,6 @@ def test_the_example_of_the_manual_loads(tmp_path: Path) -> None:
 def test_the_manual_lists_every_unit() -> None:
     manual = (SPECS.parent / "docs" / "specs.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"[^\s|,]+", manual.split("|---|---|")[1].split("\n\n")[0]))
-    left_out = {Dimension.FREQUENCY, Dimension.ACCELERATION}  # no key of a file takes them
+    left_out = {Dimension.ACCELERATION}  # no key of a file takes it
     units = {u for u, (d, _) in UNITS.items() if d not in left_out and u.isascii()}
     assert units <= listed

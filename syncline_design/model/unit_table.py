@@ -25,6 +25,7 @@ class Dimension(Enum):
     RATIO = "ratio"
     FREQUENCY = "frequency"
     ACCELERATION = "acceleration"
+    TEMPERATURE = "temperature"
     DIMENSIONLESS = "plain number"
 
 
@@ -76,6 +77,7 @@ UNITS: dict[str, tuple[Dimension, Fraction]] = {
     **_prefixed(_D.FREQUENCY, "Hz", ("m", "", "k", "M", "G")),
     "m/s^2": (_D.ACCELERATION, Fraction(1)),
     "m/s2": (_D.ACCELERATION, Fraction(1)),
+    "degC": (_D.TEMPERATURE, Fraction(1)),  # stays Celsius: only ever compared
 }
 
 EXAMPLES: dict[Dimension, str] = {
@@ -90,6 +92,7 @@ EXAMPLES: dict[Dimension, str] = {
     _D.RATIO: "20 ppm",
     _D.FREQUENCY: "10 Hz",
     _D.ACCELERATION: "9.81 m/s^2",
+    _D.TEMPERATURE: "20 degC",
     _D.DIMENSIONLESS: "1.0",
 }
 
@@ -101,7 +104,8 @@ SPELLINGS = {
     "degps": "deg/s", "radian": "rad", "radians": "rad", "radps": "rad/s", "mps": "m/s",
     "kmh": "km/h", "kph": "km/h", "knot": "kn", "knots": "kn", "kt": "kn", "gram": "g",
     "grams": "g", "kilogram": "kg", "watt": "W", "watts": "W", "hz": "Hz", "euro": "EUR",
-    "euros": "EUR", "\u20ac": "EUR", "$": "USD", "\u00a3": "GBP", "percent": "%",
+    "euros": "EUR", "\u20ac": "EUR", "$": "USD", "\u00a3": "GBP", "percent": "%", "c": "degC",
+    "\u00b0c": "degC", "celsius": "degC", "lines/s": "Hz", "fps": "Hz",
 }  # fmt: skip
 
 # Units that a result is shown in, smallest first.
@@ -116,6 +120,7 @@ LADDERS: dict[Dimension, tuple[str, ...]] = {
     _D.RATIO: ("ppb", "ppm", "%"),
     _D.FREQUENCY: ("mHz", "Hz", "kHz", "MHz", "GHz"),
     _D.ACCELERATION: ("m/s^2",),
+    _D.TEMPERATURE: ("degC",),
 }
 
 # how tables of figures in SI name each dimension
@@ -123,7 +128,7 @@ SI_UNITS = {
     Dimension.LENGTH: "m", Dimension.TIME: "s", Dimension.ANGLE: "rad", Dimension.SPEED: "m/s",
     Dimension.ANGULAR_RATE: "rad/s", Dimension.MASS: "kg", Dimension.POWER: "W",
     Dimension.RATIO: "1", Dimension.DIMENSIONLESS: "1", Dimension.FREQUENCY: "Hz",
-    Dimension.ACCELERATION: "m/s^2",
+    Dimension.ACCELERATION: "m/s^2", Dimension.TEMPERATURE: "degC",
 }  # fmt: skip
 
 # Suffixes of column and parameter names; the first is the SI one of its dimension.

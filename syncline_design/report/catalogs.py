@@ -36,7 +36,7 @@ def _digest(entry: Entry) -> str:
 def _figures(entry: Entry) -> list[tuple[str, Any]]:
     return [
         (key, value)
-        for key, value in entry
+        for key, value in entry.told()
         if key not in _TEXT_FIELDS and value is not None and value != () and value != {}
     ]
 
@@ -68,9 +68,7 @@ def _entry_text(section: str, identity: str, entry: Entry) -> str:
 
 def is_assumed(entry: Entry, figure: str) -> bool:
     """Whether the catalog has no public source for a figure."""
-    if isinstance(entry.basis, Mapping):
-        return figure in entry.basis
-    return entry.basis == "assumption" and figure not in ("modality", "type")
+    return entry.basis_of(figure) == "assumption" and figure not in ("modality", "type")
 
 
 def suggestion(catalog: Catalog, identity: str) -> str:

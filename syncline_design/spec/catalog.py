@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, PlainValidator, model_validator
@@ -9,6 +10,18 @@ from pydantic_core import PydanticCustomError
 
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.roles import RoleName
+from syncline_design.spec.facts import (
+    Corrected,
+    FieldOfView,
+    Figures,
+    Lifecycle,
+    Medium,
+    MoneyInterval,
+    Rate,
+    Reach,
+    TemperatureInterval,
+    unknown_figures,
+)
 from syncline_design.spec.fields import (
     AngularRate,
     AtLeastOne,
@@ -49,12 +62,15 @@ SIGMAS_OF: dict[str, tuple[str, ...]] = {
 }
 
 
+BASES = ("assumption", "transcript")  # a transcript: another's copy of a maker's document
+
+
 def _read_basis(value: Any) -> Any:
-    if value == "assumption":
+    if value in BASES:
         return value
-    if isinstance(value, dict) and value and all(v == "assumption" for v in value.values()):
+    if isinstance(value, dict) and value and all(v in BASES for v in value.values()):
         return value
-    wanted = "assumption, or a mapping such as {cost: assumption}"
+    wanted = "assumption, transcript, or a mapping such as {cost: assumption}"
     raise refusal("a basis that is not known", wanted, kind_of(value))
 
 
@@ -64,8 +80,8 @@ Basis = Annotated[
         _read_basis,
         {
             "anyOf": [
-                {"const": "assumption"},
-                {"type": "object", "additionalProperties": {"const": "assumption"}},
+                {"enum": list(BASES)},
+                {"type": "object", "additionalProperties": {"enum": list(BASES)}},
             ]
         },
     ),
@@ -79,18 +95,51 @@ class Entry(Record):
     source: str = ""
     basis: Basis | None = None  # "assumption", or per figure: {cost: assumption}
     note: str = ""
+    figures: Figures  # what sources print, by figure or by part: sigma_attitude.yaw
 
     @model_validator(mode="after")
-    def _basis_names_figures(self) -> Entry:
-        if isinstance(self.basis, dict):
-            known = list(type(self).model_fields)
-            wrong = [key for key in self.basis if key not in known]
-            if wrong:
-                raise refusals(
-                    (("basis", key), refusal("no such figure", hint=did_you_mean(key, known)))
-                    for key in wrong
-                )
+    def _names_figures(self) -> Entry:
+        known = [name for name in type(self).model_fields if name not in _ABOUT]
+        named = self.basis if isinstance(self.basis, dict) else {}
+        if not named and not self.figures:
+            return self
+        errors: list[tuple[KeyPath, PydanticCustomError]] = [
+            ((field, key), refusal("no such figure", hint=hint))
+            for field, keys in (("basis", named), ("figures", self.figures))
+            for key, hint in unknown_figures(iter(keys), known)
+        ]
+        if errors:
+            raise refusals(errors)
         return self
+
+    def told(self) -> Iterator[tuple[str, Any]]:
+        """Every key with its value, those that only this kind of entry has first."""
+        own = [name for name in type(self).model_fields if name not in Bought.model_fields]
+        shared = [name for name in type(self).model_fields if name in Bought.model_fields]
+        return ((name, getattr(self, name)) for name in (*own, *shared))
+
+    def basis_of(self, figure: str) -> str | None:
+        """What a figure, or the part of one, stands on; None: on its source."""
+        if not isinstance(self.basis, dict):
+            return self.basis
+        named: str | None = self.basis.get(figure, self.basis.get(figure.partition(".")[0]))
+        return named
+
+
+_ABOUT = frozenset({"name", "source", "basis", "note", "figures"})
+
+
+class Bought(Entry):
+    """What can be bought."""
+
+    needs: tuple[Need, ...] = ()
+    cost: Money | None = None
+    price_class: MoneyInterval | None = None  # where no list price is public
+    mass: Mass | None = None
+    power: Power | None = None
+    lifecycle: Lifecycle | None = None
+    lead_time: NonNegativeTime | None = None
+    temperature: TemperatureInterval | None = None
 
 
 class PlatformEntry(Entry):
@@ -98,9 +147,10 @@ class PlatformEntry(Entry):
     omega_max: AngularRate
     distance: PositiveLength
     baseline: NonNegativeLength
+    medium: Medium | None = None  # of the path to the object
 
 
-class SensorEntry(Entry):
+class SensorEntry(Bought):
     """A sensor; the sigmas of its modality are due, those of others refused.
 
     A single sigma_position, sigma_attitude or sigma_bearing holds for every axis.
@@ -115,10 +165,12 @@ class SensorEntry(Entry):
     sigma_range: SigmaLength | None = None
     sigma_bearing: Annotated[Sigma, axes(Dimension.ANGLE, ("azimuth", "elevation"))] | None = None
     primitives: tuple[Primitive, ...]
-    needs: tuple[Need, ...] = ()
-    cost: Money | None = None
-    mass: Mass | None = None
-    power: Power | None = None
+    reach: Reach | None = None
+    medium: Medium | None = None
+    field_of_view: FieldOfView | None = None
+    rate: Rate | None = None
+    corrects: tuple[Corrected, ...] = ()
+    depth_rating: PositiveLength | None = None
 
     @model_validator(mode="after")
     def _sigmas_fit_modality(self) -> SensorEntry:
@@ -223,39 +275,27 @@ ErrorEntry = Annotated[
 ]
 
 
-class TimestampingEntry(Entry):
+class TimestampingEntry(Bought):
     """A timestamping method; cost, mass and power count per sensor that uses it."""
 
     primitives: Annotated[tuple[Primitive, ...], AtLeastOne]
     timeline: Literal["host", "utc"] = "host"
     error: ErrorEntry
-    needs: tuple[Need, ...] = ()
-    cost: Money | None = None
-    mass: Mass | None = None
-    power: Power | None = None
     requires: dict[str, Count] = Field(default_factory=dict)  # channels of shared hardware
 
 
-class InfrastructureEntry(Entry):
+class InfrastructureEntry(Bought):
     """Shared hardware, bought once per vehicle and per full set of channels."""
 
     channels: Count
-    needs: tuple[Need, ...] = ()
-    cost: Money | None = None
-    mass: Mass | None = None
-    power: Power | None = None
 
 
-class ClockEntry(Entry):
+class ClockEntry(Bought):
     """How a vehicle's host clock is disciplined; offset is host against UTC."""
 
     offset: ErrorEntry
     drift: Ratio | None = None  # free-running clock: ppm, times holdover
     holdover: PositiveTime | None = None
-    needs: tuple[Need, ...] = ()
-    cost: Money | None = None
-    mass: Mass | None = None
-    power: Power | None = None
     requires: dict[str, Count] = Field(default_factory=dict)
 
     @model_validator(mode="after")

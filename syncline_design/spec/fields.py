@@ -183,7 +183,7 @@ class Reader:
         return dict(self.schema)
 
 
-def _figure(
+def figure_of(
     dimension: Dimension, lowest: float | None = None, above: bool = False, tolerance: bool = False
 ) -> Reader:
     def read(value: Any) -> Quantity:
@@ -204,20 +204,20 @@ def _read_yes_no(value: Any) -> bool:
 YesNo = Annotated[
     bool, Reader(_read_yes_no, {"anyOf": [{"enum": ["yes", "no"]}, {"type": "boolean"}]})
 ]
-PositiveLength = Annotated[float, _figure(Dimension.LENGTH, 0.0, above=True)]
-NonNegativeLength = Annotated[float, _figure(Dimension.LENGTH, 0.0)]
-Time = Annotated[float, _figure(Dimension.TIME)]
-PositiveTime = Annotated[float, _figure(Dimension.TIME, 0.0, above=True)]
-NonNegativeTime = Annotated[float, _figure(Dimension.TIME, 0.0)]
-Speed = Annotated[float, _figure(Dimension.SPEED, 0.0)]
-AngularRate = Annotated[float, _figure(Dimension.ANGULAR_RATE, 0.0)]
-NonNegativeAngle = Annotated[float, _figure(Dimension.ANGLE, 0.0)]
-Mass = Annotated[Quantity, _figure(Dimension.MASS, 0.0)]
-Power = Annotated[Quantity, _figure(Dimension.POWER, 0.0)]
-Money = Annotated[Quantity, _figure(Dimension.MONEY, 0.0)]
-PositiveMoney = Annotated[Quantity, _figure(Dimension.MONEY, 0.0, above=True)]
-Ratio = Annotated[float, _figure(Dimension.RATIO, 0.0)]
-SigmaLength = Annotated[float, _figure(Dimension.LENGTH, 0.0, above=True, tolerance=True)]
+PositiveLength = Annotated[float, figure_of(Dimension.LENGTH, 0.0, above=True)]
+NonNegativeLength = Annotated[float, figure_of(Dimension.LENGTH, 0.0)]
+Time = Annotated[float, figure_of(Dimension.TIME)]
+PositiveTime = Annotated[float, figure_of(Dimension.TIME, 0.0, above=True)]
+NonNegativeTime = Annotated[float, figure_of(Dimension.TIME, 0.0)]
+Speed = Annotated[float, figure_of(Dimension.SPEED, 0.0)]
+AngularRate = Annotated[float, figure_of(Dimension.ANGULAR_RATE, 0.0)]
+NonNegativeAngle = Annotated[float, figure_of(Dimension.ANGLE, 0.0)]
+Mass = Annotated[Quantity, figure_of(Dimension.MASS, 0.0)]
+Power = Annotated[Quantity, figure_of(Dimension.POWER, 0.0)]
+Money = Annotated[Quantity, figure_of(Dimension.MONEY, 0.0)]
+PositiveMoney = Annotated[Quantity, figure_of(Dimension.MONEY, 0.0, above=True)]
+Ratio = Annotated[float, figure_of(Dimension.RATIO, 0.0)]
+SigmaLength = Annotated[float, figure_of(Dimension.LENGTH, 0.0, above=True, tolerance=True)]
 
 
 def _number(lowest: float) -> Reader:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from syncline_design.effects import registry
 from syncline_design.model.budget import differs
@@ -19,7 +19,12 @@ from syncline_design.verdict.verified import Verified
 LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed their bound
 
 
-def cautions(case: Case, verified: Verified, assumed: Sequence[Assumption]) -> tuple[Caution, ...]:
+def cautions(
+    case: Case,
+    verified: Verified,
+    assumed: Sequence[Assumption],
+    copied: Mapping[str, Sequence[str]],
+) -> tuple[Caution, ...]:
     """The `warnings` of a verdict: a code to filter by, a sentence to read, what it is about."""
     return (
         *_worst_case(verified),
@@ -30,6 +35,7 @@ def cautions(case: Case, verified: Verified, assumed: Sequence[Assumption]) -> t
         *_waivers(verified),
         *_simulation(verified),
         *_assumptions(assumed),
+        *_transcripts(copied),
     )
 
 
@@ -183,3 +189,11 @@ def _assumptions(assumed: Sequence[Assumption]) -> Iterator[Caution]:
     for entry, figures in by_entry.items():
         message = f"assumption, no public source: {', '.join(figures)} of {entry}"
         yield Caution("assumption", message, entry=entry, key=", ".join(figures))
+
+
+def _transcripts(copied: Mapping[str, Sequence[str]]) -> Iterator[Caution]:
+    """Figures that nobody here read in the maker's own document, one line an entry."""
+    for entry, figures in copied.items():
+        named = ", ".join(figures)
+        message = f"read in another's copy of the maker's figures: {named} of {entry}"
+        yield Caution("transcript", message, entry=entry, key=named)

@@ -14,6 +14,7 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import Entry
+from syncline_design.spec.facts import AXES, split_figure
 from syncline_design.verdict.tree import (
     Assumption,
     HostClock,
@@ -140,23 +141,46 @@ def used_entries(case: Case, problem: Problem, design: Design) -> list[UsedEntry
 
 def assumptions(entries: list[UsedEntry]) -> tuple[Assumption, ...]:
     """Figures without a public source, entry by entry."""
-    found: list[Assumption] = []
-    for used in entries:
-        basis = used.entry.basis
-        if basis is None:
-            continue
-        figures = list(basis) if isinstance(basis, Mapping) else _all_figures(used.entry)
-        for figure in figures:
-            value = figure_text(getattr(used.entry, figure, None))
-            found.append(Assumption(used.id, used.section, figure, value, used.entry.note))
-    return tuple(found)
+    return tuple(
+        Assumption(used.id, used.section, figure, _figure_text(used.entry, figure), used.entry.note)
+        for used in entries
+        for figure in _resting_on(used.entry, "assumption")
+    )
 
 
-_NOT_FIGURES = frozenset({"name", "source", "basis", "note", "modality", "type", "timeline"})
+def transcripts(entries: list[UsedEntry]) -> dict[str, list[str]]:
+    """Figures that were read in another's copy of a maker's document only, by entry."""
+    found = {used.id: _resting_on(used.entry, "transcript") for used in entries}
+    return {identity: figures for identity, figures in found.items() if figures}
+
+
+def _resting_on(entry: Entry, basis: str) -> list[str]:
+    """The figures of an entry that have a basis, in the order in which it names them."""
+    figures = list(entry.basis) if isinstance(entry.basis, Mapping) else _all_figures(entry)
+    return [figure for figure in figures if entry.basis_of(figure) == basis]
+
+
+def _figure_text(entry: Entry, figure: str) -> str:
+    """A figure of an entry, or the part of it that a name with a dot means."""
+    name, part = split_figure(figure)
+    value = getattr(entry, name, None)
+    if part and isinstance(value, tuple):
+        value = tuple(value[axis] for axis in AXES[name][part])
+        value = value[0] if len(set(value)) == 1 else value
+    return figure_text(value)
+
+
+_NOT_FIGURES = frozenset(
+    {"name", "source", "basis", "note", "modality", "type", "timeline", "figures", "lifecycle"}
+)
 
 
 def _all_figures(entry: Entry) -> list[str]:
-    return [key for key, value in entry if key not in _NOT_FIGURES and value not in (None, (), {})]
+    return [
+        key
+        for key, value in entry.told()
+        if key not in _NOT_FIGURES and value not in (None, (), {})
+    ]
 
 
 def figure_text(value: Any) -> str:
@@ -178,6 +202,16 @@ def figure_text(value: Any) -> str:
 
 def sources(entries: list[UsedEntry]) -> tuple[Source, ...]:
     """Where the figures come from."""
-    return tuple(
-        Source(used.id, used.section, used.entry.source) for used in entries if used.entry.source
-    )
+    told = ((used, told_source(used.entry)) for used in entries)
+    return tuple(Source(used.id, used.section, source) for used, source in told if source)
+
+
+def told_source(entry: Entry) -> str:
+    """An entry's sources in one line: its own words, else those of its figures, each once."""
+    if entry.source or not entry.figures:
+        return entry.source
+    by_source: dict[str, list[str]] = {}
+    for key, one in entry.figures.items():
+        place = f"{one.source} ({one.address})" if one.address else one.source
+        by_source.setdefault(place, []).append(key)
+    return "; ".join(f"{', '.join(keys)}: {place}" for place, keys in by_source.items())

@@ -32,7 +32,13 @@ from syncline_design.verdict.acceptance import (
 )
 from syncline_design.verdict.cautions import cautions
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
-from syncline_design.verdict.design_data import assumptions, named_design, sources, used_entries
+from syncline_design.verdict.design_data import (
+    assumptions,
+    named_design,
+    sources,
+    transcripts,
+    used_entries,
+)
 from syncline_design.verdict.recheck import Recheck, recheck
 from syncline_design.verdict.tree import (
     UNITS,
@@ -416,7 +422,7 @@ def _verdict(
         design=named_design(case, problem, verified.design, verified.figures),
         syncline=syncline_figures(verified, case.spec.sync_model),
         monte_carlo=verified.monte_carlo,
-        warnings=cautions(case, verified, assumed),
+        warnings=cautions(case, verified, assumed, transcripts(entries)),
         figures=error_figures(verified),
         assumptions=assumed,
         sources=sources(entries),

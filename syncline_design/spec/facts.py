@@ -1,0 +1,236 @@
+"""What a catalog entry says about where it works, and where each of its figures comes from.
+
+Reach, medium, field of view, rate, depth, temperature: facts that decide whether a payload can
+exist; and per figure what the source prints, of which kind, where it was read and when.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from datetime import date
+from typing import Annotated, Any, Final, Literal
+
+from pydantic import Field, model_validator
+from pydantic import field_validator as reads_field
+from pydantic_core import PydanticCustomError
+
+from syncline_design.model.conversion import conversion_of, kinds
+from syncline_design.model.quantity import Dimension, Quantity
+from syncline_design.spec.fields import (
+    NonNegativeLength,
+    PositiveLength,
+    Reader,
+    Record,
+    Text,
+    did_you_mean,
+    figure_of,
+    kind_of,
+    quantity_schema,
+    read_quantity,
+    refusal,
+    refusals,
+)
+from syncline_design.spec.yaml_text import KeyPath
+
+Medium = Literal["air", "water", "both"]
+Corrected = Literal["travel_time"]  # what the maker's own processing takes out
+FULL_TURN: Final = 2.0 * math.pi
+_STRENGTH = re.compile(r"-?[0-9]+(?:\.[0-9]+)? (?:%|dB)")
+
+
+def _read_interval(value: Any, dimension: Dimension) -> Quantity:
+    if isinstance(value, Quantity):
+        return value
+    quantity = read_quantity(value, dimension, tolerance=True)
+    if ".." not in quantity.text:
+        raise refusal("not an interval", "LOW .. HIGH, with a unit at both", quantity.text)
+    return quantity
+
+
+def _interval(dimension: Dimension) -> Reader:
+    return Reader(
+        lambda value: _read_interval(value, dimension), quantity_schema(dimension, tolerance=True)
+    )
+
+
+AngleInterval = Annotated[Quantity, _interval(Dimension.ANGLE)]
+TemperatureInterval = Annotated[Quantity, _interval(Dimension.TEMPERATURE)]
+MoneyInterval = Annotated[Quantity, _interval(Dimension.MONEY)]
+Rate = Annotated[float, figure_of(Dimension.FREQUENCY, 0.0, above=True)]
+
+
+def _read_far_end(value: Any) -> Quantity | dict[str, Quantity]:
+    """One length, or one for each reflectivity (`10 %`) or target strength (`-30 dB`)."""
+    if not isinstance(value, Mapping):
+        return read_quantity(value, Dimension.LENGTH, 0.0, above=True)
+    if not value:
+        raise refusal("an empty table", "such as {10 %: 40 m, 80 %: 70 m}", "{}")
+    errors: list[tuple[KeyPath, PydanticCustomError]] = []
+    found: dict[str, Quantity] = {}
+    for key, item in value.items():
+        if not _STRENGTH.fullmatch(str(key)):
+            wanted = "a reflectivity such as 10 %, or a target strength such as -30 dB"
+            errors.append(((str(key),), refusal("not a target", wanted, kind_of(key))))
+            continue
+        try:
+            found[str(key)] = read_quantity(item, Dimension.LENGTH, 0.0, above=True)
+        except PydanticCustomError as error:
+            errors.append(((str(key),), error))
+    if errors:
+        raise refusals(errors)
+    return found
+
+
+_LENGTH = quantity_schema(Dimension.LENGTH)
+_TABLE = {"type": "object", "additionalProperties": _LENGTH}
+FarEnd = Annotated[float | dict[str, float], Reader(_read_far_end, {"anyOf": [_LENGTH, _TABLE]})]
+
+
+class Reach(Record):
+    """Between which distances a ranging sensor measures; `at` names the condition."""
+
+    min: NonNegativeLength | None = None
+    max: FarEnd | None = None
+    at: str = ""
+
+    @model_validator(mode="after")
+    def _ends_in_order(self) -> Reach:
+        if self.min is None and self.max is None:
+            raise refusals([(("max",), refusal("missing", "min, max or both"))])
+        far = self.farthest()
+        if self.min is not None and far is not None and self.min > far:
+            shown = f"min {_text(self.min)}, max {_text(far)}"
+            raise refusals([(("min",), refusal("min above max", "min <= max", shown))])
+        return self
+
+    def farthest(self, reflectivity: float | None = None) -> float | None:
+        """The far end; of a table the smallest row, unless a reflectivity (0.8) picks one.
+
+        A row holds for every target that reflects at least what it says; None: no row does.
+        """
+        if not isinstance(self.max, Mapping):
+            return self.max
+        if reflectivity is None:
+            return min(self.max.values())
+        held = [
+            length
+            for target, length in self.max.items()
+            if (ratio := _ratio(target)) is not None and ratio <= reflectivity * (1.0 + 1e-12)
+        ]
+        return max(held, default=None)
+
+
+def _ratio(target: str) -> float | None:
+    return float(target[:-2]) / 100.0 if target.endswith("%") else None
+
+
+def _text(value: float) -> str:
+    return str(getattr(value, "text", value))
+
+
+class FieldOfView(Record):
+    """Where a sensor looks, about its own axes; left out: a full turn, or not known."""
+
+    azimuth: AngleInterval | None = None
+    elevation: AngleInterval | None = None
+
+    @model_validator(mode="after")
+    def _within_a_turn(self) -> FieldOfView:
+        errors = []
+        for name, value in self:
+            if value is not None and value.high - value.low > FULL_TURN * (1.0 + 1e-12):
+                errors.append(
+                    ((name,), refusal("wider than a turn", "at most 360 deg", value.text))
+                )
+        if self.azimuth is None and self.elevation is None:
+            errors.append((("azimuth",), refusal("missing", "azimuth, elevation or both")))
+        if errors:
+            raise refusals(errors)
+        return self
+
+
+def _read_date(value: Any) -> str:
+    try:
+        return date.fromisoformat(value).isoformat()
+    except (TypeError, ValueError):
+        raise refusal("not a date", "a date such as 2026-11-22", kind_of(value)) from None
+
+
+Day = Annotated[str, Reader(_read_date, {"type": "string", "format": "date"})]
+
+
+class Lifecycle(Record):
+    """Whether a product can be had, as read on a day."""
+
+    status: Literal["active", "discontinued", "announced"]
+    read: Day
+    source: str = ""
+    successor: Text | None = None  # id of the entry that follows it
+    note: str = ""
+
+
+def _read_kind(value: Any) -> str:
+    if isinstance(value, str) and (conversion_of(value) is not None or value in kinds()):
+        return value
+    hint = did_you_mean(value, kinds()) if isinstance(value, str) else ""
+    raise refusal("no such kind of figure", " or ".join(kinds()), kind_of(value), hint)
+
+
+class PrintedFigure(Record):
+    """One figure as its source prints it.
+
+    over: the length that a share of a length refers to (a baseline, a slant range); at: under
+    which condition it holds; source and address: what was read; read: on which day.
+    """
+
+    figure: Text
+    kind: Annotated[str, Reader(_read_kind, {"type": "string"})]
+    source: Text
+    read: Day
+    address: str = ""
+    over: PositiveLength | None = None
+    at: str = ""
+    note: str = ""
+
+    @reads_field("figure", mode="after")
+    @classmethod
+    def _is_short(cls, value: str) -> str:
+        if len(value) > 200:
+            raise refusal("too long for a figure", "at most 200 characters", f"{len(value)}")
+        return value
+
+
+Figures = Annotated[dict[str, PrintedFigure], Field(default_factory=dict)]
+
+# The parts of a figure that may have sources of their own: which axes each one gives.
+AXES: Final[Mapping[str, Mapping[str, tuple[int, ...]]]] = {
+    "sigma_position": {
+        "north": (0,), "east": (1,), "down": (2,), "horizontal": (0, 1), "vertical": (2,),
+    },
+    "sigma_attitude": {"roll": (0,), "pitch": (1,), "yaw": (2,), "roll_pitch": (0, 1)},
+    "sigma_bearing": {"azimuth": (0,), "elevation": (1,)},
+}  # fmt: skip
+SIGMA_DIMENSIONS: Final[Mapping[str, Dimension]] = {
+    "sigma_position": Dimension.LENGTH,
+    "sigma_range": Dimension.LENGTH,
+    "sigma_attitude": Dimension.ANGLE,
+    "sigma_bearing": Dimension.ANGLE,
+}
+
+
+def split_figure(key: str) -> tuple[str, str]:
+    """`sigma_attitude.yaw` -> (`sigma_attitude`, `yaw`); the part is empty for a whole figure."""
+    name, _, part = key.partition(".")
+    return name, part
+
+
+def unknown_figures(keys: Iterator[str], known: list[str]) -> Iterator[tuple[str, str]]:
+    """Keys that name no figure of an entry, each with what it might have meant."""
+    for key in keys:
+        name, part = split_figure(key)
+        if name not in known:
+            yield key, did_you_mean(name, known)
+        elif part and part not in AXES.get(name, {}):
+            yield key, did_you_mean(part, AXES.get(name, {})) or "no such part of this figure"
