@@ -114,8 +114,8 @@ class Entry(Record):
 
     def told(self) -> Iterator[tuple[str, Any]]:
         """Every key with its value, those that only this kind of entry has first."""
-        own = [name for name in type(self).model_fields if name not in Bought.model_fields]
-        shared = [name for name in type(self).model_fields if name in Bought.model_fields]
+        own = [name for name in type(self).model_fields if name not in Product.model_fields]
+        shared = [name for name in type(self).model_fields if name in Product.model_fields]
         return ((name, getattr(self, name)) for name in (*own, *shared))
 
     def basis_of(self, figure: str) -> str | None:
@@ -129,7 +129,7 @@ class Entry(Record):
 _ABOUT = frozenset({"name", "source", "basis", "note", "figures"})
 
 
-class Bought(Entry):
+class Product(Entry):
     """What can be bought."""
 
     needs: tuple[Need, ...] = ()
@@ -150,7 +150,7 @@ class PlatformEntry(Entry):
     medium: Medium | None = None  # of the path to the object
 
 
-class SensorEntry(Bought):
+class SensorEntry(Product):
     """A sensor; the sigmas of its modality are due, those of others refused.
 
     A single sigma_position, sigma_attitude or sigma_bearing holds for every axis.
@@ -275,7 +275,7 @@ ErrorEntry = Annotated[
 ]
 
 
-class TimestampingEntry(Bought):
+class TimestampingEntry(Product):
     """A timestamping method; cost, mass and power count per sensor that uses it."""
 
     primitives: Annotated[tuple[Primitive, ...], AtLeastOne]
@@ -284,13 +284,13 @@ class TimestampingEntry(Bought):
     requires: dict[str, Count] = Field(default_factory=dict)  # channels of shared hardware
 
 
-class InfrastructureEntry(Bought):
+class InfrastructureEntry(Product):
     """Shared hardware, bought once per vehicle and per full set of channels."""
 
     channels: Count
 
 
-class ClockEntry(Bought):
+class ClockEntry(Product):
     """How a vehicle's host clock is disciplined; offset is host against UTC."""
 
     offset: ErrorEntry
