@@ -1,0 +1,98 @@
+"""Logs of chronyd: tracking, statistics, measurements, refclocks (chrony.conf(5), `log`).
+
+tracking.log and statistics.log hold local minus reference, measurements.log and refclocks.log
+reference minus local.
+"""
+
+from __future__ import annotations
+
+import calendar
+import re
+from typing import Final
+
+from syncline_design.clocks.series import Row, SourceKind
+
+_STAMP: Final = re.compile(r"(\d{4})-(\d\d)-(\d\d)$")
+_CLOCK: Final = re.compile(r"(\d\d):(\d\d):(\d\d(?:\.\d+)?)$")
+_LEAPS: Final = frozenset("N+-?")
+_TESTS: Final = re.compile(r"[01]{3}")
+_DISTANT_SKEW: Final = 1e5  # ppm; chronyd starts with 1e6 where no drift file says better
+UNSET: Final = "0.0.0.0"
+
+TRACKING: Final = SourceKind("chrony tracking", "chrony", 1, "servo", "utc")
+
+
+def row(line: str) -> tuple[SourceKind, Row, str] | None:
+    """A line of any of the four logs: source, row, the reference it names; None: no such line."""
+    cells = line.split()
+    if len(cells) < 9:
+        return None
+    time_s = stamp(cells[0], cells[1])
+    if time_s is None:
+        return None
+    try:
+        return _row(time_s, cells)
+    except (ValueError, IndexError):
+        return None
+
+
+def is_repeat(line: str) -> bool:
+    """A filtered sample of refclocks.log: it has no raw offset and sums up the ones before."""
+    cells = line.split()
+    return len(cells) == 9 and cells[6] == "-" and stamp(cells[0], cells[1]) is not None
+
+
+def stamp(date: str, clock: str) -> float | None:
+    """`2026-11-22 03:34:54` as Unix time; a leap second 60 is the one after 59."""
+    day, hours = _STAMP.match(date), _CLOCK.match(clock)
+    if day is None or hours is None:
+        return None
+    try:
+        whole = calendar.timegm((int(day[1]), int(day[2]), int(day[3]), 0, 0, 0))
+    except ValueError:
+        return None
+    return whole + 3600.0 * int(hours[1]) + 60.0 * int(hours[2]) + float(hours[3])
+
+
+def _row(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str] | None:
+    if len(cells) >= 17 and cells[3] in _LEAPS and _TESTS.fullmatch(cells[5]):
+        return _measurement(time_s, cells)
+    if len(cells) >= 11 and cells[7] in _LEAPS:
+        return TRACKING, _tracking(time_s, cells), cells[2]
+    if len(cells) == 9 and cells[4] in _LEAPS:
+        return _refclock(time_s, cells)
+    if len(cells) in (12, 13) and cells[9].isdigit() and cells[10].isdigit():
+        kind = SourceKind(f"chrony statistics {cells[2]}", "chrony", 3, "servo", "utc", cells[2])
+        return kind, Row(time_s, float(cells[4]), skew=float(cells[7])), ""
+    return None
+
+
+def _tracking(time_s: float, cells: list[str]) -> Row:
+    """Hard bound: the larger of `Max. error` and |offset| + root dispersion + root delay / 2."""
+    skew, offset = float(cells[5]), float(cells[6])
+    hard = float("nan")
+    if len(cells) >= 13:
+        delay, dispersion = float(cells[11]), float(cells[12])
+        hard = abs(offset) + dispersion + delay / 2.0
+        if len(cells) >= 14:
+            hard = max(hard, float(cells[13]))
+    locked = cells[7] != "?" and cells[2] != UNSET
+    restart = not locked and skew >= _DISTANT_SKEW
+    return Row(time_s, offset, hard, locked, 1e-6 * float(cells[4]), 1e-6 * skew, restart)
+
+
+def _measurement(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str]:
+    """Hard bound: (peer delay + root delay) / 2 + both dispersions + |offset|."""
+    offset, delay, dispersion, root_delay, root_dispersion = map(float, cells[11:16])
+    hard = (delay + root_delay) / 2.0 + dispersion + root_dispersion + abs(offset)
+    good = "0" not in cells[5] + cells[6] and cells[3] != "?"
+    kind = SourceKind(f"chrony measurements {cells[2]}", "chrony", 2, "servo", "utc", cells[2])
+    return kind, Row(time_s, -offset, hard, good), ""
+
+
+def _refclock(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str] | None:
+    if cells[6] == "-":
+        return None
+    offset, dispersion = float(cells[7]), float(cells[8])
+    kind = SourceKind(f"chrony refclock {cells[2]}", "chrony", 2, "servo", "utc", cells[2])
+    return kind, Row(time_s, -offset, abs(offset) + dispersion, cells[4] != "?"), ""

@@ -1,0 +1,177 @@
+"""A plain table of offsets: a time, `offset_UNIT` (local minus reference), perhaps more.
+
+Columns: `time_s` (or `time`, ISO 8601), `offset_s`, `_ms`, `_us` or `_ns`; `bound_UNIT` what the
+error is bounded by at that moment; `locked` 1 or 0; `session` a name or number of the session.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+import re
+from collections.abc import Callable, Iterator, Sequence
+from datetime import UTC, datetime
+from typing import Final
+
+from syncline_design.clocks.files import LogFile, refused
+from syncline_design.clocks.series import Row, Sheet, SourceKind
+from syncline_design.machine.deadline import in_force
+
+_UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "\N{MICRO SIGN}s": 1e-6,
+                 "\N{GREEK SMALL LETTER MU}s": 1e-6, "ns": 1e-9, "ps": 1e-12}  # fmt: skip
+_QUANTITY: Final = re.compile(r"(time|t|offset|bound)(?:_|\s*[\[(]\s*)([a-z\u00b5\u03bc]+)[\])]?")
+_TRUE, _FALSE = ("1", "true", "yes", "locked"), ("0", "false", "no", "unlocked")
+_EARLIEST_UTC: Final = 3e8  # seconds; smaller stamps count from some start
+MOST_CELL: Final = 200
+
+
+def looks_like(lines: Sequence[str]) -> bool:
+    """Whether the first line that is no comment is a header with an offset in it."""
+    first = next((line for line in lines if line.strip() and not line.startswith("#")), "")
+    names = [name.strip().lower() for name in next(csv.reader([first], delimiter=_mark(first)), [])]
+    return len(names) > 1 and any(re.match(r"offset|bound", name) for name in names)
+
+
+def _mark(line: str) -> str:
+    return max((";", "\t", ","), key=line.count)
+
+
+def read(file: LogFile) -> list[Sheet]:
+    """The one source of a table of offsets."""
+    numbered = ((n, line) for n, line in enumerate(file.lines, 1)
+                if line.strip() and not line.startswith("#"))  # fmt: skip
+    line, header = next(numbered)
+    mark = _mark(header)
+    columns = _columns(file, [c.strip() for c in next(csv.reader([header], delimiter=mark))], line)
+    comma = mark != ","
+    rows: list[Row] = []
+    stamps_utc = True
+    session: str | None = None
+    for number, cells in _split(numbered, mark, file):
+        if len(cells) <= max(columns.values()):
+            if number == len(file.lines):
+                break  # cut off while it was written
+            raise refused(file.path, "a row has not the header's cells", line=number,
+                          expected=f"{max(columns.values()) + 1} cells or more",
+                          found=str(len(cells)))  # fmt: skip
+        at = _Cells(file, number, cells, columns, comma)
+        row, own = at.row(session)
+        if row is not None:
+            stamps_utc &= row.time_s > _EARLIEST_UTC
+            rows.append(row)
+            session = own
+    kind = SourceKind("CSV", "csv", 1, "unknown", "utc" if stamps_utc else "boot")
+    return [Sheet(kind, rows)]
+
+
+def _split(
+    numbered: Iterator[tuple[int, str]], mark: str, file: LogFile
+) -> Iterator[tuple[int, list[str]]]:
+    check: Callable[[], None] = in_force().check
+    for count, (number, line) in enumerate(numbered):
+        if not count % 4096:
+            check()
+        try:
+            yield number, next(csv.reader([line], delimiter=mark))
+        except csv.Error as error:
+            raise refused(file.path, f"not a row: {error}", line=number) from None
+
+
+def _columns(file: LogFile, names: Sequence[str], line: int) -> dict[str, int]:
+    """`offset_us` and the like to their places; a key `offset 1e-06` carries the scale."""
+    found: dict[str, int] = {}
+    for place, name in enumerate(names):
+        lower = name.lower()
+        match = _QUANTITY.fullmatch(lower)
+        if match and match[2] in _UNITS:
+            key = f"{'time' if match[1] == 't' else match[1]} {_UNITS[match[2]]!r}"
+        elif lower in ("time", "timestamp", "date", "datetime", "time_iso", "utc"):
+            key = "stamp"
+        elif lower in ("locked", "synchronised", "synchronized", "session"):
+            key = "session" if lower == "session" else "locked"
+        else:
+            continue
+        if any(k.split(" ")[0] == key.split(" ")[0] for k in found):
+            raise refused(file.path, f"two columns of one meaning: {name[:40]}", line=line,
+                          column=place + 1, expected="one")  # fmt: skip
+        found[key] = place
+    _demand(file, found, names, line)
+    return found
+
+
+def _demand(file: LogFile, found: dict[str, int], names: Sequence[str], line: int) -> None:
+    listed = ", ".join(names)[:MOST_CELL]
+    if not any(key.startswith("offset") for key in found):
+        raise refused(
+            file.path, "no offset whose unit and sign are known", line=line, found=listed,
+            expected="a column offset_s, offset_ms, offset_us or offset_ns: local minus reference",
+        )  # fmt: skip
+    if not any(key.startswith(("time", "stamp")) for key in found):
+        raise refused(file.path, "no time", line=line, found=listed,
+                      expected="a column time_s, or time in ISO 8601")  # fmt: skip
+
+
+class _Cells:
+    """One row of a table."""
+
+    def __init__(
+        self, file: LogFile, line: int, cells: Sequence[str], columns: dict[str, int], comma: bool
+    ) -> None:
+        self.file, self.line, self.cells = file, line, cells
+        self.columns, self.comma = columns, comma
+
+    def row(self, before: str | None) -> tuple[Row | None, str | None]:
+        """The row, None where a value is missing; and the session that it is in."""
+        time_s, offset_s = self._time(), self._number("offset")
+        if time_s is None or offset_s is None:
+            return None, before
+        bound = self._number("bound")
+        own = self._text("session")
+        restart = own is not None and before is not None and own != before
+        hard = math.nan if bound is None else abs(bound)
+        return Row(time_s, offset_s, hard, self._locked(), restart=restart), own
+
+    def _text(self, key: str) -> str | None:
+        place = self.columns.get(key)
+        return None if place is None else self.cells[place].strip()
+
+    def _number(self, name: str) -> float | None:
+        for key, place in self.columns.items():
+            if not key.startswith(name + " "):
+                continue
+            text = self.cells[place].strip()
+            if text.lower() in ("", "nan", "na", "null", "none", "-"):
+                return None
+            try:
+                value = float(text.replace(",", ".") if self.comma else text)
+            except ValueError:
+                value = math.inf
+            if not math.isfinite(value):
+                raise refused(self.file.path, f"no number in column {name}", line=self.line,
+                              column=place + 1, found=repr(text[:40]))  # fmt: skip
+            return value * float(key.split(" ")[1])
+        return None
+
+    def _time(self) -> float | None:
+        if "stamp" not in self.columns:
+            return self._number("time")
+        text = self.cells[self.columns["stamp"]].strip()
+        if not text:
+            return None
+        try:
+            read_as = datetime.fromisoformat(text)
+        except ValueError:
+            raise refused(self.file.path, "no time", line=self.line,
+                          column=self.columns["stamp"] + 1, expected="ISO 8601, or time_s",
+                          found=repr(text[:40])) from None  # fmt: skip
+        return (read_as if read_as.tzinfo else read_as.replace(tzinfo=UTC)).timestamp()
+
+    def _locked(self) -> bool:
+        text = self._text("locked")
+        if text is None or text.lower() in _TRUE:
+            return True
+        if text.lower() in _FALSE:
+            return False
+        raise refused(self.file.path, "neither locked nor unlocked", line=self.line,
+                      column=self.columns["locked"] + 1, expected="1 or 0",
+                      found=repr(text[:40]))  # fmt: skip

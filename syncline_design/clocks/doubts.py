@@ -1,0 +1,103 @@
+"""What forbids a claim until somebody has explained it: steps of the time scale, units mixed up."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from syncline_design.clocks.series import Series
+from syncline_design.clocks.sessions import ClockSession, is_leap, went_back
+from syncline_design.clocks.times import moment, shown
+from syncline_design.model.quantity import format_duration
+
+TAI_MINUS_UTC_S: Final = 37.0  # since 2017
+WHOLE_STEP_S: Final = 0.5
+_LARGEST_S, _SMALLEST_S = 0.5, 1e-11
+_THOUSANDS: Final = (1e3, 1e6, 1e9)
+
+
+def doubts(series: Sequence[Series], sessions: Sequence[ClockSession]) -> tuple[str, ...]:
+    """Every doubt as a sentence without its stop."""
+    found = [
+        *(said for one in series for said in _stamps(one)),
+        *(said for one in sessions for said in _steps(one)),
+        *_levels(sessions),
+        *_units(sessions),
+        *_own_bound(sessions),
+    ]
+    return tuple(dict.fromkeys(found))
+
+
+def _stamps(one: Series) -> Iterator[str]:
+    for time_s, back_s in went_back(one):
+        hours = back_s / 3600.0
+        dst = abs(hours - round(hours)) * 3600.0 < 60.0 and round(hours) in (1, 2)
+        why = "local time set back (DST)? give stamps in UTC" if dst else "was the clock set?"
+        yield (f"{one.kind.name}: the stamps go back by {format_duration(back_s)} at "
+               f"{moment(time_s, one.kind.stamps)}: {why}")  # fmt: skip
+
+
+def _steps(session: ClockSession) -> Iterator[str]:
+    series = session.series
+    offsets, times = session.offsets, series.time_s[session.steady]
+    jumps = np.diff(offsets)
+    for k in np.flatnonzero(np.abs(jumps) >= WHOLE_STEP_S)[:3]:
+        jump, at = float(jumps[k]), float(times[k + 1])
+        leap = series.kind.stamps == "utc" and is_leap(at, jump)
+        hour = abs(abs(jump) - 3600.0) < 60.0
+        why = ("a leap second?" if leap else "an hour: local time (DST)?" if hour
+               else "was the clock set?")  # fmt: skip
+        yield (f"{series.kind.name}: the offset jumps by {shown(jump)} at "
+               f"{moment(at, series.kind.stamps)}: {why} The logs before and after "
+               "do not tell of one clock")  # fmt: skip
+
+
+def _levels(sessions: Sequence[ClockSession]) -> Iterator[str]:
+    for session in sessions:
+        if not session.is_counted:
+            continue
+        median = float(np.median(session.offsets))
+        typical = float(np.median(np.abs(session.offsets)))
+        name = session.series.kind.name
+        if abs(abs(median) - TAI_MINUS_UTC_S) < 0.5:
+            yield (
+                f"{name}: off by {shown(median)}: TAI against UTC (37 s): one side counts leap "
+                "seconds, the other does not (phc2sys -O, or the grandmaster's UTC offset)"
+            )
+            return
+        if typical > _LARGEST_S:
+            yield (f"{name}: offsets of {shown(typical)}: is that the unit, and is it a "
+                   "synchronised clock?")  # fmt: skip
+            return
+        if 0.0 < typical < _SMALLEST_S:
+            yield f"{name}: offsets of {shown(typical)}: is that the unit? No clock is as good"
+            return
+
+
+def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
+    """Sessions of different files whose levels stand a thousand apart, with nothing between."""
+    levels = [(float(np.median(np.abs(s.offsets))), s) for s in sessions if s.is_counted]
+    levels = sorted((level for level in levels if level[0] > 0.0), key=lambda level: level[0])
+    for (low, small), (high, large) in itertools.pairwise(levels):
+        below = [level for level, _ in levels if level <= low]
+        above = [level for level, _ in levels if level >= high]
+        ratio = float(np.median(above)) / float(np.median(below))
+        apart = small.series.files != large.series.files
+        if apart and high > 100.0 * low and any(0.3 < ratio / t < 3.0 for t in _THOUSANDS):
+            yield (f"offsets in {large.series.files[0]} are {ratio:.3g} times those in "
+                   f"{small.series.files[0]}: are the units the same?")  # fmt: skip
+            return
+
+
+def _own_bound(sessions: Sequence[ClockSession]) -> Iterator[str]:
+    for session in sessions:
+        hard = session.series.hard_s[session.steady]
+        known = np.isfinite(hard)
+        beyond = np.abs(session.offsets[known]) > hard[known] * (1.0 + 1e-9)
+        if np.sum(known) >= 20 and float(np.mean(beyond)) > 0.5:
+            yield (f"{session.series.kind.name}: most offsets are beyond the bound given beside "
+                   "them: are the units the same?")  # fmt: skip
+            return

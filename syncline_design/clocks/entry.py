@@ -1,0 +1,178 @@
+"""What logs showed as an entry of a catalog: YAML with its claim, and the values beside it."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+from syncline_design.clocks.files import refused
+from syncline_design.clocks.result import CatalogEntry, EntryKind, Timing
+from syncline_design.clocks.study import TimingStudy
+from syncline_design.machine.result_files import write_files
+
+_ID: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,79}")
+_SECTIONS: Final[dict[EntryKind, str]] = {"clock": "clocks", "timestamping": "timestamping"}
+_MOST_EVENTS: Final = 20
+_MARK: Final = "# Measured by `syncline-design timing`"
+
+
+@dataclass(frozen=True, slots=True)
+class EntryFiles:
+    """What is to be written: catalog and values."""
+
+    catalog: Path
+    values: Path
+
+    @property
+    def paths(self) -> tuple[Path, Path]:
+        """Both."""
+        return self.catalog, self.values
+
+
+def entry_files(identity: str, catalog: Path | None) -> EntryFiles:
+    """Where an entry goes; refused for an id that no catalog takes, or a file of somebody else."""
+    if not _ID.fullmatch(identity):
+        raise refused(Path(f"--as {identity[:40]}"), "not an id",
+                      expected="letters, digits, _ . - and a letter first")  # fmt: skip
+    path = catalog or Path(f"{identity}.yaml")
+    if path.exists():
+        try:
+            head = path.read_bytes()[:4096].decode("utf-8", "replace") if path.is_file() else ""
+        except OSError:
+            head = ""
+        if not head.startswith(_MARK) or f"\n  {identity}:\n" not in head:
+            raise refused(
+                path,
+                "is there already and is not this entry",
+                hint="write the entry elsewhere and name both files in the spec",
+            )
+    return EntryFiles(
+        path,
+        path.with_name(
+            f"{path.stem}_{identity}_values.txt"
+            if path.stem != identity
+            else f"{identity}_values.txt"
+        ),
+    )
+
+
+def with_entry(study: TimingStudy, identity: str, kind: EntryKind, files: EntryFiles) -> Timing:
+    """The result with its entry; nothing is written yet."""
+    text = entry_text(study.timing, identity, kind, files.values.name)
+    entry = CatalogEntry(identity, kind, str(files.catalog), str(files.values), text)
+    return replace(study.timing, entry=entry)
+
+
+def write_entry(study: TimingStudy, timing: Timing, files: EntryFiles) -> None:
+    """Catalog and values, both or none."""
+    assert timing.entry is not None
+    values = values_text(study, timing.entry.kind)
+    write_files([(files.values, values.encode()), (files.catalog, timing.entry.text.encode())])
+
+
+def values_text(study: TimingStudy, kind: EntryKind) -> str:
+    """Quantiles of the error, one a line; of a method mu = -offset (valid at stamp + mu)."""
+    sign = 1.0 if kind == "clock" else -1.0
+    meaning = "host minus UTC" if kind == "clock" else "mu: data were valid at their stamp plus mu"
+    lines = [f"# {meaning}, quantiles of the steady state, each session with the same weight", "s"]
+    lines += [f"{value:.9g}" for value in sorted((sign * study.offsets_s).tolist())]
+    return "\n".join(lines) + "\n"
+
+
+def entry_text(timing: Timing, identity: str, kind: EntryKind, values_file: str) -> str:
+    """One catalog file with one entry."""
+    claim, key = timing.claim, "offset" if kind == "clock" else "error"
+    lines = [
+        f"{_MARK} {timing.version}.",
+        f"{_SECTIONS[kind]}:",
+        f"  {identity}:",
+        f"    name: {_quoted(f'{identity}, measured')}",
+    ]
+    if kind == "timestamping":
+        lines += [f"    primitives: [{_primitive(timing)}]", "    timeline: host"]
+    lines += [
+        f"    {key}:",
+        "      distribution: empirical",
+        f"      file: {_quoted(values_file)}",
+        f"      bound: {_time(timing.bound_s or 0.0)}",
+        "      claim:",
+        *(f"        {name}: {value}" for name, value in _claim(timing)),
+        "      evidence:",
+        *(f"        - {{file: {_quoted(one.file)}, sha256: {one.sha256}}}"
+          for one in timing.evidence),
+        f"      conditions: {_quoted(timing.conditions or 'as in the logs, not stated')}",
+        "      events:",
+        *_events(timing),
+    ]  # fmt: skip
+    if lines[-1] == "      events:":
+        lines[-1] = "      events: []"
+    lines += [
+        "    cost: 0 EUR",
+        "    mass: 0 g",
+        "    power: 0 W",
+        "    basis: {cost: assumption, mass: assumption, power: assumption}",
+        f"    source: {_quoted(_source(timing))}",
+        "    note: " + _quoted("what disciplines this clock is taken as there already: fill in "
+                               "cost, mass and power"),
+    ]  # fmt: skip
+    assert claim.made
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=True)
+
+
+def _time(value_s: float) -> str:
+    """A bound, rounded up in its sixth figure: what is written may not be less."""
+    for unit, scale in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)):
+        if value_s >= scale or unit == "ns":
+            break
+    digits = f"{value_s / scale:.6g}"
+    if float(digits) * scale < value_s:
+        digits = f"{value_s / scale * (1.0 + 1e-5):.6g}"
+    return f"{digits} {unit}" if "e" not in digits else f"{float(digits):.12f} {unit}"
+
+
+def _claim(timing: Timing) -> list[tuple[str, str]]:
+    claim = timing.claim
+    found = [
+        ("coverage", f"{claim.coverage:g}"),
+        ("session_share", f"{claim.session_share:g}"),
+        ("confidence", f"{claim.confidence:g}"),
+        ("sessions", str(claim.sessions)),
+        ("hours", f"{claim.hours:.6g}"),
+        ("rests_on", claim.rests_on),
+    ]
+    if claim.session_s is not None:
+        found.append(("session_length", f"{claim.session_s:.6g} s"))
+    if timing.declared:
+        terms = ", ".join(f"{_quoted(k)}: {_time(v)}" for k, v in timing.declared.items())
+        found.append(("declared", f"{{{terms}}}"))
+    return found
+
+
+def _events(timing: Timing) -> list[str]:
+    """One line a kind: how often, and the largest."""
+    lines = []
+    for kind in dict.fromkeys(event.kind for event in timing.events):
+        sizes = [event.size_s for event in timing.events if event.kind == kind]
+        lines.append(f"        - {{kind: {kind}, count: {len(sizes)}, "
+                     f"largest: {_time(max(sizes))}}}")  # fmt: skip
+    return lines[:_MOST_EVENTS]
+
+
+def _primitive(timing: Timing) -> str:
+    name = timing.source.name
+    if "ptp4l" in name or name.startswith(("phc2sys", "ts2phc")):
+        return "network"
+    return "pps" if name.startswith(("gpsd PPS", "ppstest", "chrony refclock")) else "arrival"
+
+
+def _source(timing: Timing) -> str:
+    claim = timing.claim
+    return (f"measured: {timing.source.name}, {claim.sessions} sessions, "
+            f"{claim.hours:.3g} h")  # fmt: skip

@@ -1,0 +1,106 @@
+"""Lines of ptp4l, phc2sys and ts2phc: on standard output, in syslog, in the journal.
+
+`master offset`, `phc offset` and `sys offset` are local minus reference, in nanoseconds.  A summary
+line gives the `rms` and `max` of an interval: max is taken as one sample, its sign is not known.
+Stamps are seconds since boot, or whole Unix seconds; the date that syslog puts before has no year.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Final
+
+from syncline_design.clocks.series import Row, SourceKind, Stamps, Steering
+
+_PROGRAM: Final = re.compile(r"\b(ptp4l|phc2sys|ts2phc)(?=\[|: )")
+_STAMP: Final = re.compile(r"\[(\d{1,12}(?:\.\d+)?)\]")
+_TAG: Final = re.compile(r"\[([\w.@-]+?)(?::\d)?\]")
+_INTEGER: Final = r"([-+]?\d{1,18})"
+_SAMPLE: Final = re.compile(
+    rf"(?P<what>[\w/.-]+)?\s*(?:master|phc|sys|\bPHC)?\s*offset\s+{_INTEGER}\s+s(\d)"
+    rf"(?:\s+freq\s+{_INTEGER})?(?:\s+(?:path\s+)?delay\s+{_INTEGER})?"
+)
+_SUMMARY: Final = re.compile(
+    rf"(?P<what>[\w/.-]+\s+)?rms\s+{_INTEGER}\s+max\s+{_INTEGER}"
+    rf"(?:\s+freq\s+{_INTEGER}\s+\+/-\s+\d+)?(?:\s+delay\s+{_INTEGER})?"
+)
+_LOST: Final = re.compile(r"port \d+[^:]*: SLAVE to (?!SLAVE)|link down|timed out")
+_STARTED: Final = re.compile(r"INITIALIZING to LISTENING on INIT_COMPLETE|selected /dev/ptp\d+ as")
+_UNIX: Final = 1e9
+_RANKS: Final = {"phc2sys": 1, "ptp4l": 2, "ts2phc": 3}
+_STEERING: Final[dict[str, Steering]] = {
+    "phc2sys": "servo",
+    "ptp4l": "servo",
+    "ts2phc": "independent",  # against a pulse: no path whose asymmetry could hide
+}
+
+
+@dataclass(slots=True)
+class Reader:
+    """One file; states say between which lines lock was lost or the program began anew."""
+
+    began: set[tuple[str, str]] = field(default_factory=set)
+    last: dict[tuple[str, str], SourceKind] = field(default_factory=dict)
+
+    def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
+        """A line of any of the three programs that holds an offset, or says that lock was lost."""
+        program = _PROGRAM.search(line)
+        if program is None:
+            return None
+        rest = line[program.end() :]
+        stamps = list(_STAMP.finditer(rest))[:2]
+        if not stamps:
+            return None
+        # `ptp4l[812]: [1234.567]` of syslog: the first bracket is the process
+        at = stamps[1] if len(stamps) > 1 and "." not in stamps[0][1] else stamps[0]
+        if "." not in at[1] and float(at[1]) < _UNIX:
+            return None
+        time_s, said = float(at[1]), rest[at.end() :]
+        tag = _TAG.search(said)
+        key = (program[1], tag[1] if tag else "")
+        body = said[tag.end() :] if tag else said
+        return self._state(key, time_s, body) or self._sample(key, time_s, body)
+
+    def _state(
+        self, key: tuple[str, str], time_s: float, body: str
+    ) -> tuple[SourceKind, Row, str] | None:
+        if _STARTED.search(body):
+            self.began.add(key)
+        kind = self.last.get(key)
+        if kind is not None and _LOST.search(body):
+            return kind, Row(time_s, float("nan"), locked=False), ""
+        return None
+
+    def _sample(
+        self, key: tuple[str, str], time_s: float, body: str
+    ) -> tuple[SourceKind, Row, str] | None:
+        found = _SAMPLE.search(body)
+        summary = None if found else _SUMMARY.search(body)
+        if found is not None:
+            _, offset, state, freq, delay = found.groups()
+            locked = int(state) >= 2
+        elif summary is not None:
+            _, _, offset, freq, delay = summary.groups()
+            locked = True
+        else:
+            return None
+        what = ((found or summary) or found)["what"]  # type: ignore[index]
+        offset_s = 1e-9 * int(offset)
+        hard = abs(offset_s) + 1e-9 * abs(int(delay or 0)) * (0.5 if key[0] == "phc2sys" else 1.0)
+        kind = _kind(key, what, time_s)
+        self.last[key] = kind
+        restart = key in self.began
+        self.began.discard(key)
+        rate = 1e-9 * int(freq) if freq else float("nan")
+        return kind, Row(time_s, offset_s, hard, locked, rate, restart=restart), ""
+
+
+def _kind(key: tuple[str, str], what: str | None, time_s: float) -> SourceKind:
+    program, tag = key
+    named = (what or "").strip()
+    if program == "ptp4l" or named in ("master", "phc", "sys"):
+        named = tag
+    stamps: Stamps = "utc" if time_s >= _UNIX else "boot"
+    name = f"{program} {named}".strip()
+    return SourceKind(name, "linuxptp", _RANKS[program], _STEERING[program], stamps)

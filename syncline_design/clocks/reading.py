@@ -1,0 +1,178 @@
+"""Files of clock logs to series: one for each source and log, whatever format each file has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from syncline_design.clocks import chrony, columns, linuxptp, ntpd, pulses
+from syncline_design.clocks.files import LogFile, read_files, refused
+from syncline_design.clocks.series import Row, Series, Sheet, SourceKind, series_of
+from syncline_design.machine.deadline import in_force
+from syncline_design.machine.input_files import FileRead
+
+_Read = Callable[[str], tuple[SourceKind, Row, str] | None]
+_LINE_READERS: Final[dict[str, Callable[[], _Read]]] = {
+    "chrony": lambda: chrony.row,
+    "ntpd": lambda: ntpd.row,
+    "linuxptp": lambda: linuxptp.Reader().row,
+    "gpsd": lambda: pulses.gpsd_row,
+    "ppstest": lambda: pulses.ppstest_row,
+}
+_HEAD: Final = 2000  # lines by which a format is told
+_JOURNALS: Final = ("linuxptp", "gpsd", "ppstest")  # formats that stand among other lines
+_FORMATS: Final = (
+    "a log of chrony (tracking, statistics, measurements, refclocks), ntpd (loopstats, peerstats), "
+    "ptp4l, phc2sys, ts2phc, gpsd (JSON), ppstest, or a table with time_s and offset_s"
+)
+MOST_ROWS: Final = 5_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class ClockLogs:
+    """All that was read: series by source, the files, and what has to be said of them."""
+
+    series: tuple[Series, ...]
+    files: tuple[FileRead, ...]
+    notes: tuple[str, ...]
+
+
+def read_logs(paths: Sequence[Path]) -> ClockLogs:
+    """Read the logs; BadInput names the first that cannot be used."""
+    files = read_files(paths)
+    notes = [f"{one.path}: {one.cut_short}" for one in files if one.cut_short]
+    sheets: dict[tuple[str, str], list[tuple[LogFile, Sheet]]] = {}
+    for file in files:
+        read, said = _sheets(file)
+        notes += said
+        for sheet in read:
+            sheets.setdefault((file.log, sheet.kind.name), []).append((file, sheet))
+    series = [_joined(parts) for parts in sheets.values()]
+    _demand_once(series, {str(file.path): file for file in files})
+    freed = [_free_running(one) for one in series]
+    notes += [said for _, said in freed if said]
+    hashes = tuple(FileRead(str(file.path), file.sha256) for file in files)
+    return ClockLogs(tuple(one for one, _ in freed), hashes, tuple(notes))
+
+
+def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:
+    name = _format(file)
+    if name == "csv":
+        return columns.read(file), []
+    read = _LINE_READERS[name]()
+    found: dict[str, Sheet] = {}
+    strange: list[int] = []
+    total = 0
+    for number, line in enumerate(file.lines, 1):
+        if not number % 4096:
+            in_force().check()
+        parsed = read(line)
+        if parsed is None:
+            if not _is_decoration(line) and not chrony.is_repeat(line):
+                strange.append(number)
+            continue
+        kind, row, reference = parsed
+        sheet = found.setdefault(kind.name, Sheet(kind))
+        sheet.rows.append(row)
+        if reference:
+            sheet.references.add(reference)
+        total += 1
+        if total > MOST_ROWS:
+            raise refused(file.path, "too many lines", line=number, expected=f"at most {MOST_ROWS}")
+    if name in _JOURNALS:
+        return list(found.values()), []
+    return list(found.values()), _strange(file, strange, total)
+
+
+def _strange(file: LogFile, strange: list[int], total: int) -> list[str]:
+    """Lines that are none of the format: the last one is cut off, a few are said, more refused."""
+    if len(strange) > max(2, total // 10):
+        raise refused(
+            file.path, "lines that are no lines of this log", line=strange[0],
+            expected="dates, sources and figures as the daemon writes them",
+            found=repr(file.lines[strange[0] - 1][:60]),
+        )  # fmt: skip
+    if strange == [len(file.lines)]:
+        return [f"{file.path}: the last line is cut off and left out"]
+    if strange:
+        return [f"{file.path}: {len(strange)} damaged lines left out, the first at {strange[0]}"]
+    return []
+
+
+def _is_decoration(line: str) -> bool:
+    """Banners, headers, comments and empty lines."""
+    text = line.strip()
+    return not text or text[0] in "=#" or text.startswith(("Date (UTC)", "MJD"))
+
+
+def _format(file: LogFile) -> str:
+    head = [line for line in file.lines[:_HEAD] if line.strip()]
+    counts = {name: _count(make(), head) for name, make in _LINE_READERS.items()}
+    best = max(counts, key=lambda name: counts[name])
+    if counts[best] == 0 and columns.looks_like(head):
+        return "csv"
+    if counts[best] == 0 and len(file.lines) > _HEAD:
+        for name in ("linuxptp", "gpsd", "ppstest"):  # a journal that is long before they begin
+            if _count(_LINE_READERS[name](), file.lines):
+                return name
+    if counts[best] == 0:
+        shown = next((line.strip() for line in head if not _is_decoration(line)), "")
+        if not shown:
+            raise refused(file.path, "no samples", expected=_FORMATS, found="only headers")
+        columns_hint = "a table needs offset_s (or _ms, _us, _ns): local minus reference"
+        raise refused(file.path, "no clock log that is known", expected=_FORMATS,
+                      found=repr(shown[:60]), hint=columns_hint)  # fmt: skip
+    return best
+
+
+def _count(read: Callable[[str], object], lines: Iterable[str]) -> int:
+    return sum(read(line) is not None for line in lines)
+
+
+def _joined(parts: list[tuple[LogFile, Sheet]]) -> Series:
+    """Rotations of one log, the oldest first: by their stamps where these are of UTC."""
+    kind = parts[0][1].kind
+    if kind.stamps == "utc":
+        parts = sorted(parts, key=lambda part: part[1].rows[0].time_s if part[1].rows else 0.0)
+    else:
+        parts = sorted(parts, key=lambda part: part[0].order)
+    rows = [row for _, sheet in parts for row in sheet.rows]
+    references = {name for _, sheet in parts for name in sheet.references}
+    return series_of(kind, tuple(str(file.path) for file, _ in parts), rows, references)
+
+
+def _demand_once(series: Sequence[Series], files: dict[str, LogFile]) -> None:
+    """Rows of one source in two logs are one session given twice, whole or in part.
+
+    Within a log a row that comes back is one too: a rotation and its copy.
+    """
+    seen: dict[str, dict[tuple[float, float], int]] = {}
+    for index, one in enumerate(series):
+        known = seen.setdefault(one.kind.name, {})
+        rows = list(zip(one.time_s.tolist(), one.offset_s.tolist(), strict=True))
+        twice = [known[row] for row in rows if row in known]
+        if len(twice) > max(2, len(rows) // 20):
+            other = series[twice[0]].files[0]
+            raise refused(files[one.files[0]].path, f"the same session as in {other}",
+                          found=f"{len(twice)} rows of {one.kind.name} with the same stamp and "
+                          "offset", hint="a session counts once: give each once")  # fmt: skip
+        if len(one.files) > 1 and len(rows) - len(set(rows)) > max(2, len(rows) // 20):
+            raise refused(files[one.files[-1]].path, f"the same session as in {one.files[0]}",
+                          found="rows with the same stamp and offset",
+                          hint="a session counts once: give each once")  # fmt: skip
+        known.update(dict.fromkeys(rows, index))
+
+
+def _free_running(one: Series) -> tuple[Series, str]:
+    """A servo that never steered: it only compares, so its offsets are no servo's own."""
+    if one.kind.family != "linuxptp" or not len(one) or bool(np.any(one.locked)):
+        return one, ""
+    kind = replace(one.kind, steering="independent")
+    locked = np.isfinite(one.offset_s)
+    return replace(one, kind=kind, locked=locked), (
+        f"{one.kind.name} never steered (state s0 throughout): taken as a comparison only"
+    )

@@ -1,0 +1,171 @@
+"""Which of several sources the figures rest on, and what a chain of two adds up to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from syncline_design.clocks.files import refused
+from syncline_design.clocks.result import EntryKind
+from syncline_design.clocks.series import Series
+from syncline_design.clocks.sessions import sessions_of
+
+SIGNS: Final = {
+    "chrony tracking": "local - reference in the log",
+    "chrony statistics": "local - reference in the log",
+    "chrony measurements": "reference - local in the log, turned",
+    "chrony refclock": "reference - local in the log, turned",
+    "ntpd loopstats": "reference - local in the log, turned",
+    "ntpd peerstats": "reference - local in the log, turned",
+    "gpsd": "clock - real in the log",
+    "ppstest": "clock - whole second in the log",
+    "CSV": "local - reference by the column's name",
+}
+_LINUXPTP_SIGN: Final = "local - reference in the log"
+
+
+@dataclass(frozen=True, slots=True)
+class Selection:
+    """Series of the source that is used, all others, and what has to be said of the choice."""
+
+    used: tuple[Series, ...]
+    others: tuple[Series, ...]
+    notes: tuple[str, ...]
+
+
+def sign_of(name: str) -> str:
+    """In which sign the source writes its offsets."""
+    return next((sign for start, sign in SIGNS.items() if name.startswith(start)), _LINUXPTP_SIGN)
+
+
+def select(series: Sequence[Series], wanted: str | None, kind: EntryKind, first: Path) -> Selection:
+    """The source asked for, or the one that says most of the clock; refused where none does."""
+    series = [*series, *_chained(series)]
+    names = list(dict.fromkeys(one.kind.name for one in series))
+    if wanted is not None:
+        chosen = [name for name in names if name == wanted] or [
+            name for name in names if wanted.lower() in name.lower()
+        ]
+        if len(chosen) != 1:
+            found = "no such source" if not chosen else "several sources of that name"
+            raise refused(first, f"--source {wanted}: {found}", expected="one of the sources",
+                          found=", ".join(names))  # fmt: skip
+        return _split(series, chosen[0], ())
+    usable = [one for one in series if kind == "timestamping" or not _is_serial(one)]
+    if not usable:
+        raise refused(
+            first, "gpsd TOFF alone holds the latency of the serial line: no evidence of the clock",
+            expected="PPS messages too",
+            hint="--entry timestamping makes a method of it: stamping on arrival",
+        )  # fmt: skip
+    families = sorted({one.kind.family for one in usable})
+    if len(families) > 1:
+        raise refused(first, "several kinds of logs that say different things of a clock",
+                      found=", ".join(names), expected="logs of one kind",
+                      hint="--source NAME takes one of them")  # fmt: skip
+    return _ranked(usable, series)
+
+
+def _is_serial(one: Series) -> bool:
+    return one.kind.family == "gpsd" and one.kind.reference == "TOFF"
+
+
+def _ranked(usable: Sequence[Series], series: Sequence[Series]) -> Selection:
+    usable, notes = _independent_refclocks(usable)
+    by_hand = {one.kind.name: one for one in usable}
+    best = min(one.kind.rank for one in by_hand.values())
+    names = [name for name, one in by_hand.items() if one.kind.rank == best]
+    steering = [n for n in names if any(n.endswith(" " + r) for s in usable for r in s.references)]
+    if steering and len(names) > 1:
+        names = steering
+    if len(names) > 1:
+        largest = {name: _level([s for s in usable if s.kind.name == name]) for name in names}
+        names.sort(key=lambda name: -largest[name])
+        notes.append(f"of {len(names)} sources alike, {names[0]} has the largest offsets and is "
+                     "used; --source NAME takes another")  # fmt: skip
+    kept = {s.kind.name: s for s in usable}
+    series = [replace(s, kind=kept[s.kind.name].kind) if s.kind.name in kept else s for s in series]
+    return _split(series, names[0], tuple(notes))
+
+
+def _level(series: Sequence[Series]) -> float:
+    offsets = np.concatenate([one.offset_s[one.locked] for one in series])
+    offsets = offsets[np.isfinite(offsets)]
+    return float(np.quantile(np.abs(offsets), 0.95)) if offsets.shape[0] else 0.0
+
+
+def _independent_refclocks(series: Sequence[Series]) -> tuple[list[Series], list[str]]:
+    """Reference clocks that the tracking log never names: marked `noselect`, they steer nothing."""
+    tracked = [one for one in series if one.kind.name == "chrony tracking"]
+    references = frozenset[str]().union(*(one.references for one in tracked))
+    found, notes = [], []
+    for one in series:
+        free = (
+            bool(tracked)
+            and one.kind.name.startswith("chrony refclock")
+            and one.kind.reference not in references
+        )
+        if free:
+            notes.append(f"{one.kind.name} steers nothing by the tracking log: independent")
+            one = replace(one, kind=replace(one.kind, steering="independent", rank=0))
+        found.append(one)
+    return found, list(dict.fromkeys(notes))
+
+
+def _split(series: Sequence[Series], name: str, notes: tuple[str, ...]) -> Selection:
+    used = tuple(one for one in series if one.kind.name == name)
+    return Selection(used, tuple(one for one in series if one.kind.name != name), notes)
+
+
+def _chained(series: Sequence[Series]) -> list[Series]:
+    """The system clock against the reference: phc2sys (system - card) + ptp4l or ts2phc (card -
+    reference), where both are there."""
+    system = [s for s in series if s.kind.name == "phc2sys CLOCK_REALTIME"]
+    for program in ("ptp4l", "ts2phc"):
+        cards = [s for s in series if s.kind.name.startswith(program)]
+        names = {s.kind.name for s in cards}
+        if system and names:
+            busiest = max(names, key=lambda n: sum(len(s) for s in cards if s.kind.name == n))
+            pairs = _pairs(system, [s for s in cards if s.kind.name == busiest])
+            sums = [_sum(one, card) for one, card in pairs]
+            return [one for one in sums if one is not None]
+    return []
+
+
+def _pairs(system: Sequence[Series], cards: Sequence[Series]) -> list[tuple[Series, Series]]:
+    """Runs of both that belong together: of one file, or in the order of the files."""
+    found = []
+    for index, one in enumerate(system):
+        same = [card for card in cards if card.files == one.files]
+        card = same[0] if same else cards[index] if len(cards) == len(system) else None
+        if card is None:
+            continue
+        halves = [[x.series for x in sessions_of(s, np.inf)] for s in (one, card)]
+        if len(halves[0]) == len(halves[1]):
+            found += list(zip(halves[0], halves[1], strict=True))
+    return found
+
+
+def _sum(system: Series, card: Series) -> Series | None:
+    good = card.locked & np.isfinite(card.offset_s)
+    known = card.part(good)
+    if len(known) < 2:
+        return None
+    nearest = np.clip(np.searchsorted(known.time_s, system.time_s), 1, len(known) - 1)
+    apart = np.minimum(np.abs(system.time_s - known.time_s[nearest - 1]),
+                       np.abs(known.time_s[nearest] - system.time_s))  # fmt: skip
+    reach = max(10.0 * float(np.median(np.diff(known.time_s))), 1.0)
+    kind = replace(system.kind, name=f"CLOCK_REALTIME by phc2sys and {card.kind.name}", rank=0,
+                   steering=card.kind.steering)  # fmt: skip
+    begin = np.zeros(len(system), dtype=bool)
+    begin[:1] = True
+    files = tuple(dict.fromkeys((*system.files, *card.files)))
+    return replace(
+        system, kind=kind, files=files, restart=begin, locked=system.locked & (apart <= reach),
+        offset_s=system.offset_s + np.interp(system.time_s, known.time_s, known.offset_s),
+        hard_s=system.hard_s + np.interp(system.time_s, known.time_s, known.hard_s),
+    )  # fmt: skip

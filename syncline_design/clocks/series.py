@@ -1,0 +1,96 @@
+"""What every reader of clock logs makes: rows of one source, offsets local minus reference."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+Family = Literal["chrony", "ntpd", "linuxptp", "gpsd", "ppstest", "csv"]
+Steering = Literal["servo", "independent", "unknown"]
+Stamps = Literal["utc", "boot"]
+
+
+class Row(NamedTuple):
+    """One line of a log.
+
+    offset_s: local minus reference, not a number in a line that only says that lock was lost.
+    hard_s: bound of the error by the daemon's own dispersions and delays; not a number: none
+    known.  rate: frequency against the reference [s/s].  skew: what that rate is uncertain by.
+    """
+
+    time_s: float
+    offset_s: float
+    hard_s: float = math.nan
+    locked: bool = True
+    rate: float = math.nan
+    skew: float = math.nan
+    restart: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class SourceKind:
+    """What is known of a source before its rows are read.
+
+    rank: which source of a family is taken first.  steering: whether the clock is steered by just
+    these offsets (a servo nulls what it measures).  reference: what it is held against, where it
+    has a name that another log of the family uses.
+    """
+
+    name: str
+    family: Family
+    rank: int
+    steering: Steering
+    stamps: Stamps
+    reference: str = ""
+
+
+@dataclass(slots=True)
+class Sheet:
+    """Rows of one source of one file, under construction."""
+
+    kind: SourceKind
+    rows: list[Row] = field(default_factory=list)
+    references: set[str] = field(default_factory=set)
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """Rows of one source of one log (all its rotations), in the order of time."""
+
+    kind: SourceKind
+    files: tuple[str, ...]
+    time_s: Array
+    offset_s: Array
+    hard_s: Array
+    locked: Flags
+    rate: Array
+    skew: Array
+    restart: Flags
+    references: frozenset[str] = frozenset()
+
+    def __len__(self) -> int:
+        return int(self.time_s.shape[0])
+
+    def part(self, chosen: slice | Flags) -> Series:
+        """Some of the rows."""
+        return Series(
+            self.kind, self.files, self.time_s[chosen], self.offset_s[chosen], self.hard_s[chosen],
+            self.locked[chosen], self.rate[chosen], self.skew[chosen], self.restart[chosen],
+            self.references,
+        )  # fmt: skip
+
+
+def series_of(
+    kind: SourceKind, files: tuple[str, ...], rows: list[Row], references: set[str]
+) -> Series:
+    """Rows as columns."""
+    table = np.array([tuple(map(float, row)) for row in rows], dtype=np.float64).reshape(-1, 7)
+    time_s, offset_s, hard_s, locked, rate, skew, restart = table.T.copy()
+    return Series(kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5,
+                  frozenset(references))  # fmt: skip

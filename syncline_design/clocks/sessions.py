@@ -1,0 +1,236 @@
+"""Series to sessions: where one ends and the next begins, and what in it is no steady state."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from syncline_design.clocks.series import Array, Flags, Series
+
+EventKind = Literal[
+    "startup", "step", "unlock", "holdover", "gap", "relock", "leap_second", "frequency_jump"
+]
+STARTUP_FACTOR: Final = 10.0  # of the session's median hard bound: what a start leaves behind
+GAP_FACTOR: Final = 10.0  # of the median interval between samples
+STEP_SIGMAS: Final = 12.0
+LEAST_SAMPLES: Final = 20
+SHORTEST_S: Final = 90.0
+_MAD: Final = 1.4826  # to a normal standard deviation
+_DAY: Final = 86400.0
+
+
+@dataclass(frozen=True, slots=True)
+class ClockEvent:
+    """Something that is no steady state; size_s: the largest |offset| that it brought."""
+
+    kind: EventKind
+    from_s: float
+    to_s: float
+    size_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClockSession:
+    """One run of the clock, from a start to its end; steady: rows that the bounds are made of."""
+
+    series: Series
+    steady: Flags
+    weight_s: Array
+    events: tuple[ClockEvent, ...]
+
+    @property
+    def duration_s(self) -> float:
+        """From the first row to the last."""
+        return float(self.series.time_s[-1] - self.series.time_s[0])
+
+    @property
+    def offsets(self) -> Array:
+        """Offsets of the steady state [s]."""
+        return self.series.offset_s[self.steady]
+
+    @property
+    def is_counted(self) -> bool:
+        """Whether it is long enough to say anything."""
+        return int(np.sum(self.steady)) >= LEAST_SAMPLES and self.duration_s >= SHORTEST_S
+
+    def quantile_s(self, share: float) -> float:
+        """The |offset| that is kept for this share of the time."""
+        return weighted_quantile(np.abs(self.offsets), self.weight_s[self.steady], share)
+
+    @property
+    def hard_s(self) -> float:
+        """The largest hard bound of the steady state, with drift over the time between samples."""
+        hard = self.series.hard_s[self.steady]
+        if not np.any(np.isfinite(hard)):
+            return math.nan
+        skew = np.nan_to_num(self.series.skew[self.steady])
+        aged = hard + np.where(skew < 1e-3, skew, 0.0) * self.weight_s[self.steady]
+        return float(np.nanmax(aged))
+
+
+def weighted_quantile(values: Array, weights: Array, share: float) -> float:
+    """The smallest value below or at which at least this share of the weight lies."""
+    order = np.argsort(values, kind="stable")
+    heaped = np.cumsum(weights[order])
+    place = int(np.searchsorted(heaped, share * heaped[-1] * (1.0 - 1e-12)))
+    return float(values[order][min(place, len(values) - 1)])
+
+
+def sessions_of(series: Series, gap_s: float) -> list[ClockSession]:
+    """A log cut at restarts, at gaps longer than `gap_s`, and where stamps begin anew."""
+    if not len(series):
+        return []
+    steps = np.diff(series.time_s)
+    cuts = np.flatnonzero((steps > gap_s) | (steps < -1.0) | series.restart[1:]) + 1
+    ends = [0, *cuts.tolist(), len(series)]
+    parts = [series.part(slice(a, b)) for a, b in itertools.pairwise(ends)]
+    return [_session(part) for part in parts]
+
+
+def went_back(series: Series) -> list[tuple[float, float]]:
+    """Where stamps of UTC go back: (stamp before, by how much) [s]."""
+    if series.kind.stamps != "utc":
+        return []
+    steps = np.diff(series.time_s)
+    return [(float(series.time_s[k]), float(-steps[k])) for k in np.flatnonzero(steps < -1.0)]
+
+
+def _session(series: Series) -> ClockSession:
+    order = np.argsort(series.time_s, kind="stable")
+    series = series.part(order) if np.any(np.diff(order) < 0) else series  # type: ignore[arg-type]
+    longest = _longest_interval(series.time_s)
+    known = np.isfinite(series.offset_s)
+    startup = _startup(series)
+    steady = known & series.locked & ~startup
+    events = [*_startup_events(series, startup), *_lock_events(series, startup, longest),
+              *_gap_events(series, longest), *_step_events(series, steady),
+              *_frequency_events(series, steady)]  # fmt: skip
+    events.sort(key=lambda event: (event.from_s, event.kind))
+    return ClockSession(series, steady, _weights(series.time_s, longest), tuple(events))
+
+
+def _longest_interval(time_s: Array) -> float:
+    """The longest time between two samples that is no gap: daemons change their own interval."""
+    steps = np.diff(time_s)
+    steps = steps[steps > 0.0]
+    if not steps.shape[0]:
+        return math.inf
+    return float(max(GAP_FACTOR * np.median(steps), 3.0 * np.quantile(steps, 0.9)))
+
+
+def _weights(time_s: Array, longest: float) -> Array:
+    """How much time each row stands for: half of what lies to its neighbours."""
+    if time_s.shape[0] < 2 or time_s[0] == time_s[-1]:
+        return np.ones(time_s.shape)
+    steps = np.minimum(np.diff(time_s), longest)
+    halves = np.concatenate([steps[:1], steps, steps[-1:]])
+    weights = 0.5 * (halves[:-1] + halves[1:])
+    floor = 1e-6 * float(np.max(weights))
+    raised: Array = np.maximum(weights, floor)
+    return raised
+
+
+def _startup(series: Series) -> Flags:
+    """The rows before lock is first reached, or before the daemon's own bound has come down."""
+    good = series.locked & np.isfinite(series.offset_s)
+    hard = series.hard_s[good]
+    if np.any(np.isfinite(hard)):
+        usual = float(np.nanmedian(hard))
+        good &= ~(series.hard_s > STARTUP_FACTOR * usual)
+    first = int(np.argmax(good)) if np.any(good) else len(series)
+    return np.arange(len(series)) < first
+
+
+def _size(offsets: Array) -> float:
+    known = np.abs(offsets[np.isfinite(offsets)])
+    return float(np.max(known)) if known.shape[0] else 0.0
+
+
+def _startup_events(series: Series, startup: Flags) -> list[ClockEvent]:
+    count = int(np.sum(startup))
+    if not count:
+        return []
+    end = series.time_s[min(count, len(series) - 1)]
+    return [ClockEvent("startup", float(series.time_s[0]), float(end),
+                       _size(series.offset_s[:count]))]  # fmt: skip
+
+
+def _lock_events(series: Series, startup: Flags, longest: float) -> list[ClockEvent]:
+    """Where lock was lost, what the clock did until it came back, and its offset then."""
+    out = ~series.locked & ~startup
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], out, [False]]).astype(int)))
+    found: list[ClockEvent] = []
+    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        back = min(stop, len(series) - 1)
+        begins, ends = float(series.time_s[start]), float(series.time_s[back])
+        size = _size(series.offset_s[start : back + 1])
+        found.append(ClockEvent("unlock", begins, ends, size))
+        if ends - begins > longest or (stop - start > 1 and ends > begins):
+            found.append(ClockEvent("holdover", begins, ends, size))
+        if stop < len(series):
+            found.append(ClockEvent("relock", ends, ends, _size(series.offset_s[stop : stop + 1])))
+    return found
+
+
+def _gap_events(series: Series, longest: float) -> list[ClockEvent]:
+    """Times without samples: the size is the larger offset at the two ends."""
+    places = np.flatnonzero(np.diff(series.time_s) > longest)
+    return [
+        ClockEvent("gap", float(series.time_s[k]), float(series.time_s[k + 1]),
+                   _size(series.offset_s[k : k + 2]))
+        for k in places
+    ]  # fmt: skip
+
+
+def _step_events(series: Series, steady: Flags) -> list[ClockEvent]:
+    """Jumps from one sample to the next beyond anything that the session's noise does."""
+    places = np.flatnonzero(steady)
+    if places.shape[0] < LEAST_SAMPLES:
+        return []
+    offsets, times = series.offset_s[places], series.time_s[places]
+    jumps = np.diff(offsets)
+    spread = _MAD * float(np.median(np.abs(jumps - np.median(jumps))))
+    least = max(STEP_SIGMAS * spread, _usual(jumps))
+    found: list[ClockEvent] = []
+    for k in np.flatnonzero(np.abs(jumps) > least):
+        size = max(abs(float(jumps[k])), abs(float(offsets[k])), abs(float(offsets[k + 1])))
+        kind: EventKind = "step"
+        if series.kind.stamps == "utc" and is_leap(float(times[k + 1]), float(jumps[k])):
+            kind = "leap_second"
+        found.append(ClockEvent(kind, float(times[k]), float(times[k + 1]), size))
+    return found
+
+
+def _usual(jumps: Array) -> float:
+    """What a jump has to exceed besides: common ones, and the log's own resolution."""
+    sizes = np.abs(jumps)
+    moved = sizes[sizes > 0.0]
+    finest = float(np.min(moved)) if moved.shape[0] > 5 else 0.0
+    return max(3.0 * float(np.quantile(sizes, 0.9)), 5.0 * finest, 1e-12)
+
+
+def is_leap(time_s: float, jump_s: float) -> bool:
+    """A second in or out at a UTC midnight."""
+    from_midnight = (time_s + _DAY / 2.0) % _DAY - _DAY / 2.0
+    return abs(abs(jump_s) - 1.0) < 0.1 and abs(from_midnight) < 1100.0
+
+
+def _frequency_events(series: Series, steady: Flags) -> list[ClockEvent]:
+    """Jumps of the frequency correction; the size is what they bring until the next sample."""
+    rate, times = series.rate[steady], series.time_s[steady]
+    known = np.isfinite(rate)
+    rate, times = rate[known], times[known]
+    if rate.shape[0] < LEAST_SAMPLES:
+        return []
+    jumps = np.diff(rate)
+    spread = _MAD * float(np.median(np.abs(jumps - np.median(jumps))))
+    places = np.flatnonzero(np.abs(jumps) > max(STEP_SIGMAS * spread, _usual(jumps), 1e-9))
+    return [
+        ClockEvent("frequency_jump", float(times[k]), float(times[k + 1]),
+                   abs(float(jumps[k])) * float(times[k + 1] - times[k]))
+        for k in places
+    ]  # fmt: skip

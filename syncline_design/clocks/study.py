@@ -1,0 +1,326 @@
+"""From logs of a clock to what may be claimed of it: the whole of `timing`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Final, Literal
+
+import numpy as np
+
+from syncline_design import __version__
+from syncline_design.clocks import stability
+from syncline_design.clocks.doubts import doubts
+from syncline_design.clocks.reading import read_logs
+from syncline_design.clocks.result import (
+    EntryKind,
+    EventResult,
+    HoldoverPoint,
+    RestsOn,
+    SessionResult,
+    SourceResult,
+    StabilityPoint,
+    Timing,
+    TimingClaim,
+    TracePoint,
+)
+from syncline_design.clocks.selection import Selection, select, sign_of
+from syncline_design.clocks.series import Array
+from syncline_design.clocks.sessions import ClockSession, sessions_of, weighted_quantile
+from syncline_design.clocks.times import moment
+from syncline_design.clocks.tolerance import (
+    LEAST_SESSIONS,
+    sessions_of_order_statistic,
+    tolerance_bound,
+)
+from syncline_design.machine.deadline import in_force
+
+MOST_EVENTS: Final = 1000
+MOST_BINS: Final = 1500
+VALUES: Final = 999  # quantiles that stand for the distribution in a catalog
+_HOLDOVERS_S: Final = (60.0, 600.0, 3600.0, 14400.0)
+Use = Literal["larger", "statistical", "hard"]
+
+
+@dataclass(frozen=True, slots=True)
+class TimingSettings:
+    """How logs are cut and what is to be claimed.
+
+    coverage: share of a session's time; session_share: of sessions; declared: what no log shows
+    and is added to the bound, by name [s].
+    """
+
+    gap_s: float = 3600.0
+    coverage: float = 0.95
+    session_share: float = 0.95
+    confidence: float = 0.95
+    source: str | None = None
+    independent: bool = False
+    use: Use = "larger"
+    kind: EntryKind = "clock"
+    declared: Mapping[str, float] = field(default_factory=dict)
+    conditions: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class TimingStudy:
+    """The result, and the distribution of offsets [s] (local minus reference) behind it."""
+
+    timing: Timing
+    offsets_s: Array
+
+
+def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingStudy:
+    """Read the logs and say what they bear out; BadInput where one cannot be used."""
+    files = [Path(path) for path in paths]
+    logs = read_logs(files)
+    in_force().doing("cutting the logs into sessions")
+    chosen = select(logs.series, settings.source, settings.kind, files[0])
+    sessions = [s for one in chosen.used for s in sessions_of(one, settings.gap_s)]
+    sessions.sort(key=lambda s: (s.series.kind.stamps, s.series.time_s[0], s.series.files))
+    doubted = doubts(chosen.used, sessions)
+    in_force().doing("bounding the clock's error")
+    counted = [s for s in sessions if s.is_counted]
+    figures = _figures(counted, sessions, settings)
+    claim = _claim(counted, chosen, settings, figures, doubted)
+    timing = Timing(
+        sessions=tuple(_session(s, settings.coverage) for s in sessions),
+        bound_s=figures.bound_s,
+        event_bound_s=figures.event_s,
+        statistical_bound_s=figures.statistical_s,
+        hard_bound_s=figures.hard_s,
+        claim=claim,
+        events=_events(sessions),
+        entry=None,
+        use=settings.use,
+        sources=_sources(chosen, settings),
+        declared=dict(settings.declared),
+        holdover=_holdover(counted, figures.bound_s),
+        stability=_stability(counted),
+        trace=_trace(sessions),
+        conditions=settings.conditions,
+        evidence=logs.files,
+        doubts=doubted,
+        notes=(*logs.notes, *chosen.notes, *_notes(sessions, figures)),
+        version=__version__,
+    )
+    return TimingStudy(timing, _distribution(counted))
+
+
+@dataclass(frozen=True, slots=True)
+class _Figures:
+    quantiles: Array
+    statistical_s: float | None
+    hard_s: float | None
+    bound_s: float | None
+    event_s: float | None
+    method: str | None
+
+
+def _figures(
+    counted: Sequence[ClockSession], sessions: Sequence[ClockSession], settings: TimingSettings
+) -> _Figures:
+    """The bounds.  With too few sessions for a statistical one, that of these sessions alone."""
+    quantiles = np.array([s.quantile_s(settings.coverage) for s in counted])
+    if not counted:
+        return _Figures(quantiles, None, None, None, None, None)
+    declared = math.fsum(settings.declared.values())
+    statistical, method = None, None
+    seen = float(np.max(quantiles)) + declared
+    if len(counted) >= LEAST_SESSIONS:
+        raised, method = tolerance_bound(quantiles, settings.session_share, settings.confidence)
+        statistical = seen = raised + declared
+    known = [s.hard_s for s in counted if not math.isnan(s.hard_s)]
+    hard = max(known) if known else None
+    bound = {"larger": max(seen, hard or 0.0), "statistical": seen, "hard": hard}[settings.use]
+    sizes = [e.size_s for s in sessions for e in s.events
+             if e.kind not in ("startup", "frequency_jump")]  # fmt: skip
+    event = max([bound or 0.0, *(size + declared for size in sizes)])
+    return _Figures(quantiles, statistical, hard, bound, event, method)
+
+
+def _claim(
+    counted: Sequence[ClockSession], chosen: Selection, settings: TimingSettings,
+    figures: _Figures, doubted: Sequence[str],
+) -> TimingClaim:  # fmt: skip
+    missing = max(0, LEAST_SESSIONS - len(counted))
+    why = None
+    if doubted:
+        why = "the logs are in doubt"
+    elif not counted:
+        why = "no session is long enough"
+    elif missing:
+        why = ("one session says nothing about the next start" if len(counted) == 1
+               else f"{len(counted)} sessions are too few")  # fmt: skip
+    elif figures.bound_s is None:
+        why = "the logs hold nothing that a hard bound could be made of"
+    durations = [s.duration_s for s in counted]
+    return TimingClaim(
+        coverage=settings.coverage, session_share=settings.session_share,
+        confidence=settings.confidence, sessions=len(counted),
+        hours=math.fsum(durations) / 3600.0, rests_on=_rests_on(chosen, settings),
+        made=why is None, needs_sessions=missing,
+        shape_free_from=sessions_of_order_statistic(settings.session_share, settings.confidence),
+        session_s=float(np.median(durations)) if durations else None,
+        method=figures.method, why_not=why,
+    )  # fmt: skip
+
+
+def _rests_on(chosen: Selection, settings: TimingSettings) -> RestsOn:
+    """Whether the offsets are the servo's own, which nulls them whatever the clock's error is."""
+    steering = {one.kind.steering for one in chosen.used}
+    if settings.independent or steering == {"independent"}:
+        return "independent"
+    if "servo" in steering:
+        return "servo_and_declared" if settings.declared else "servo"
+    return "unknown_and_declared" if settings.declared else "unknown"
+
+
+def _session(session: ClockSession, coverage: float) -> SessionResult:
+    series, offsets = session.series, session.offsets
+    stamps = series.kind.stamps
+    begin, end = float(series.time_s[0]), float(series.time_s[-1])
+    some = offsets.shape[0] > 0
+    hard = session.hard_s if some else math.nan
+    memory, stationary = _memory(session)
+    return SessionResult(
+        from_=moment(begin, stamps), to=moment(end, stamps), samples=int(offsets.shape[0]),
+        median_s=weighted_quantile(offsets, session.weight_s[session.steady], 0.5)
+        if some else None,
+        quantile_s=session.quantile_s(coverage) if some else None,
+        duration_s=end - begin, counted=session.is_counted,
+        hard_s=None if math.isnan(hard) else hard,
+        autocorrelation_s=memory, stationary=stationary, files=series.files,
+    )  # fmt: skip
+
+
+def _memory(session: ClockSession) -> tuple[float | None, bool | None]:
+    """How long one sample speaks for, and whether both halves of the session are alike."""
+    if not session.is_counted:
+        return None, None
+    in_force().check()
+    times = session.series.time_s[session.steady]
+    step, grid = stability.on_a_grid(times, session.offsets)
+    if grid.shape[0] < 4:
+        return None, None
+    memory = stability.autocorrelation_s(step, grid)
+    return memory, stability.is_stationary(grid, session.duration_s / memory)
+
+
+def _events(sessions: Sequence[ClockSession]) -> tuple[EventResult, ...]:
+    """Events in the order of sessions and time; of very many the largest."""
+    found = [(event, index, session.series.kind.stamps) for index, session in enumerate(sessions)
+             for event in session.events]  # fmt: skip
+    if len(found) > MOST_EVENTS:
+        least = sorted(event.size_s for event, *_ in found)[-MOST_EVENTS]
+        found = [one for one in found if one[0].size_s >= least][:MOST_EVENTS]
+    return tuple(
+        EventResult(event.kind, moment(event.from_s, stamps), moment(event.to_s, stamps),
+                    event.size_s, index)
+        for event, index, stamps in found
+    )  # fmt: skip
+
+
+def _sources(chosen: Selection, settings: TimingSettings) -> tuple[SourceResult, ...]:
+    names = list(dict.fromkeys(one.kind.name for one in (*chosen.used, *chosen.others)))
+    found = []
+    for name in names:
+        parts = [one for one in (*chosen.used, *chosen.others) if one.kind.name == name]
+        counted = [s for one in parts for s in sessions_of(one, settings.gap_s) if s.is_counted]
+        quantiles = [s.quantile_s(settings.coverage) for s in counted]
+        hard = [s.hard_s for s in counted if not math.isnan(s.hard_s)]
+        found.append(SourceResult(
+            name, sign_of(name), parts[0].kind.steering, sum(len(one) for one in parts),
+            len(counted), max(quantiles, default=None), max(hard, default=None),
+            name == chosen.used[0].kind.name,
+        ))  # fmt: skip
+    return tuple(found)
+
+
+def _holdover(counted: Sequence[ClockSession], bound_s: float | None) -> tuple[HoldoverPoint, ...]:
+    """bound + t max |frequency(s + t) - frequency(s)|, as far as the sessions show it.
+
+    A clock left alone keeps the last frequency: what that was seen to move in t is what the error
+    may grow by each second.
+    """
+    found = []
+    for after in _HOLDOVERS_S:
+        moved = [_moved(session, after) for session in counted]
+        seen = [one for one in moved if one is not None]
+        if seen and bound_s is not None:
+            found.append(HoldoverPoint(after, bound_s + after * max(seen)))
+    return tuple(found)
+
+
+def _moved(session: ClockSession, after_s: float) -> float | None:
+    rate, times = session.series.rate[session.steady], session.series.time_s[session.steady]
+    known = np.isfinite(rate)
+    rate, times = rate[known], times[known]
+    if rate.shape[0] < 2 or times[-1] - times[0] < after_s:
+        return None
+    later = np.searchsorted(times, times + after_s)
+    inside = later < times.shape[0]
+    return float(np.max(np.abs(rate[later[inside]] - rate[inside]))) if np.any(inside) else None
+
+
+def _stability(counted: Sequence[ClockSession]) -> tuple[StabilityPoint, ...]:
+    """TDEV and MTIE of the longest session."""
+    if not counted:
+        return ()
+    longest = max(counted, key=lambda s: s.duration_s)
+    times = longest.series.time_s[longest.steady]
+    step, grid = stability.on_a_grid(times, longest.offsets)
+    points = []
+    for n in stability.averaging_factors(grid.shape[0], 3):
+        in_force().check()
+        deviation = stability.tdev(grid, n)
+        points.append(StabilityPoint(n * step, None if math.isnan(deviation) else deviation,
+                                     stability.mtie(grid, n)))  # fmt: skip
+    return tuple(points)
+
+
+def _trace(sessions: Sequence[ClockSession]) -> tuple[TracePoint, ...]:
+    """Offsets over time, thinned to the smallest and largest of each stretch."""
+    bins = max(4, MOST_BINS // max(1, len(sessions)))
+    found: list[TracePoint] = []
+    for index, session in enumerate(sessions[:MOST_BINS]):
+        times, offsets = session.series.time_s[session.steady], session.offsets
+        if not offsets.shape[0]:
+            continue
+        edges = np.unique(np.linspace(0, offsets.shape[0], bins + 1).astype(int))
+        for a, b in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+            part = offsets[a:b]
+            found.append(TracePoint(index, float(times[a]), float(np.min(part)),
+                                    float(np.max(part))))  # fmt: skip
+    return tuple(found)
+
+
+def _notes(sessions: Sequence[ClockSession], figures: _Figures) -> list[str]:
+    said = []
+    short = sum(not s.is_counted for s in sessions)
+    if short:
+        said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
+                    "(less than 20 samples in lock, or than 90 s)")  # fmt: skip
+    total = sum(len(s.events) for s in sessions)
+    if total > MOST_EVENTS:
+        said.append(f"{total} events, of which the {MOST_EVENTS} largest are listed")
+    if figures.hard_s is None and figures.bound_s is not None:
+        said.append("no hard bound: these logs hold no dispersions or delays")
+    return said
+
+
+def _distribution(counted: Sequence[ClockSession]) -> Array:
+    """Quantiles of the steady offsets, every session with the same weight."""
+    if not counted:
+        return np.zeros(0)
+    offsets = np.concatenate([s.offsets for s in counted])
+    weights = np.concatenate([s.weight_s[s.steady] / np.sum(s.weight_s[s.steady])
+                              for s in counted])  # fmt: skip
+    order = np.argsort(offsets, kind="stable")
+    heaped = np.cumsum(weights[order])
+    levels = (np.arange(VALUES) + 0.5) / VALUES * heaped[-1]
+    places = np.minimum(np.searchsorted(heaped, levels), offsets.shape[0] - 1)
+    found: Array = offsets[order][places]
+    return found

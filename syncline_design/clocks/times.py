@@ -1,0 +1,25 @@
+"""Moments and spans of time as the outputs write them."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+
+from syncline_design.clocks.series import Stamps
+from syncline_design.model.quantity import Dimension, format_quantity
+
+
+def moment(time_s: float, stamps: Stamps) -> str:
+    """ISO 8601 in UTC, or seconds since boot where no date is known."""
+    if stamps == "boot":
+        return f"{time_s:.3f} s since start"
+    try:
+        return (
+            datetime.fromtimestamp(time_s, UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
+        )
+    except (ValueError, OverflowError, OSError):
+        return f"{time_s:.3f} s"
+
+
+def shown(time_s: float) -> str:
+    """`12 us`."""
+    return format_quantity(time_s, Dimension.TIME)
