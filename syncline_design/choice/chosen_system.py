@@ -49,7 +49,8 @@ def host_timeline(vehicle: str) -> str:
 def timing_error(entry: TimestampError) -> timing.TimingError:
     """A catalog's timestamp error as the model takes it."""
     left = None if entry.calibrated is None else float(entry.calibrated)
-    return timing.TimingError(_distribution(entry), left)
+    bound = None if entry.bound is None else float(entry.bound)
+    return timing.TimingError(_distribution(entry), left, bound_s=bound)
 
 
 def _distribution(entry: TimestampError) -> timing.Distribution:

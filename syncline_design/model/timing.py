@@ -53,12 +53,14 @@ class TimingError:
     removed and a constant of unknown sign, at most `calibrated_s`, remains (about 2 ms is what
     practice reaches).
     `drifted_s`: what a free-running clock has drifted away [s], drift times holdover: a further
-    uniform draw between plus and minus it.
+    uniform draw between plus and minus it.  `bound_s`: a measured bound of |mu| that takes the
+    place of the distribution's own.
     """
 
     distribution: Distribution
     calibrated_s: float | None = None
     drifted_s: float = 0.0
+    bound_s: float | None = None
 
 
 NO_ERROR = TimingError(Constant(0.0))
@@ -90,6 +92,8 @@ def bound(error: TimingError, coverage_factor: float = DEFAULT_COVERAGE_FACTOR) 
     calibrated out, the bound of the centred error plus what remains of the mean.  What the clock
     has drifted away adds to either.
     """
+    if error.bound_s is not None:
+        return error.bound_s + error.drifted_s
     shift = 0.0 if error.calibrated_s is None else mean(error.distribution)
     remains = 0.0 if error.calibrated_s is None else error.calibrated_s
     match error.distribution:
@@ -111,6 +115,8 @@ def support(
 
     As `bound`, but each end by itself: data that are late by 0 to 50 ms span -50 ms to 0.
     """
+    if error.bound_s is not None:
+        return -error.bound_s - error.drifted_s, error.bound_s + error.drifted_s
     match error.distribution:
         case Uniform(low, high):
             ends = (low, high)

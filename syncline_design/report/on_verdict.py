@@ -211,7 +211,10 @@ def _timing(verdict: Verdict) -> list[Node]:
         return []
     lead = ("A sensor whose \u03c4 stays below its \u03c4_crit is limited by its own noise, not by "
             "its timestamps.")  # fmt: skip
-    return [Text(lead), *verdict_figures.timing_chart(verdict), *show(table, silent=True)]
+    return [
+        Text(lead), *verdict_figures.timing_chart(verdict), *show(table, silent=True),
+        *show(verdict_tables.measured(verdict)),
+    ]  # fmt: skip
 
 
 def _syncline(verdict: Verdict) -> list[Node]:

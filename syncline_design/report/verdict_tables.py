@@ -20,6 +20,7 @@ from syncline_design.report.verdict_words import (
     waiver_text,
 )
 from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, TIMELINES
+from syncline_design.verdict.measured import claim_words
 
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
@@ -186,6 +187,27 @@ def assumptions(verdict: Verdict) -> Table | None:
     ]
     heads = ("Entry", "Assumed figures", "Note")
     return table("Assumptions: figures without a public source", heads, rows) if rows else None
+
+
+def measured(verdict: Verdict) -> Table | None:
+    """Timing errors that were measured, with what is claimed of them."""
+    rows = [
+        (
+            Cell(entry.entry, code=True),
+            Cell(numbers.time(entry.bound_s), entry.bound_s),
+            claim_words(entry.claim),
+            (entry.claim.rests_on or "").replace("_", " ") if entry.claim else "",
+            entry.conditions,
+            Cell(_counted(len(entry.evidence), "log"), sub=_counted(entry.events, "event")),
+        )
+        for entry in verdict.measured or ()
+    ]
+    heads = ("Entry", "Bound #", "Holds for", "Rests on", "Conditions", "Evidence")
+    return table("Measured timing errors", heads, rows) if rows else None
+
+
+def _counted(count: int, what: str) -> str:
+    return f"{count} {what}" if count == 1 else f"{count} {what}s"
 
 
 def sources(verdict: Verdict) -> Table | None:

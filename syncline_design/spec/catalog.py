@@ -49,6 +49,7 @@ from syncline_design.spec.fields import (
     refusal,
     refusals,
 )
+from syncline_design.spec.measured import MeasuredKeys
 from syncline_design.spec.yaml_text import KeyPath
 
 Primitive = Literal["pps", "network", "tov", "trigger", "arrival"]
@@ -195,7 +196,7 @@ class SensorEntry(Product):
         return tuple(dict.fromkeys((*self.primitives, "arrival")))
 
 
-class UniformError(Record):
+class UniformError(MeasuredKeys):
     distribution: Literal["uniform"]
     low: Time
     high: Time
@@ -208,14 +209,14 @@ class UniformError(Record):
         return self
 
 
-class NormalError(Record):
+class NormalError(MeasuredKeys):
     distribution: Literal["normal"]
     mean: Time
     std: NonNegativeTime
     calibrated: NonNegativeTime | None = None
 
 
-class ConstantError(Record):
+class ConstantError(MeasuredKeys):
     distribution: Literal["constant"]
     value: Time
     calibrated: NonNegativeTime | None = None
@@ -228,7 +229,7 @@ def _read_times(value: Any) -> tuple[Quantity, ...]:
 _TIMES_SCHEMA = {"type": "array", "items": quantity_schema(Dimension.TIME), "minItems": 1}
 
 
-class EmpiricalError(Record):
+class EmpiricalError(MeasuredKeys):
     """Measured values, given here or in a file (one per line) whose values loading puts here."""
 
     distribution: Literal["empirical"]

@@ -34,6 +34,8 @@ def norm(figures: float | Sequence[float], axes: int) -> Fraction:
 
 def tau_bound(error: TimestampError, coverage_factor: float) -> Fraction:
     """Bound of |mu| [s]: see timing.bound, here in fractions."""
+    if error.bound is not None:
+        return fraction_of(error.bound)
     values, spread = _values(error), Fraction(0)
     if isinstance(error, NormalError):
         spread = fraction_of(coverage_factor) * fraction_of(error.std)

@@ -229,7 +229,8 @@ def _stretched(error: TimingError, factor: float) -> TimingError:
         case Empirical(values):
             distribution = Empirical(tuple(value * factor for value in values))
     left = None if error.calibrated_s is None else error.calibrated_s * factor
-    return replace(error, distribution=distribution, calibrated_s=left)
+    bound = None if error.bound_s is None else error.bound_s * factor
+    return replace(error, distribution=distribution, calibrated_s=left, bound_s=bound)
 
 
 def _noise_alone(system: System, stage: int, role: RoleName) -> System:

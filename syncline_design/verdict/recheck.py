@@ -201,6 +201,8 @@ def _bound(error: Any, coverage_factor: float) -> Decimal:
 
     With the mean calibrated out, the same about the mean, plus what remains of it.
     """
+    if error.bound is not None:  # measured: a claim of its own, whatever the distribution
+        return _decimal(error.bound)
     spread = Decimal(0)
     if error.distribution == "uniform":
         ends = [_decimal(error.low), _decimal(error.high)]

@@ -265,6 +265,31 @@ class Source(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class ClaimShown(Record):
+    """What a measured bound is claimed to hold for; None: the entry does not say."""
+
+    coverage: float
+    session_share: float | None
+    confidence: float | None
+    sessions: int | None
+    session_s: float | None
+    rests_on: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredEntry(Record):
+    """A timing error of a catalog that was measured; events: how many its entry lists."""
+
+    entry: str
+    section: str
+    bound_s: float
+    claim: ClaimShown | None
+    conditions: str
+    evidence: tuple[FileRead, ...]
+    events: int
+
+
+@dataclass(frozen=True, slots=True)
 class KnownEffect(Record):
     """A known effect of the system and what it does, in words."""
 
@@ -435,6 +460,7 @@ class Verdict(Record):
     sources: tuple[Source, ...] | None = optional()
     effects: tuple[KnownEffect, ...] | None = optional()
     choice: ChoiceResult | None = optional()
+    measured: tuple[MeasuredEntry, ...] | None = optional()
 
     @property
     def name(self) -> str:

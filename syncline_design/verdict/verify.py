@@ -39,6 +39,7 @@ from syncline_design.verdict.design_data import (
     transcripts,
     used_entries,
 )
+from syncline_design.verdict.measured import claim_cautions, measured
 from syncline_design.verdict.recheck import Recheck, recheck
 from syncline_design.verdict.tree import (
     UNITS,
@@ -422,10 +423,14 @@ def _verdict(
         design=named_design(case, problem, verified.design, verified.figures),
         syncline=syncline_figures(verified, case.spec.sync_model),
         monte_carlo=verified.monte_carlo,
-        warnings=cautions(case, verified, assumed, transcripts(entries)),
+        warnings=(
+            *cautions(case, verified, assumed, transcripts(entries)),
+            *claim_cautions(case, entries),
+        ),
         figures=error_figures(verified),
         assumptions=assumed,
         sources=sources(entries),
         effects=known_effects(verified.system),
         choice=choice or None,
+        measured=measured(case, entries),
     )

@@ -1,0 +1,105 @@
+"""What an error in a catalog says of its measurement: bound, claim, evidence, conditions, events.
+
+`timing` writes these keys; an entry that has them is shown as measured.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Any, Final
+
+from pydantic import Field, model_validator
+
+from syncline_design.spec.fields import (
+    Count,
+    NonNegativeTime,
+    PositiveTime,
+    Reader,
+    Record,
+    Text,
+    kind_of,
+    refusal,
+    refusals,
+)
+
+_SHA256: Final = re.compile(r"[0-9a-f]{64}")
+
+
+def _read_sha256(value: Any) -> str:
+    if not isinstance(value, str) or not _SHA256.fullmatch(value):
+        raise refusal("not a SHA-256", "64 digits 0-9 a-f", kind_of(value))
+    return value
+
+
+Sha256 = Annotated[str, Reader(_read_sha256, {"type": "string", "pattern": "^[0-9a-f]{64}$"})]
+Share = Annotated[float, Field(gt=0.0, lt=1.0)]
+
+
+class MeasuredClaim(Record):
+    """With `confidence`, a `session_share` of sessions of this length keep the error within
+    `bound` for a share `coverage` of their time.
+
+    rests_on: servo (its own offsets, which it nulls), independent, or with declared terms.
+    """
+
+    coverage: Share
+    session_share: Share | None = None
+    confidence: Share | None = None
+    sessions: Count | None = None
+    hours: Annotated[float, Field(ge=0.0)] | None = None
+    session_length: PositiveTime | None = None
+    rests_on: Text | None = None
+    declared: dict[Text, NonNegativeTime] = Field(default_factory=dict)
+    made: bool | None = None
+    needs_sessions: Annotated[int, Field(ge=0)] | None = None
+
+    @property
+    def session_s(self) -> float | None:
+        """Length of a session [s] that the claim is bound to; the mean one where only sums are."""
+        if self.session_length is not None:
+            return float(self.session_length)
+        if self.sessions is None or self.hours is None:
+            return None
+        return 3600.0 * float(self.hours) / self.sessions
+
+
+class EvidenceFile(Record):
+    """A log that the figures rest on."""
+
+    file: Text
+    sha256: Sha256
+
+
+class MeasuredEvent(Record):
+    """What was no steady state: how often and how large, or one event with its time."""
+
+    kind: Text
+    count: Count | None = None
+    largest: NonNegativeTime | None = None
+    size: NonNegativeTime | None = None
+    size_s: Annotated[float, Field(ge=0.0)] | None = None
+    from_: Annotated[str | float | None, Field(alias="from")] = None
+    to: str | float | None = None
+
+
+class MeasuredKeys(Record):
+    """Keys of an error that was measured; `bound` replaces the distribution's own as tau."""
+
+    bound: NonNegativeTime | None = None
+    claim: MeasuredClaim | None = None
+    evidence: tuple[EvidenceFile, ...] = ()
+    conditions: str | None = None
+    events: tuple[MeasuredEvent, ...] = ()
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether the entry names a claim or the logs it rests on."""
+        return self.claim is not None or bool(self.evidence)
+
+    @model_validator(mode="after")
+    def _one_bound(self) -> MeasuredKeys:
+        if self.bound is not None and getattr(self, "calibrated", None) is not None:
+            raise refusals(
+                [(("bound",), refusal("beside calibrated", "one of them", hint="delete one"))]
+            )
+        return self

@@ -1,0 +1,114 @@
+"""Timing errors that were measured: shown with their claim, cautioned where it is too weak."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+from syncline_design.machine.input_files import FileRead
+from syncline_design.model.quantity import format_duration
+from syncline_design.spec.case import Case
+from syncline_design.spec.catalog import ClockEntry, TimestampError, TimestampingEntry
+from syncline_design.spec.exact import tau_bound
+from syncline_design.spec.measured import MeasuredClaim
+from syncline_design.verdict.design_data import UsedEntry
+from syncline_design.verdict.tree import Caution, ClaimShown, MeasuredEntry
+
+# k = 2 is commonly said to be 95 % (it is 95.45 %), k = 3 to be 99.7 % (99.73 %): JCGM 100, G.1.3
+_COMMONLY = 1.12
+
+
+def measured(case: Case, entries: Sequence[UsedEntry]) -> tuple[MeasuredEntry, ...] | None:
+    """The measured errors that a design rests on; None where there are none."""
+    k = case.spec.coverage_factor
+    found = tuple(
+        MeasuredEntry(
+            used.id, used.section, float(tau_bound(error, k)), _claim(error.claim),
+            error.conditions or "", tuple(FileRead(one.file, one.sha256) for one in error.evidence),
+            sum(event.count or 1 for event in error.events),
+        )
+        for used, error in _errors(entries)
+    )  # fmt: skip
+    return found or None
+
+
+def _errors(entries: Sequence[UsedEntry]) -> Iterator[tuple[UsedEntry, TimestampError]]:
+    for used in entries:
+        error = None
+        if isinstance(used.entry, TimestampingEntry):
+            error = used.entry.error
+        elif isinstance(used.entry, ClockEntry):
+            error = used.entry.offset
+        if error is not None and error.is_measured:
+            yield used, error
+
+
+def _claim(claim: MeasuredClaim | None) -> ClaimShown | None:
+    if claim is None:
+        return None
+    return ClaimShown(
+        float(claim.coverage),
+        None if claim.session_share is None else float(claim.session_share),
+        None if claim.confidence is None else float(claim.confidence),
+        claim.sessions, claim.session_s, claim.rests_on,
+    )  # fmt: skip
+
+
+def claim_words(claim: ClaimShown | None) -> str:
+    """`95 % of the time in 95 % of sessions at 95 % confidence, from 7 sessions`."""
+    if claim is None:
+        return "no claim"
+    text = f"{100.0 * claim.coverage:.4g} % of the time"
+    if claim.session_share is not None:
+        text += f" in {100.0 * claim.session_share:.4g} % of sessions"
+    if claim.session_s is not None:
+        text += f" of {format_duration(claim.session_s)}"
+    if claim.confidence is not None:
+        text += f" at {100.0 * claim.confidence:.4g} % confidence"
+    if claim.sessions is not None:
+        text += f", from {claim.sessions} session{'s' if claim.sessions > 1 else ''}"
+    return text
+
+
+def claim_cautions(case: Case, entries: Sequence[UsedEntry]) -> Iterator[Caution]:
+    """What a verdict takes from a measurement beyond what that claims."""
+    for used, error in _errors(entries):
+        yield from _of_entry(case, used, error.claim)
+
+
+def _of_entry(case: Case, used: UsedEntry, claim: MeasuredClaim | None) -> Iterator[Caution]:
+    key = "error" if used.section == "timestamping" else "offset"
+    if claim is None or claim.made is False:
+        message = f"{used.id} was measured, but carries no claim about future sessions"
+        yield Caution("measured-claim", message, entry=used.id, key=key)
+        return
+    k = float(case.spec.coverage_factor)
+    beyond = math.erfc(k / math.sqrt(2.0))
+    if 1.0 - float(claim.coverage) > _COMMONLY * beyond:
+        yield Caution(
+            "measured-claim",
+            f"{used.id}: its bound was measured to hold for {100.0 * claim.coverage:.4g} % of the "
+            f"time; coverage_factor {k:g} asks for {100.0 * (1.0 - beyond):.4g} %: measure with "
+            f"`timing --coverage {1.0 - beyond:.4g}`",
+            entry=used.id, key=key,
+        )  # fmt: skip
+    session_s, asked = claim.session_s, float(case.spec.horizon.duration)
+    if session_s is not None and asked > session_s * 1.001:
+        yield Caution(
+            "measured-horizon",
+            f"{used.id}: measured over sessions of {format_duration(session_s)}, the horizon is "
+            f"{format_duration(asked)}: what drifts may grow beyond the bound",
+            entry=used.id, key=key,
+        )  # fmt: skip
+    if claim.rests_on in ("servo", "unknown"):
+        yield Caution(
+            "measured-servo",
+            f"{used.id}: {_RESTS[claim.rests_on]}; a constant asymmetry of the path would not show",
+            entry=used.id, key=key,
+        )  # fmt: skip
+
+
+_RESTS = {
+    "servo": "rests on the offsets of the servo itself, which nulls what it measures",
+    "unknown": "the logs do not say whether the clock is steered by these offsets",
+}
