@@ -8,6 +8,7 @@ from pathlib import Path
 import jsonschema
 import pytest
 
+from syncline_design.machine.records import read_as
 from syncline_design.model import timing
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.render_console import console
@@ -133,6 +134,7 @@ def test_outputs_say_that_it_was_measured(tmp_path: Path) -> None:
     assert "in the van, 20 deg" in text
     told = json.loads(json.dumps(found.to_json()))
     jsonschema.Draft202012Validator(result_schema("verdict")).validate(told)
+    assert read_as(Verdict, json.dumps(told)).measured == found.measured
     (entry,) = told["measured"]
     assert entry["evidence"] == [{"file": "tracking.log", "sha256": digest}]
     assert (entry["entry"], entry["section"], entry["events"]) == ("own", "timestamping", 3)
