@@ -18,6 +18,7 @@ from syncline_design.report.render_console import console
 from syncline_design.spec.load import BadInput
 from syncline_design.verdict.verify import CheckSettings, check_file
 
+ROOT = Path(__file__).parent.parent
 PLAIN = CheckSettings(monte_carlo=False)
 
 
@@ -246,3 +247,85 @@ def test_a_difference_satisfies_its_schema_and_reads_back(files: tuple[Path, Pat
         text = json_text(found.to_json())
         jsonschema.validate(json.loads(text), schema)
         assert read_as(Difference, text) == found
+
+
+def _stored(spec: Path) -> Path:
+    """The verdict on a spec, as `check` writes it, beside the spec."""
+    target = spec.with_suffix(".json")
+    target.write_text(json_text(check_file(spec, PLAIN).to_json()), encoding="utf-8")
+    return target
+
+
+WAIVER = "waiver: {reason: trial, expires: 2199-01-01}"
+LATENCY = "effects:\n  - {effect: latency, sensor: attitude, parameters: {latency_s: 17 us}}\n"
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "key"),
+    [
+        ("stages:\n", "horizon: {duration: 7 h}\nstages:\n", "horizon.duration_s"),
+        ("stages:\n", LATENCY + "stages:\n", "effects.latency (uav.attitude)"),
+        ("limit: 0.30 m", f"limit: 0.30 m, {WAIVER}", "requirements[ACC-1].waiver"),
+        ("id: ACC-1", "id: ACC-7", "requirements[ACC-7]"),
+        ("kind: cost, limit: 100000 EUR", "kind: mass, limit: 90 kg", "requirements[COST-1].kind"),
+        ("name: Small", "name: Tiny", "spec (hash)"),
+    ],
+    ids=["horizon", "effect", "waiver", "id", "kind", "what verdicts do not repeat"],
+)
+def test_verdict_files_never_differ_in_nothing(
+    files: tuple[Path, Path], before: str, after: str, key: str
+) -> None:
+    """Two verdicts on specs that differ were said to differ in nothing, whatever they showed."""
+    change(files[1], (before, after))
+    found = diff(_stored(files[0]), _stored(files[1]))
+    assert key in {cause.key for cause in found.causes}
+    assert "Nothing" not in headline(found)
+
+
+@pytest.mark.parametrize("stored", [False, True], ids=["specs", "verdict files"])
+def test_a_waived_requirement_reads_waived(files: tuple[Path, Path], stored: bool) -> None:
+    """It stood as `fail` below the headline `Meets every requirement`."""
+    fails = (ROOT / "specs" / "better_sensor_worse_payload.yaml").read_text(encoding="utf-8")
+    for path in files:
+        path.write_text(fails, encoding="utf-8")
+    change(files[1], ("kind: sync, limit: 1.0", f"kind: sync, limit: 1.0, {WAIVER}"))
+    sides = tuple(_stored(path) for path in files) if stored else files
+    found = diff(*sides, PLAIN)
+    row = next(entry for entry in found.requirements if entry.id == "SYNC-1")
+    assert (row.old and row.old.status, row.new and row.new.status) == ("fail", "fail")
+    assert (row.old and row.old.waived, row.new and row.new.waived) == (None, True)
+    shown = next(line for line in console(on_difference(found)).splitlines() if "  SYNC-1" in line)
+    assert shown.count("fail") == 1
+    assert shown.count("waived") == 1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "where", "found"),
+    [
+        ({"schema": "syncline-design/verdict/v2"}, "schema", "verdict/v2"),
+        ({"schema": "syncline-design/optimization/v1"}, "schema", "optimization/v1"),
+        ({"schema": None}, "schema", "None"),
+        ({"verdict": "refused"}, "verdict", "refused"),
+        ({"horizon": None}, "horizon", ""),
+    ],
+)
+def test_only_a_verdict_of_this_version_is_read(
+    files: tuple[Path, Path], wrong: dict[str, str | None], where: str, found: str
+) -> None:
+    """A `verdict/v2` was read as v1, and other results were refused for a key that they lack."""
+    stored = _stored(files[0])
+    told = json.loads(stored.read_text(encoding="utf-8")) | wrong
+    stored.write_text(json_text(told), encoding="utf-8")
+    with pytest.raises(BadInput) as caught:
+        diff(stored, stored)
+    (flaw,) = caught.value.problems
+    assert (flaw.path, found in flaw.found) == (where, True)
+
+
+def test_a_verdict_of_an_earlier_state_says_so(files: tuple[Path, Path]) -> None:
+    stored = _stored(files[0])
+    told = json.loads(stored.read_text(encoding="utf-8"))
+    del told["horizon"]
+    stored.write_text(json_text(told), encoding="utf-8")
+    with pytest.raises(BadInput, match="horizon: missing; perhaps an earlier syncline-design"):
+        diff(stored, stored)

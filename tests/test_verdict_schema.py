@@ -16,7 +16,7 @@ from syncline_design.report.checks import render_checks
 from syncline_design.report.json_out import json_text
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.tree import SCHEMA, Checked, Refused, Verdict
+from syncline_design.verdict.tree import SCHEMA, Checked, Refused, Verdict, Verdicts
 from syncline_design.verdict.verify import CheckSettings, check_file, check_files, check_loaded
 
 ROOT = Path(__file__).parent.parent
@@ -83,11 +83,16 @@ def test_a_refused_file_among_others_is_a_record_too(tmp_path: Path) -> None:
     assert isinstance(verdict, Verdict)
     schema = schema_of(Refused, SCHEMA, "a refused file")
     both: list[Checked] = [refused, verdict]
-    written = json.loads(render_checks("json", both))["verdicts"]
+    several = json.loads(render_checks("json", both))
+    jsonschema.Draft202012Validator(result_schema("verdicts")).validate(several)
+    assert read_as(Verdicts, json.dumps(several)).verdicts == (refused, verdict)
+    written = several["verdicts"]
     jsonschema.Draft202012Validator(schema).validate(written[0])
     VALIDATOR.validate(written[1])
     assert read_as(Refused, json.dumps(written[0])) == refused
-    assert not VALIDATOR.is_valid(written[0])
+    VALIDATOR.validate(written[0])  # alone it goes by the name of a verdict
+    with pytest.raises(NotThisResultError):
+        read_as(Verdict, json.dumps(written[0]))
 
 
 @pytest.mark.parametrize(

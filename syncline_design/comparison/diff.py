@@ -21,7 +21,7 @@ from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
 from syncline_design.spec.load import BadInput, catalogs_of, load_document, without_simulated
 from syncline_design.spec.yaml_text import KeyPath, ParsedFile, parse
-from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.tree import RequirementResult, Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 MOST_TRIED = 8  # changes that are also tried one by one
@@ -73,12 +73,9 @@ def read_side(path: Path, settings: CheckSettings) -> Side:
 def _causes(before: Side, after: Side) -> Found:
     if before.case is not None and after.case is not None:
         yield from _spec_causes(_expanded(before), _expanded(after), (), "")
-    else:
-        yield from _verdict_causes(before.verdict, after.verdict)
-    if before.case is not None and after.case is not None:
         yield from _catalog_causes(before.case, after.case)
     else:
-        yield from _provenance_causes(before.verdict, after.verdict)
+        yield from _verdict_causes(before.verdict, after.verdict)
 
 
 def _expanded(side: Side) -> Any:
@@ -151,20 +148,60 @@ def _text(value: Any) -> str | None:
 
 
 def _verdict_causes(old: Verdict, new: Verdict) -> Found:
-    """What two verdicts say about their inputs: motion, models, limits."""
-    for key in ("sync_model", "objective", "coverage_factor", "currency"):
-        yield from _one_cause(key, getattr(old.spec, key), getattr(new.spec, key))
-    stages = {stage.name: stage.platform.to_json() for stage in old.spec.stages}
-    for stage in new.spec.stages:
-        before = stages.get(stage.name, {})
-        for key, value in stage.platform.to_json().items():
-            if key != "name":
-                place = f"stages[{stage.name}].{key}"
-                yield from _one_cause(place, before.get(key, _ABSENT), value)
-    limits = {row.id: row.limit for row in old.requirements}
-    for row in new.requirements:
-        if row.id in limits:
-            yield from _one_cause(f"requirements[{row.id}].limit", limits[row.id], row.limit)
+    """What two verdicts say differently about what they were asked, and by what they were made."""
+    ids = {row.id for row in old.requirements} & {row.id for row in new.requirements}
+    before, after = _asked(old, ids), _asked(new, ids)
+    if old.design is not None and new.design is not None:
+        before, after = before | _worked_on(old), after | _worked_on(new)
+    found = [*_spec_causes(before, after, (), ""), *_provenance_causes(old, new)]
+    hashes = [one.provenance.spec_sha256[:12] for one in (old, new)]
+    if not found:  # whatever it is that the verdicts do not repeat
+        found = list(_one_cause("spec (hash)", *hashes))
+    yield from found
+
+
+def _asked(verdict: Verdict, both: set[str]) -> Json:
+    """What a verdict repeats of its inputs, as a spec would hold it.
+
+    both: requirements of both sides; an implied one of one side alone comes of the outcome.
+    """
+    spec = verdict.spec
+    keys = ("sync_model", "objective", "coverage_factor", "currency")
+    return {
+        **{key: getattr(spec, key) for key in keys},
+        "horizon": verdict.horizon.to_json(),
+        "stages": tuple(
+            {**stage.platform.to_json(), "name": stage.name, "vehicle": stage.vehicle}
+            for stage in spec.stages
+        ),
+        "open_roles": ", ".join(spec.open_roles) or "none",
+        "requirements": tuple(
+            _required(row) for row in verdict.requirements if row.id in both or not row.implied
+        ),
+        "files": {one.file: one.sha256[:12] for one in verdict.provenance.files},
+    }
+
+
+def _required(row: RequirementResult) -> Json:
+    """A requirement without its outcome."""
+    keys = ("id", "kind", "limit", "quantile", "waiver")
+    return {key: value for key, value in row.to_json().items() if key in keys}
+
+
+def _listed_effects(verdict: Verdict) -> Json:
+    """Parameters of the known effects by `latency (boat.attitude)`."""
+    found: dict[str, list[Json]] = {}
+    for one in verdict.effects or ():
+        name = f"{one.effect} ({one.stage}.{one.sensor})"
+        found.setdefault(name, []).append(dict(one.parameters))
+    return {name: one[0] if len(one) == 1 else tuple(one) for name, one in found.items()}
+
+
+def _worked_on(verdict: Verdict) -> Json:
+    """What only the verdict on a design tells of its inputs."""
+    found = verdict.monte_carlo
+    simulated = "none" if found is None else {"samples": found.samples}
+    return {"effects": _listed_effects(verdict), "monte_carlo": simulated}
 
 
 def _provenance_causes(old: Verdict, new: Verdict) -> Found:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Annotated
 
-from syncline_design.machine.records import Record
+from syncline_design.machine.records import Named, Record, optional
 from syncline_design.verdict.tree import RequirementResult, Status, Verdict, Word
 
 SCHEMA = "syncline-design/diff/v1"
@@ -65,7 +66,10 @@ class FigureChange(Record):
 
 @dataclass(frozen=True, slots=True)
 class Standing(Record):
-    """How one side stands to a requirement."""
+    """How one side stands to a requirement.
+
+    quantile: of a simulated one; waived: true where a waiver in force covers it.
+    """
 
     status: Status
     value: float | None
@@ -74,6 +78,8 @@ class Standing(Record):
     unit: str
     line: int | None
     column: int | None
+    quantile: float | None = optional()
+    waived: bool | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +122,7 @@ class Cause(Record):
 class Difference(Record):
     """The difference of two specs or verdict files; exit_code: that of the new one."""
 
-    schema: str
+    schema: Annotated[str, Named(SCHEMA)]
     old: Compared
     new: Compared
     causes: tuple[Cause, ...]
@@ -202,4 +208,7 @@ def _requirements(old: Verdict, new: Verdict) -> Iterator[RequirementChange]:
 def _standing(row: RequirementResult | None) -> Standing | None:
     if row is None:
         return None
-    return Standing(row.status, row.value, row.limit, row.margin, row.unit, row.line, row.column)
+    return Standing(
+        row.status, row.value, row.limit, row.margin, row.unit, row.line, row.column,
+        row.quantile, row.is_waived or None,
+    )  # fmt: skip

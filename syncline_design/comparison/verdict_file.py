@@ -9,9 +9,10 @@ from typing import NoReturn
 from syncline_design.machine.records import NotThisResultError, read_as
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw, StopReadingError, read_bytes
-from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.tree import SCHEMA, Verdict
 
 _WANTED = "a verdict as `check --output json:PATH` writes it, of one spec"
+_ANEW = "a verdict written by this version; run `check` on its spec again"
 
 
 def text_of(path: Path) -> str:
@@ -26,16 +27,24 @@ def text_of(path: Path) -> str:
 def read_verdict(path: Path) -> Verdict:
     """The verdict in a JSON file; BadInput names the first thing in it that is none."""
     text = text_of(path)
-    found = _schema_of(path, text)
+    name, word = _is(path, text)
+    if name != SCHEMA or word == "refused":
+        where = "verdict" if name == SCHEMA else "schema"
+        found = word if name == SCHEMA else name or "none"
+        _refuse(path, "not a verdict that can be compared", where, _WANTED, found)
     try:
         return read_as(Verdict, text)
     except NotThisResultError as error:
         where, _, what = str(error).partition("\n")[0].partition(": ")
-        _refuse(path, f"not a verdict: {what}", where, _WANTED, found)
+        if what == "Field required":
+            what, wanted = "missing; perhaps an earlier syncline-design wrote this verdict", _ANEW
+        else:
+            what, wanted = f"not a verdict: {what}", _WANTED
+        _refuse(path, what, where, wanted)
 
 
-def _schema_of(path: Path, text: str) -> str:
-    """What a JSON file says it is; BadInput where it is no JSON."""
+def _is(path: Path, text: str) -> tuple[str, str]:
+    """What a JSON file says it is, and its outcome; BadInput where it is no JSON."""
     try:
         data = json.loads(text, parse_constant=_no_constant)
     except json.JSONDecodeError as error:
@@ -44,7 +53,8 @@ def _schema_of(path: Path, text: str) -> str:
     except (ValueError, RecursionError) as error:
         deep = isinstance(error, RecursionError)
         _refuse(path, "nested too deeply" if deep else f"not JSON: {error}")
-    return str(data.get("schema", ""))[:80] if isinstance(data, dict) else ""
+    said = data if isinstance(data, dict) else {}
+    return str(said.get("schema", ""))[:80], str(said.get("verdict", ""))[:80]
 
 
 def _no_constant(name: str) -> NoReturn:

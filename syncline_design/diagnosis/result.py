@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
-from syncline_design.machine.records import Record, optional
+from syncline_design.machine.records import Named, Record, optional
 from syncline_design.spec.effects_listed import EffectChoice
 
 SCHEMA: Final = "syncline-design/diagnosis/v1"
@@ -335,7 +335,7 @@ class Diagnosis(Record):
     addition.  unseen: what this log could not show.
     """
 
-    schema: str = SCHEMA
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
     verdict: LogOutcome
     sound: bool
     checks: tuple[Check, ...]

@@ -66,6 +66,18 @@ class _NullIsInfinite:
 Unbounded = Annotated[float, _NullIsInfinite]  # may be infinite: unlimited, or no end known
 
 
+@dataclasses.dataclass(frozen=True, slots=True)
+class Named:
+    """Of the `schema` key: only this name is taken, so that no other kind or version is read."""
+
+    name: str
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: Any) -> Any:
+        from pydantic_core import core_schema
+
+        return core_schema.literal_schema([self.name])
+
+
 def optional() -> Any:
     """A field that may be missing: None here, no key there."""
     return dataclasses.field(default=None, metadata={_OPTIONAL: True})
@@ -128,7 +140,7 @@ def read_as(kind: type[R], text: str | bytes) -> R:
     return found
 
 
-def _adapter(kind: type[Record]) -> Any:
+def _adapter(kind: Any) -> Any:
     """The reader of a kind of record; making one takes as long as reading hundreds."""
     from pydantic import TypeAdapter
 
@@ -149,14 +161,16 @@ def _path(location: Sequence[int | str]) -> str:
     return shown
 
 
-def schema_of(kind: type[Record], name: str, title: str) -> Json:
+def schema_of(kind: Any, name: str, title: str) -> Json:
     """JSON Schema (draft 2020-12) of a result; name: its `schema` key, as in `.../verdict/v1`.
+
+    kind: a record's type, or the union of those that go by this name.
 
     Further keys are allowed everywhere: a later state of the same version may add some.
     """
     raw = _adapter(kind).json_schema()
     body = _without_titles(raw)
-    body["properties"]["schema"] = {"const": name}
+    body.setdefault("properties", {})["schema"] = {"const": name}
     return {"$schema": DRAFT, "$id": f"urn:{name.replace('/', ':')}", **body, "title": title}
 
 

@@ -11,11 +11,11 @@ from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from fractions import Fraction
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
 from syncline_design import __version__
 from syncline_design.machine.deadline import in_force
-from syncline_design.machine.records import Record
+from syncline_design.machine.records import Named, Record
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
@@ -83,7 +83,7 @@ class Reproduction(Record):
     inputs: its platform and sensor figures against the catalog.
     """
 
-    schema: str
+    schema: Annotated[str, Named(SCHEMA)]
     version: str
     seed: int
     ok: bool

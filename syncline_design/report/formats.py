@@ -27,4 +27,5 @@ ResultName = Literal[
     "simulation",
     "study-result",
     "verdict",
+    "verdicts",
 ]

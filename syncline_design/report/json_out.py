@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import Checked
 
-SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
-
 
 def json_text(data: Any) -> str:
     """Indented JSON; what is infinite or not a number becomes null, as the schemas say."""
@@ -30,5 +28,7 @@ def _finite(value: Any) -> Any:
 
 def verdicts_json(verdicts: Sequence[Checked]) -> str:
     """One verdict as it is; several under `verdicts`."""
-    plain = [verdict.to_json() for verdict in verdicts]
-    return json_text(plain[0] if len(plain) == 1 else {"schema": SEVERAL_SCHEMA, "verdicts": plain})
+    from syncline_design.verdict.tree import SEVERAL_SCHEMA, Verdicts
+
+    found = verdicts[0] if len(verdicts) == 1 else Verdicts(SEVERAL_SCHEMA, tuple(verdicts))
+    return json_text(found.to_json())

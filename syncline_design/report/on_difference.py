@@ -17,7 +17,8 @@ from syncline_design.report.document import Document, Items, Node, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import sentence_list, visible
-from syncline_design.report.words import KINDS, OUTCOMES, STATUSES
+from syncline_design.report.verdict_words import kind_words, status_word
+from syncline_design.report.words import OUTCOMES
 
 
 def render_diff(name: str, data: Difference) -> str:
@@ -172,16 +173,22 @@ def _margins(data: Difference) -> Table | None:
 def _margin_row(entry: RequirementChange) -> tuple[Cell | str, ...]:
     return (
         Cell(entry.id),
-        KINDS.get(entry.kind, entry.kind),
+        _limited(entry),
         _standing(entry.old),
         _standing(entry.new),
     )
+
+
+def _limited(entry: RequirementChange) -> str:
+    """What a requirement limits; of a simulated one the quantile too, where both sides agree."""
+    quantiles = {row.quantile for row in (entry.old, entry.new) if row is not None}
+    return kind_words(entry.kind, quantiles.pop() if len(quantiles) == 1 else None)
 
 
 def _standing(row: Standing | None) -> Cell:
     """`0.29 m of 0.3 m` with the requirement's status as colour and symbol."""
     if row is None:
         return Cell("not required")
-    state = STATUSES[row.status]
+    state = status_word(row.status, waived=bool(row.waived))
     shown = f"{numbers.in_unit(row.value, row.unit)} of {numbers.in_unit(row.limit, row.unit)}"
     return Cell(f"{shown}, {state.word}", row.value, state.tone, state.mark)

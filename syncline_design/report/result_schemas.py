@@ -7,7 +7,7 @@ from typing import Any, Final, get_args
 
 from syncline_design.comparison import difference, meaning
 from syncline_design.diagnosis import result as diagnosis
-from syncline_design.machine.records import Record, schema_of
+from syncline_design.machine.records import schema_of
 from syncline_design.paper import reproduce
 from syncline_design.report import study_data
 from syncline_design.report.formats import ResultName
@@ -16,14 +16,15 @@ from syncline_design.simulation import results as simulation
 from syncline_design.verdict import optimise
 from syncline_design.verdict import tree as verdict
 
-_RESULTS: Final[Mapping[ResultName, tuple[type[Record], str]]] = {
+_RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
     "optimisation": (optimise.Optimisation, optimise.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),
     "study-result": (study_data.StudyData, study_data.SCHEMA),
-    "verdict": (verdict.Verdict, verdict.SCHEMA),
+    "verdict": (verdict.Checked, verdict.SCHEMA),
+    "verdicts": (verdict.Verdicts, verdict.SEVERAL_SCHEMA),
 }
 RESULT_NAMES: Final[tuple[ResultName, ...]] = get_args(ResultName)
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from syncline_design import __version__
-from syncline_design.machine.records import Record
+from syncline_design.machine.records import Named, Record
 from syncline_design.report.study_rows import Value, rows, si_unit
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import MeetsWhen
@@ -61,7 +61,7 @@ class StudyProvenance(Record):
 class StudyData(Record):
     """A finished study; cases: the rows of its table, what a case lacks null or left out."""
 
-    schema: str
+    schema: Annotated[str, Named(SCHEMA)]
     verdict: StudyWord
     name: str
     file: str

@@ -22,7 +22,7 @@ from syncline_design.report.words import (
 )
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.tree import Checked, LedgerRow, RequirementResult, Verdict
+    from syncline_design.verdict.tree import Checked, LedgerRow, RequirementResult, Status, Verdict
 
 Json = Mapping[str, Any]
 
@@ -79,7 +79,12 @@ def qualification(verdict: Verdict) -> str:
 
 def status_of(row: RequirementResult) -> Outcome:
     """A requirement's outcome; a failing one with a waiver in force is waived."""
-    return STATUSES["waived" if row.status == "fail" and row.is_waived else row.status]
+    return status_word(row.status, waived=row.is_waived)
+
+
+def status_word(status: Status, *, waived: bool) -> Outcome:
+    """The outcome of a requirement, by whether a waiver in force covers it."""
+    return STATUSES["waived" if waived and status == "fail" else status]
 
 
 def waiver_text(row: RequirementResult) -> str:
@@ -93,9 +98,14 @@ def waiver_text(row: RequirementResult) -> str:
 
 def kind_text(row: RequirementResult) -> str:
     """What a requirement limits."""
-    if row.kind == "monte_carlo" and row.quantile is not None:
-        return f"simulated error, {numbers.percent(row.quantile)} quantile"
-    return KINDS[row.kind]
+    return kind_words(row.kind, row.quantile)
+
+
+def kind_words(kind: str, quantile: float | None = None) -> str:
+    """What a kind of requirement limits."""
+    if kind == "monte_carlo" and quantile is not None:
+        return f"simulated error, {numbers.percent(quantile)} quantile"
+    return KINDS.get(kind, kind)
 
 
 def relative_margin(row: RequirementResult) -> float | None:

@@ -6,14 +6,14 @@ import math
 import platform
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 import numpy as np
 
 from syncline_design import __version__
 from syncline_design.effects.record import Array
 from syncline_design.machine.input_files import FileRead
-from syncline_design.machine.records import Record, Unbounded, optional
+from syncline_design.machine.records import Named, Record, Unbounded, optional
 from syncline_design.simulation.distribution import Binned, Values
 from syncline_design.simulation.settings import Envelope
 
@@ -176,7 +176,7 @@ class Simulation(Record):
     spec, provenance: missing where a system was simulated that comes from no spec.
     """
 
-    schema: str
+    schema: Annotated[str, Named(SCHEMA)]
     monte_carlo: MonteCarlo
     syncline: SimulatedSyncline
     trajectory: str | None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Annotated, Any
 
 from syncline_design import __version__
 from syncline_design.choice.acceptable import refusals
@@ -31,7 +31,7 @@ from syncline_design.choice.tolerance import (
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
 from syncline_design.machine.input_files import FileRead
-from syncline_design.machine.records import Record, optional
+from syncline_design.machine.records import Named, Record, optional
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.selection import RoleSelection
@@ -104,7 +104,7 @@ class Optimisation(Record):
     meets, null where that was not worked out.
     """
 
-    schema: str = SCHEMA
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
     verdict: Word
     spec: SpecName
     proof: Proof

@@ -8,15 +8,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from syncline_design.choice.outcome import Explanation, PriceStep, Proof
 from syncline_design.machine.input_files import FileRead
-from syncline_design.machine.records import Record, optional
+from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
 
 SCHEMA = "syncline-design/verdict/v1"
+SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
 Status = Literal["pass", "fail", "indeterminate"]
 Figure = float | str | None
 Word = Literal["meets", "fails", "infeasible", "indeterminate"]
@@ -444,7 +445,7 @@ class ChoiceResult(Record):
 class Verdict(Record):
     """What `check` says of one spec; without a design its figures are None."""
 
-    schema: str = SCHEMA
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
     verdict: Word
     spec: SpecFrame
     horizon: MissionHorizon
@@ -493,7 +494,7 @@ class FileProblem(Record):
 class Refused(Record):
     """A file among several that could not be read; nothing of it was computed."""
 
-    schema: str = SCHEMA
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
     verdict: Literal["refused"] = "refused"
     file: str
     problems: tuple[FileProblem, ...]
@@ -511,3 +512,11 @@ class Refused(Record):
 
 
 Checked = Verdict | Refused  # what there is to say of one file among several
+
+
+@dataclass(frozen=True, slots=True)
+class Verdicts(Record):
+    """What `check` says of several files."""
+
+    schema: Annotated[str, Named(SEVERAL_SCHEMA)]
+    verdicts: tuple[Checked, ...]
