@@ -2,16 +2,19 @@
 
 Each takes what its command takes and returns a result as data; `time_limit_s` binds all of it, and
 `seed` is that of every random number in it.  BadInput names everything that is wrong with a file;
-OutOfTime (a NoVerdict) says that the time was over before anything could be concluded.
+OutOfTime (a NoVerdict) says that the time was over before anything could be concluded; ValueError
+names an argument that its command would refuse.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from syncline_design.machine import arguments
 from syncline_design.machine.deadline import NoVerdict, OutOfTime, within_s
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, load
@@ -46,7 +49,15 @@ SpecOrPath = str | Path | Case  # a spec file, or one that was loaded before
 
 
 def _case(spec: SpecOrPath) -> Case:
-    return spec if isinstance(spec, Case) else load(spec)
+    return spec if isinstance(spec, Case) else load(arguments.path("spec", spec))
+
+
+def _limited(seed: int, time_limit_s: float | None) -> AbstractContextManager[object]:
+    """The time limit in force, once it and the seed are such as the commands take."""
+    arguments.whole("seed", seed, 0)
+    if time_limit_s is not None:
+        arguments.amount("time_limit_s", time_limit_s, 0.0)
+    return within_s(time_limit_s)
 
 
 def check(
@@ -58,10 +69,13 @@ def check(
     monte_carlo: whether to simulate (a requirement of that kind stays undecided without).  today:
     the day on which waivers are judged; None: the machine's date.
     """
+    from syncline_design.choice.outcome import METHODS
     from syncline_design.verdict.verify import CheckSettings, check_loaded
 
+    arguments.word("method", method, METHODS)
+    arguments.day("today", today)
     settings = CheckSettings(seed, method, monte_carlo=monte_carlo, today=today)
-    with within_s(time_limit_s):
+    with _limited(seed, time_limit_s):
         return check_loaded(_case(spec), settings)
 
 
@@ -75,10 +89,15 @@ def optimize(
     best: how many designs that differ in a sensor; every: in anything.  pareto: the exact front of
     `resource` against the error too.
     """
+    from syncline_design.choice.outcome import METHODS
+    from syncline_design.choice.table import RESOURCES
     from syncline_design.verdict import optimise
 
+    arguments.whole("best", best, 1)
+    arguments.word("resource", resource, RESOURCES)
+    arguments.word("method", method, METHODS)
     settings = optimise.OptimizeSettings(best, pareto, resource, method, seed=seed, every=every)
-    with within_s(time_limit_s):
+    with _limited(seed, time_limit_s):
         return optimise.optimize(_case(spec), settings).result
 
 
@@ -89,25 +108,33 @@ def simulate(
     """The nonlinear chain of a spec (its best design where something is open) simulated."""
     from syncline_design.verdict.simulated_spec import simulate_spec
 
-    with within_s(time_limit_s):
+    if samples is not None:
+        arguments.whole("samples", samples, 1)
+    if workers is not None:
+        arguments.whole("workers", workers, 1)
+    with _limited(seed, time_limit_s):
         return simulate_spec(_case(spec), seed, samples, workers).result
 
 
 def diagnose(
-    spec: SpecOrPath, logs: Sequence[str | Path] = (), *, seed: int = 0,
+    spec: SpecOrPath, logs: str | Path | Sequence[str | Path] = (), *, seed: int = 0,
     false_alarm_rate: float = 0.05, max_effects: int = 4, time_limit_s: float | None = None,
 ) -> DiagnosisAndDesign:  # fmt: skip
     """Where measured logs disagree with a spec, what is missing in it, what that means for it.
 
-    logs: files; none: those that the spec names.
+    logs: a file or several; none: those that the spec names.
     """
     from syncline_design import diagnosis
     from syncline_design.comparison.meaning import as_measured, meaning, with_design
 
+    arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
+    arguments.whole("max_effects", max_effects, 0, arguments.MOST_EFFECTS)
+    named = [logs] if isinstance(logs, str | Path) else logs
+    files = [arguments.path("logs", one) for one in named]
     settings = diagnosis.DiagnosisSettings(seed, false_alarm_rate, max_effects)
-    with within_s(time_limit_s):
+    with _limited(seed, time_limit_s):
         case = _case(spec)
-        found = diagnosis.diagnose(as_measured(case, seed), logs, settings)
+        found = diagnosis.diagnose(as_measured(case, seed), files, settings)
         means = meaning(case, found.effects_entries(), seed)
         return with_design(found, means)
 
@@ -124,9 +151,12 @@ def study(
     """
     from syncline_design import studies
 
+    file = arguments.path("path", path)
+    arguments.whole("workers", workers, 1)
+    arguments.day("today", today)
     settings = studies.StudySettings(seed, workers, store, scheduler, dask, today, fresh)
-    with within_s(time_limit_s):
-        return studies.run_study(path, settings, progress)
+    with _limited(seed, time_limit_s):
+        return studies.run_study(file, settings, progress)
 
 
 def diff(
@@ -136,13 +166,14 @@ def diff(
     from syncline_design.comparison import diff as comparison
     from syncline_design.verdict.verify import CheckSettings
 
-    with within_s(time_limit_s):
-        return comparison.diff(old, new, CheckSettings(seed))
+    files = arguments.path("old", old), arguments.path("new", new)
+    with _limited(seed, time_limit_s):
+        return comparison.diff(*files, CheckSettings(seed))
 
 
 def reproduce(*, seed: int = 0, time_limit_s: float | None = None) -> Reproduction:
     """Every table and figure of the paper computed anew, beside what is printed."""
     from syncline_design.paper import reproduce as paper
 
-    with within_s(time_limit_s):
+    with _limited(seed, time_limit_s):
         return paper.reproduce(seed=seed)

@@ -24,6 +24,7 @@ from syncline_design.cli.shared import (
     output_targets,
     watched,
 )
+from syncline_design.machine.arguments import FALSE_ALARM_RATES, MOST_EFFECTS
 from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:
@@ -80,9 +81,16 @@ def diagnose(
         Path | None, typer.Option(metavar="PATH", help="Write the spec with the findings in it.")
     ] = None,
     false_alarm_rate: Annotated[
-        float, typer.Option(min=0.0005, max=0.5, help="Chance that a clean log is found at fault.")
+        float,
+        typer.Option(
+            min=FALSE_ALARM_RATES[0],
+            max=FALSE_ALARM_RATES[1],
+            help="Chance that a clean log is found at fault.",
+        ),
     ] = 0.05,
-    max_effects: Annotated[int, typer.Option(min=0, max=20, help="Effects named at most.")] = 4,
+    max_effects: Annotated[
+        int, typer.Option(min=0, max=MOST_EFFECTS, help="Effects named at most.")
+    ] = 4,
     time_limit: TimeLimitOption = None,
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""

@@ -44,6 +44,10 @@ class BadInput(Exception):  # noqa: N818  it is the input that is bad, not the p
         self.problems = tuple(sorted(set(problems), key=_place_and_text))
         super().__init__(self._lines())
 
+    def __reduce__(self) -> tuple[type[BadInput], tuple[tuple[Flaw, ...]]]:
+        """So that it travels between processes: made again of its problems, not of their text."""
+        return type(self), (self.problems,)
+
     def _lines(self) -> str:
         lines = [str(problem) for problem in self.problems[:MAX_SHOWN]]
         if len(self.problems) > MAX_SHOWN:
