@@ -404,31 +404,31 @@ def log_lines(log: LogRead) -> list[str]:
     if log.thinned:
         lines.append(f"Too long to hold: {numbers.count(log.thinned)} rows are between windows.")
     lines += [f"Left out: {numbers.count(n)} ({why})" for why, n in log.rejected.items()]
-    varied = (
+    motion = [f"Varied: {_motion(log)}"] if log.motion else []
+    return [*lines, *motion, *log.notes]
+
+
+def _motion(log: LogRead) -> str:
+    """`speed 0.82 to 7.8 m/s, range 31 to 46 m`."""
+    return ", ".join(
         f"{_spaced(n)} {numbers.number(m.low, 3)} to {numbers.number(m.high, 3)} {m.unit}"
         for n, m in log.motion.items()
     )
-    motion = ["Varied: " + ", ".join(varied)] if log.motion else []
-    return [*lines, *motion, *log.notes]
 
 
 def _log_facts(found: Diagnosis) -> list[tuple[str, str]]:
     log = found.log
-    motion = ", ".join(
-        f"{_spaced(name)} low {numbers.number(m.low)}, high {numbers.number(m.high)}, unit {m.unit}"
-        for name, m in log.motion.items()
-    )
     facts = [
-        ("files", sentence_list(list(found.log_files))),
-        ("rows", numbers.count(log.rows)),
-        ("used", numbers.count(log.used)),
-        ("kind", log.kind),
-        ("thinned", numbers.number(log.thinned)),
-        ("notes", sentence_list(list(log.notes))),
-        ("duration s", numbers.number(log.duration_s)),
-        ("interval s", numbers.number(log.interval_s)),
-        ("fitted", numbers.number(log.fitted)),
-        ("motion", motion),
+        ("Files", sentence_list(list(found.log_files))),
+        ("Kind", log.kind),
+        ("Rows", numbers.count(log.rows)),
+        ("Rows used", numbers.count(log.used)),
+        ("Rows between windows", numbers.count(log.thinned)),
+        ("Rows fitted", numbers.count(log.fitted)),
+        ("Duration", numbers.time(log.duration_s)),
+        ("Interval", numbers.time(log.interval_s)),
+        ("Varied", _motion(log)),
+        ("Notes", sentence_list(list(log.notes))),
     ]
     return [(label, text) for label, text in facts if text]
 
