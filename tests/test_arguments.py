@@ -22,7 +22,7 @@ LOG = ROOT / "examples" / "hidden_latency.csv"
 def test_a_seed_is_a_whole_number(name: str, seed: Any) -> None:
     """They gave a verdict, with that seed in its provenance."""
     words = (SPEC, SPEC) if name == "diff" else (SPEC,)
-    with pytest.raises(ValueError, match="^seed: expected a whole number of at least 0, found"):
+    with pytest.raises(ValueError, match=r"^seed: expected a whole number of at least 0, found"):
         getattr(sd, name)(*words, seed=seed)
 
 
@@ -59,13 +59,13 @@ def test_what_a_command_refuses_is_refused_by_its_name(name: str, handed: dict[s
 
 @pytest.mark.parametrize("spec", [None, 7, b"x.yaml", {"syncline": 1}, "a\0b"])
 def test_a_spec_is_a_path_or_a_case(spec: Any) -> None:
-    with pytest.raises(ValueError, match="^spec: expected a path, found"):
+    with pytest.raises(ValueError, match=r"^spec: expected a path, found"):
         sd.check(spec)
 
 
 def test_one_log_needs_no_list() -> None:
     """Its name was taken letter by letter."""
-    with pytest.raises(sd.BadInput, match="there_is_none.csv: cannot read the log"):
+    with pytest.raises(sd.BadInput, match=r"there_is_none\.csv: cannot read the log"):
         sd.diagnose(SPEC.parent.parent / "examples" / "hidden_latency.yaml", "there_is_none.csv")
 
 
