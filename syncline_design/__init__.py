@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         reproduce,
         simulate,
         study,
+        timing,
     )
 
 __version__ = "0.1.0"
@@ -47,6 +48,7 @@ __all__ = [
     "reproduce",
     "simulate",
     "study",
+    "timing",
 ]
 
 

@@ -22,6 +22,8 @@ from syncline_design.spec.load import BadInput, load
 if TYPE_CHECKING:
     from syncline_design.choice.outcome import Road
     from syncline_design.choice.table import ResourceName
+    from syncline_design.clocks.study import TimingSettings
+    from syncline_design.comparison.clock_meaning import TimingAndSpec
     from syncline_design.comparison.difference import Difference
     from syncline_design.comparison.meaning import DiagnosisAndDesign
     from syncline_design.paper.reproduce import Reproduction
@@ -43,6 +45,7 @@ __all__ = [
     "reproduce",
     "simulate",
     "study",
+    "timing",
 ]
 
 SpecOrPath = str | Path | Case  # a spec file, or one that was loaded before
@@ -169,6 +172,26 @@ def diff(
     files = arguments.path("old", old), arguments.path("new", new)
     with _limited(seed, time_limit_s):
         return comparison.diff(*files, CheckSettings(seed))
+
+
+def timing(
+    logs: Sequence[str | Path], settings: TimingSettings | None = None, *,
+    spec: SpecOrPath | None = None, seed: int = 0, time_limit_s: float | None = None,
+) -> TimingAndSpec:  # fmt: skip
+    """What logs of a clock bear out of its error, over sessions, with a stated claim.
+
+    settings: `syncline_design.clocks.study.TimingSettings`.  spec: say what it means for it too.
+    """
+    from syncline_design.clocks.study import TimingSettings, study_logs
+    from syncline_design.comparison.clock_meaning import timing_meaning, with_spec
+
+    chosen = settings or TimingSettings()
+    with within_s(time_limit_s):
+        found = study_logs(logs, chosen)
+        if spec is None:
+            return with_spec(found.timing, None)
+        means = timing_meaning(_case(spec), found, chosen.kind, "measured", seed)
+        return with_spec(found.timing, means)
 
 
 def reproduce(*, seed: int = 0, time_limit_s: float | None = None) -> Reproduction:

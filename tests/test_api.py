@@ -18,7 +18,17 @@ from syncline_design.cli.app import app
 
 SPECS = Path(__file__).parent.parent / "specs"
 SPEC = SPECS / "position_track.yaml"
-FUNCTIONS = ("check", "diagnose", "diff", "load", "optimize", "reproduce", "simulate", "study")
+FUNCTIONS = (
+    "check",
+    "diagnose",
+    "diff",
+    "load",
+    "optimize",
+    "reproduce",
+    "simulate",
+    "study",
+    "timing",
+)
 
 
 def printed(*words: str) -> object:

@@ -38,6 +38,7 @@ LONG = {
     "diagnose": ("diagnose", *LOGGED),
     "diff": ("diff", str(SPEC), str(OTHER)),
     "reproduce": ("reproduce",),
+    "timing": ("timing", LOGGED[1]),
 }
 
 

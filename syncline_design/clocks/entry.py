@@ -75,11 +75,16 @@ def write_entry(study: TimingStudy, timing: Timing, files: EntryFiles) -> None:
 
 def values_text(study: TimingStudy, kind: EntryKind) -> str:
     """Quantiles of the error, one a line; of a method mu = -offset (valid at stamp + mu)."""
-    sign = 1.0 if kind == "clock" else -1.0
     meaning = "host minus UTC" if kind == "clock" else "mu: data were valid at their stamp plus mu"
     lines = [f"# {meaning}, quantiles of the steady state, each session with the same weight", "s"]
-    lines += [f"{value:.9g}" for value in sorted((sign * study.offsets_s).tolist())]
+    lines += [f"{value:.9g}" for value in values_of(study, kind)]
     return "\n".join(lines) + "\n"
+
+
+def values_of(study: TimingStudy, kind: EntryKind) -> list[float]:
+    """Quantiles of the error [s]: host minus UTC of a clock, mu of a method."""
+    sign = 1.0 if kind == "clock" else -1.0
+    return sorted((sign * study.offsets_s).tolist())
 
 
 def entry_text(timing: Timing, identity: str, kind: EntryKind, values_file: str) -> str:

@@ -56,6 +56,7 @@ def read_files(paths: Sequence[Path]) -> list[LogFile]:
     found: list[LogFile] = []
     seen: dict[str, Path] = {}
     for path in paths:
+        in_force().check()
         one = _read(path)
         digest = hashlib.sha256("\n".join(one.lines).encode("utf-8", "replace")).hexdigest()
         if digest in seen:

@@ -43,6 +43,7 @@ class ClockLogs:
 
 def read_logs(paths: Sequence[Path]) -> ClockLogs:
     """Read the logs; BadInput names the first that cannot be used."""
+    in_force().doing("reading the logs")
     files = read_files(paths)
     notes = [f"{one.path}: {one.cut_short}" for one in files if one.cut_short]
     sheets: dict[tuple[str, str], list[tuple[LogFile, Sheet]]] = {}

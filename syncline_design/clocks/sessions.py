@@ -85,7 +85,8 @@ def sessions_of(series: Series, gap_s: float) -> list[ClockSession]:
     if not len(series):
         return []
     steps = np.diff(series.time_s)
-    cuts = np.flatnonzero((steps > gap_s) | (steps < -1.0) | series.restart[1:]) + 1
+    begun = series.restart[1:] & ~series.restart[:-1]  # several such lines are one start
+    cuts = np.flatnonzero((steps > gap_s) | (steps < -1.0) | begun) + 1
     ends = [0, *cuts.tolist(), len(series)]
     parts = [series.part(slice(a, b)) for a, b in itertools.pairwise(ends)]
     return [_session(part) for part in parts]

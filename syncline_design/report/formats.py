@@ -13,6 +13,7 @@ STUDY_FORMATS: Final = (
 )  # fmt: skip
 DIFF_FORMATS: Final = ("json", "html", "markdown", "github")
 REPRODUCE_FORMATS: Final = ("json", "html")
+TIMING_FORMATS: Final = ("json", "html", "markdown")
 
 # Pages and binary tables are for files; a bare format name does not send them to a terminal.
 NOT_FOR_A_TERMINAL: Final = ("html", "parquet")
@@ -26,6 +27,7 @@ ResultName = Literal[
     "reproduction",
     "simulation",
     "study-result",
+    "timing",
     "verdict",
     "verdicts",
 ]

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final, get_args
 
-from syncline_design.comparison import difference, meaning
+from syncline_design.clocks import result as clocks
+from syncline_design.comparison import clock_meaning, difference, meaning
 from syncline_design.diagnosis import result as diagnosis
 from syncline_design.machine.records import schema_of
 from syncline_design.paper import reproduce
@@ -23,6 +24,7 @@ _RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),
     "study-result": (study_data.StudyData, study_data.SCHEMA),
+    "timing": (clock_meaning.TimingAndSpec, clocks.SCHEMA),
     "verdict": (verdict.Checked, verdict.SCHEMA),
     "verdicts": (verdict.Verdicts, verdict.SEVERAL_SCHEMA),
 }

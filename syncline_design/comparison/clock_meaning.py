@@ -1,0 +1,131 @@
+"""What measured timing means for a spec: its verdict with the measured error in place, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+from syncline_design.clocks.entry import values_of
+from syncline_design.clocks.result import EntryKind, Timing
+from syncline_design.clocks.study import TimingStudy
+from syncline_design.comparison.meaning import as_measured
+from syncline_design.machine.records import Record, optional
+from syncline_design.spec.case import Case
+from syncline_design.spec.catalog import ClockEntry
+from syncline_design.spec.spec import ClockChoice
+from syncline_design.verdict.tree import NamedRole, Verdict, Word
+from syncline_design.verdict.verify import CheckSettings, check_loaded
+
+
+@dataclass(frozen=True, slots=True)
+class SensorUnderTiming(Record):
+    """One sensor of the spec's design.
+
+    tau_s: as the spec has it; measured_tau_s: with the measured clock in place (None: of a method,
+    which is not put in place); bound_ratio: the measured bound alone over tau_crit.
+    """
+
+    stage: str
+    role: str
+    sensor: str
+    timeline: str
+    tau_crit_s: float | None
+    tau_s: float | None
+    measured_tau_s: float | None
+    bound_ratio: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class TimingMeaning(Record):
+    """The verdict as the spec has it and with the measured clock; after None: not put in place."""
+
+    name: str
+    file: str
+    before: Word
+    after: Word | None
+    requirement_changes: tuple[str, ...]
+    sensors: tuple[SensorUnderTiming, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TimingAndSpec(Timing):
+    """What logs of a clock show, and what it means for a spec where one was given."""
+
+    spec: TimingMeaning | None = optional()
+
+
+def with_spec(timing: Timing, means: TimingMeaning | None) -> TimingAndSpec:
+    """The result with what it means for a spec."""
+    parts = {f.name: getattr(timing, f.name) for f in fields(Timing)}
+    return TimingAndSpec(**parts, spec=means)
+
+
+def timing_meaning(
+    case: Case, study: TimingStudy, kind: EntryKind, identity: str, seed: int
+) -> TimingMeaning | None:
+    """Check the spec as it is, and with every vehicle on the measured clock; None: no bound."""
+    bound = study.timing.bound_s
+    if bound is None:
+        return None
+    settings = CheckSettings(seed=seed)
+    before = check_loaded(case, settings)
+    own = as_measured(case, seed) if before.design is not None else case
+    after = None
+    if kind == "clock":
+        after = check_loaded(on_clock(own, study, identity), settings)
+    return TimingMeaning(
+        before.name, before.file, before.verdict, None if after is None else after.verdict,
+        _changes(before, after), _sensors(before, after, bound),
+    )  # fmt: skip
+
+
+def on_clock(case: Case, study: TimingStudy, identity: str) -> Case:
+    """The case with every vehicle's host clock the measured one."""
+    currency = case.spec.currency
+    entry = ClockEntry.model_validate({
+        "name": f"{identity}, measured",
+        "offset": {
+            "distribution": "empirical",
+            "values": tuple(f"{value:.9g} s" for value in values_of(study, "clock")),
+            "bound": f"{study.timing.bound_s!r} s",
+            "claim": {"coverage": study.timing.claim.coverage},
+        },
+        "cost": f"0 {currency}", "mass": "0 g", "power": "0 W", "source": "measured",
+    })  # fmt: skip
+    clocks = {**case.catalog.clocks, identity: entry}
+    only = ClockChoice(candidates=(identity,))
+    stages = tuple(one.model_copy(update={"clock": only}) for one in case.spec.stages)
+    return replace(
+        case, catalog=case.catalog.model_copy(update={"clocks": clocks}),
+        spec=case.spec.model_copy(update={"stages": stages}),
+    )  # fmt: skip
+
+
+def _changes(before: Verdict, after: Verdict | None) -> tuple[str, ...]:
+    """Requirements whose status changes: `SYNC-1: pass to fail`."""
+    if after is None:
+        return ()
+    was = {row.id: row.status for row in before.requirements}
+    return tuple(
+        f"{row.id}: {was[row.id]} to {row.status}"
+        for row in after.requirements
+        if row.id in was and was[row.id] != row.status
+    )
+
+
+def _sensors(
+    before: Verdict, after: Verdict | None, bound_s: float
+) -> tuple[SensorUnderTiming, ...]:
+    changed = _roles(after) if after is not None else {}
+    return tuple(
+        SensorUnderTiming(
+            stage, role, row.sensor, row.timeline, row.tau_crit_s, row.tau_s,
+            changed[stage, role].tau_s if (stage, role) in changed else None,
+            bound_s / row.tau_crit_s if row.tau_crit_s else None,
+        )
+        for (stage, role), row in _roles(before).items()
+    )  # fmt: skip
+
+
+def _roles(verdict: Verdict) -> dict[tuple[str, str], NamedRole]:
+    stages = verdict.design.stages if verdict.design is not None else ()
+    return {(stage.name, role): row for stage in stages for role, row in stage.roles.items()}

@@ -1,0 +1,401 @@
+"""From logs to a claim: bounds over sessions, what forbids a claim, the entry, the command."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+import syncline_design as sd
+from syncline_design.cli.app import app
+from syncline_design.clocks.study import TimingSettings, study_logs
+from syncline_design.clocks.tolerance import (
+    normal_factor,
+    sessions_of_order_statistic,
+    tolerance_bound,
+)
+from syncline_design.machine.records import read_as
+from syncline_design.report.result_schemas import result_schema
+from syncline_design.spec.load import load
+from syncline_design.verdict.verify import CheckSettings, check_loaded
+from tests import clock_logs as made
+from tests.clock_logs import START, sessions_csv, write
+
+ROOT = Path(__file__).parent.parent
+SPEC = """\
+syncline: 1
+name: two timelines
+requirements:
+  - {id: ACC-1, kind: accuracy, limit: 0.30 m}
+  - {id: SYNC-1, kind: sync, limit: 1.0}
+catalogs: [own_clock.yaml]
+coverage_factor: 2
+stages:
+  - name: uav
+    platform: {v_max: 20 m/s, omega_max: 0.001 deg/s, distance: 0.1 m, baseline: 0 m}
+    clock: {candidates: [own_clock]}
+    position: {sensor: {modality: position, sigma_position: 1 cm, primitives: []},
+               timestamping: {error: {distribution: constant, value: 0 s}, timeline: utc}}
+    attitude: {sensor: {modality: attitude, sigma_attitude: 0.01 deg, primitives: []},
+               timestamping: {error: {distribution: constant, value: 0 s}}}
+    ranging: {sensor: {modality: ranging, sigma_range: 1 cm, sigma_bearing: 0.01 deg,
+              primitives: []}, timestamping: {error: {distribution: constant, value: 0 s}}}
+"""
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+# Factors of ISO 16269-6, table D.4 (one-sided, unknown variance), p = 95 %, confidence 95 %
+@pytest.mark.parametrize(
+    ("count", "factor"), [(5, 4.203), (6, 3.708), (10, 2.911), (20, 2.396), (60, 2.022)]
+)
+def test_the_tolerance_factor_is_the_printed_one(count: int, factor: float) -> None:
+    assert normal_factor(count, 0.95, 0.95) == pytest.approx(factor, abs=1.5e-3)
+
+
+def test_the_order_statistic_needs_what_wilks_says() -> None:
+    assert sessions_of_order_statistic(0.95, 0.95) == 59
+    assert sessions_of_order_statistic(0.99, 0.95) == 299
+    assert sessions_of_order_statistic(0.5, 0.5) == 1
+
+
+def test_the_bound_is_log_normal_below_the_largest_from_59_on() -> None:
+    source = np.random.default_rng(3)
+    q = np.exp(source.normal(-11.0, 0.4, 10))
+    bound, method = tolerance_bound(q, 0.95, 0.95)
+    logs = np.log(q)
+    assert method == "log-normal"
+    assert bound == pytest.approx(math.exp(logs.mean() + 2.911 * logs.std(ddof=1)), rel=1e-3)
+    outlier = np.append(np.full(19, 1e-6) * np.exp(0.001 * source.normal(size=19)), 1e-3)
+    assert tolerance_bound(outlier, 0.95, 0.95)[0] >= 1e-3
+    many = np.exp(source.normal(-11.0, 0.4, 59))
+    assert tolerance_bound(many, 0.95, 0.95) == (float(many.max()), "order statistic")
+    assert tolerance_bound(many[:58], 0.95, 0.95)[1] == "log-normal"
+
+
+def test_a_claim_over_sessions(tmp_path: Path) -> None:
+    """Normal offsets: 95 % of |x| lie below 1.96 standard deviations, in every session alike."""
+    paths = sessions_csv(tmp_path, [1e-5] * 20, count=2000, step_s=5.0)
+    timing = study_logs(paths, TimingSettings()).timing
+    claim = timing.claim
+    assert (claim.made, claim.sessions, claim.needs_sessions, claim.why_not) == (True, 20, 0, None)
+    assert claim.hours == pytest.approx(20 * 1999 * 5.0 / 3600.0)
+    assert [row.quantile_s for row in timing.sessions] == pytest.approx([1.96e-5] * 20, rel=0.08)
+    assert timing.statistical_bound_s is not None
+    assert 1.96e-5 < timing.statistical_bound_s < 1.2 * 1.96e-5
+    assert timing.bound_s == timing.statistical_bound_s
+    assert timing.hard_bound_s is None
+    assert timing.exit_code == 0
+    assert claim.rests_on == "unknown"
+    assert all(row.stationary for row in timing.sessions)
+    assert len(timing.evidence) == 20
+
+
+@pytest.mark.parametrize(("count", "need"), [(1, 4), (2, 3), (4, 1)])
+def test_too_few_sessions_carry_no_claim(count: int, need: int, tmp_path: Path) -> None:
+    paths = sessions_csv(tmp_path, [1e-5] * count)
+    timing = study_logs(paths, TimingSettings()).timing
+    assert (timing.claim.made, timing.claim.needs_sessions) == (False, need)
+    assert timing.statistical_bound_s is None
+    assert timing.exit_code == 1
+    entry = tmp_path / "own.yaml"
+    done = run("timing", *paths, "--as", "own", "--write-catalog", entry)
+    assert done.exit_code == 1
+    assert "no claim, so no entry written" in done.stderr
+    assert not entry.exists()
+    if count == 1:
+        assert "it says nothing about the next start: 4 more sessions" in " ".join(
+            done.stdout.split()
+        )
+
+
+def test_the_larger_of_both_bounds_is_taken_unless_asked_otherwise(tmp_path: Path) -> None:
+    source = np.random.default_rng(5)
+    paths = []
+    for k in range(6):
+        times = START + 86400.0 * k + 64.0 * np.arange(200)
+        lines = made.tracking(times, source.normal(0.0, 1e-5, 200), hard_s=5e-4)
+        paths.append(write(tmp_path / f"s{k}.log", lines))
+    found = {use: study_logs(paths, TimingSettings(use=use)).timing
+             for use in ("larger", "statistical", "hard")}  # type: ignore[arg-type]  # fmt: skip
+    statistical = found["larger"].statistical_bound_s
+    assert statistical is not None
+    assert statistical < 1e-4
+    hard = found["larger"].hard_bound_s
+    assert hard == pytest.approx(5e-4, rel=0.02)
+    assert found["larger"].bound_s == found["hard"].bound_s == hard
+    assert found["statistical"].bound_s == statistical
+    assert found["larger"].claim.rests_on == "servo"
+    declared = TimingSettings(use="statistical", declared={"path_asymmetry": 5e-6})
+    told = study_logs(paths, declared).timing
+    assert told.bound_s == pytest.approx(statistical + 5e-6)
+    assert told.claim.rests_on == "servo_and_declared"
+
+
+def test_a_refclock_that_steers_nothing_is_the_evidence(tmp_path: Path) -> None:
+    """The servo nulls its own offset; a second pulse shows 20 us of asymmetry."""
+    tracking, pulses = [], []
+    for k in range(6):
+        for i in range(200):
+            time_s = START + 86400.0 * k + 16.0 * i
+            tracking.append(made.tracking_line(time_s, 1e-7))
+            pulses += made.refclock_lines(time_s, 2e-5)
+    logs = [write(tmp_path / "tracking.log", tracking), write(tmp_path / "refclocks.log", pulses)]
+    timing = study_logs(logs, TimingSettings()).timing
+    assert timing.source.name == "chrony refclock PPS2"
+    assert timing.claim.rests_on == "independent"
+    assert timing.bound_s == pytest.approx(2.1e-5, rel=1e-3)
+    steered = [line.replace("192.0.2.1", "PPS2") for line in tracking]
+    logs[0] = write(tmp_path / "steered.log", steered)
+    assert study_logs(logs, TimingSettings()).timing.claim.rests_on == "servo"
+
+
+def test_the_system_clock_is_phc2sys_and_ptp4l_together(tmp_path: Path) -> None:
+    paths = []
+    for k in range(5):
+        lines = []
+        for i in range(300):
+            lines.append(made.ptp4l_line(1000.0 + i + 0.01 * k, 3e-7))
+            lines.append(made.phc2sys_line(1000.5 + i, -1e-7 + 1e-9 * k))
+        paths.append(write(tmp_path / f"boot{k}.log", lines))
+    timing = study_logs(paths, TimingSettings()).timing
+    assert timing.source.name == "CLOCK_REALTIME by phc2sys and ptp4l"
+    assert timing.claim.sessions == 5
+    assert timing.sessions[0].median_s == pytest.approx(-2e-7, abs=1e-12)
+    assert timing.hard_bound_s == pytest.approx(4e-7 + 1.5e-6 + 0.25e-6, rel=0.02)
+
+
+def _week(folder: Path, sigma_s: float) -> list[Path]:
+    return sessions_csv(folder, [sigma_s] * 7, count=400, step_s=60.0, seed=2)
+
+
+def test_a_week_of_logs_becomes_an_entry_that_decides_a_verdict(tmp_path: Path) -> None:
+    """tau_crit of the position is sqrt(3) cm over 20 m/s: 866 us; its stamps are on UTC, the
+    reference's on the host."""
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(SPEC, "utf-8")
+    entry = tmp_path / "own_clock.yaml"
+    for sigma_s, word, code in ((1e-4, "meets", 0), (1e-3, "fails", 1)):
+        logs = _week(tmp_path, sigma_s)
+        done = run("timing", *logs, "--as", "own_clock", "--write-catalog", entry, "--coverage",
+                   "0.96", "--conditions", "on the bench")  # fmt: skip
+        assert done.exit_code == 0, done.stderr
+        checked = run("check", spec, "-o", "json:-")
+        assert checked.exit_code == code, checked.stdout + checked.stderr
+        verdict = json.loads(checked.stdout)
+        assert verdict["verdict"] == word
+        (shown,) = verdict["measured"]
+        assert shown["claim"]["sessions"] == 7
+        assert shown["claim"]["session_s"] == pytest.approx(399 * 60.0)
+        assert shown["conditions"] == "on the bench"
+        hashes = {one["sha256"] for one in shown["evidence"]}
+        assert hashes == {hashlib.sha256(p.read_bytes()).hexdigest() for p in logs}
+        codes = {w["code"] for w in verdict["warnings"] if w["code"].startswith("measured")}
+        assert codes == {"measured-servo"}
+    case = load(spec)
+    offset = case.catalog.clocks["own_clock"].offset
+    said = study_logs(logs, TimingSettings(coverage=0.96)).timing
+    assert offset.bound is not None
+    assert said.bound_s is not None
+    assert said.bound_s <= float(offset.bound) <= said.bound_s * 1.0001
+
+
+def test_signs_of_an_entry(tmp_path: Path) -> None:
+    """A clock 1 ms late: host minus UTC is -1 ms; data stamped by it were valid 1 ms later."""
+    source = np.random.default_rng(0)
+    logs = []
+    for k in range(5):
+        times = START + 86400.0 * k + 60.0 * np.arange(200)
+        late = 1e-3 + source.normal(0.0, 1e-6, 200)
+        logs.append(write(tmp_path / f"r{k}.csv", made.csv_lines(times, late)))
+    means = {}
+    for kind in ("clock", "timestamping"):
+        path = tmp_path / f"{kind}.yaml"
+        assert run("timing", *logs, "--as", kind, "--entry", kind, "--write-catalog",
+                   path).exit_code == 0  # fmt: skip
+        spec = tmp_path / f"{kind}_spec.yaml"
+        spec.write_text(SPEC.replace("own_clock.yaml", path.name).replace(
+            "    clock: {candidates: [own_clock]}\n", ""), "utf-8")  # fmt: skip
+        catalog = load(spec).catalog
+        error = (catalog.clocks["clock"].offset if kind == "clock"
+                 else catalog.timestamping["timestamping"].error)  # fmt: skip
+        means[kind] = float(np.mean([float(v) for v in error.values or ()]))  # type: ignore[union-attr]
+    assert means["clock"] == pytest.approx(-1e-3, rel=1e-3)
+    assert means["timestamping"] == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_what_it_means_for_a_spec_is_what_check_then_says(tmp_path: Path) -> None:
+    base = SPEC.replace("catalogs: [own_clock.yaml]\n", "").replace("own_clock", "ntp")
+    spec = tmp_path / "base.yaml"
+    spec.write_text(base, "utf-8")
+    logs = _week(tmp_path, 1e-3)
+    done = run("timing", *logs, "--spec", spec, "-o", "json:-")
+    means = json.loads(done.stdout)["spec"]
+    assert (means["before"], means["after"]) == ("meets", "fails")
+    assert means["requirement_changes"] == ["SYNC-1: pass to fail"]
+    entry = tmp_path / "own_clock.yaml"
+    run("timing", *logs, "--as", "own_clock", "--write-catalog", entry)
+    with_it = tmp_path / "with.yaml"
+    with_it.write_text(SPEC, "utf-8")
+    verdict = check_loaded(load(with_it), CheckSettings(monte_carlo=False))
+    assert verdict.design is not None
+    (stage,) = verdict.design.stages
+    taus = {row["role"]: row["measured_tau_s"] for row in means["sensors"]}
+    assert taus == pytest.approx({k: r.tau_s for k, r in stage.roles.items()}, rel=1e-5)
+
+
+def _spoiled(folder: Path, name: str) -> list[Path]:
+    """Six good sessions, of which something is wrong."""
+    paths = sessions_csv(folder, [1e-5] * 6, count=300, step_s=10.0)
+    lines = paths[3].read_text("utf-8").splitlines()
+    rows = [[float(cell) for cell in line.split(",")] for line in lines[1:]]
+    if name == "DST":
+        rows = [[t - (3600.0 if k > 150 else 0.0), x] for k, (t, x) in enumerate(rows)]
+    elif name == "leap":
+        midnight = 1_798_761_600.0
+        rows = [[midnight + 10.0 * (k - 150), x + (1e6 if k >= 150 else 0.0)]
+                for k, (_, x) in enumerate(rows)]  # fmt: skip
+    elif name == "hour":
+        rows = [[t, x + (3600e6 if k > 150 else 0.0)] for k, (t, x) in enumerate(rows)]
+    elif name == "TAI":
+        rows = [[t, x + 37e6] for t, x in rows]
+    elif name == "ns as us":
+        rows = [[t, 1e3 * x] for t, x in rows]
+    elif name == "us as s":
+        rows = [[t, 1e6 * x] for t, x in rows]
+    write(paths[3], ["time_s,offset_us", *(f"{t:.3f},{x:.6f}" for t, x in rows)])
+    return paths
+
+
+DOUBTS = {
+    "DST": "local time set back",
+    "leap": "a leap second?",
+    "hour": "local time (DST)?",
+    "TAI": "TAI against UTC (37 s)",
+    "ns as us": "are the units the same?",
+    "us as s": "is that the unit",
+}
+
+
+@pytest.mark.parametrize("name", DOUBTS)
+def test_logs_in_doubt_carry_no_claim_and_nothing_is_written(name: str, tmp_path: Path) -> None:
+    entry = tmp_path / "own.yaml"
+    logs = _spoiled(tmp_path, name)
+    done = run("timing", *logs, "--as", "own", "--write-catalog", entry, "-o", "json:-")
+    assert done.exit_code == 1, done.stderr
+    found = json.loads(done.stdout)
+    assert any(DOUBTS[name] in one for one in found["doubts"]), found["doubts"]
+    assert found["claim"]["made"] is False
+    assert found["entry"] is None
+    assert not entry.exists()
+    assert study_logs(_spoiled(tmp_path, "nothing"), TimingSettings()).timing.doubts == ()
+
+
+def test_a_log_of_one_minute_is_no_session(tmp_path: Path) -> None:
+    times = START + np.arange(60.0)
+    log = write(tmp_path / "a.csv", made.csv_lines(times, np.full(60, 1e-5)))
+    timing = study_logs([log], TimingSettings()).timing
+    assert (timing.claim.sessions, timing.claim.made) == (0, False)
+    assert timing.bound_s is None
+    assert any("too short" in note for note in timing.notes)
+
+
+def test_a_share_that_the_samples_cannot_show_is_not_claimed(tmp_path: Path) -> None:
+    paths = sessions_csv(tmp_path, [1e-5] * 6)
+    assert study_logs(paths, TimingSettings(coverage=0.99)).timing.claim.made
+    claim = study_logs(paths, TimingSettings(coverage=0.9999)).timing.claim
+    assert not claim.made
+    assert "too few samples" in (claim.why_not or "")
+
+
+REFUSED = {
+    "mixed": (lambda p: [*sessions_csv(p, [1e-5]),
+                         write(p / "t.log", made.tracking([START], [0.0]))],
+              "several kinds of logs"),
+    "TOFF": (lambda p: [write(p / "g.json", [made.gpsd_line(START + k, 0.1, "TOFF")
+                                             for k in range(200)])],
+             "latency of the serial line"),
+    "missing": (lambda p: [p / "none.log"], "cannot read"),
+    "folder": (lambda p: [p], "a folder"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_logs_that_cannot_be_used_are_refused(name: str, tmp_path: Path) -> None:
+    make, words = REFUSED[name]
+    entry = tmp_path / "own.yaml"
+    done = run("timing", *make(tmp_path), "--as", "own", "--write-catalog", entry)
+    assert done.exit_code == 2
+    assert words in done.stderr
+    assert not entry.exists()
+
+
+def test_toff_may_become_a_method_of_stamping_on_arrival(tmp_path: Path) -> None:
+    logs = [write(tmp_path / f"g{k}.json", [made.gpsd_line(START + 86400 * k + i, -0.1 - 1e-6 * i,
+                                                           "TOFF") for i in range(200)])
+            for k in range(5)]  # fmt: skip
+    done = run("timing", *logs, "--as", "serial", "--entry", "timestamping", "--write-catalog",
+               tmp_path / "serial.yaml")  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("--coverage", "1"), ("--coverage", "95"), ("--confidence", "0"), ("--session", "5"),
+        ("--session", "-1 h"), ("--declare", "5us"), ("--declare", "path=5 m"),
+        ("--source", "ptp4l"), ("--as", "own clock"), ("--write-catalog", "x.yaml"),
+    ],
+)  # fmt: skip
+def test_slips_of_the_command_line_are_named(arguments: tuple[str, str], tmp_path: Path) -> None:
+    done = run("timing", *sessions_csv(tmp_path, [1e-5] * 2), *arguments)
+    assert done.exit_code == 2
+    assert done.stdout == ""
+    assert arguments[0] in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_an_entry_takes_nobody_else_s_place(tmp_path: Path) -> None:
+    logs = _week(tmp_path, 1e-5)
+    other = write(tmp_path / "other.yaml", ["clocks: {}"])
+    done = run("timing", *logs, "--as", "own", "--write-catalog", other)
+    assert done.exit_code == 2
+    assert other.read_text("utf-8") == "clocks: {}\n"
+    again = tmp_path / "again.yaml"
+    for _ in range(2):
+        assert run("timing", *logs, "--as", "own", "--write-catalog", again).exit_code == 0
+    assert run("timing", *logs, "--as", "else", "--write-catalog", again).exit_code == 2
+
+
+def test_outputs_agree_and_are_as_the_schema_says(tmp_path: Path) -> None:
+    logs = _week(tmp_path, 1e-5)
+    page, data, text = (tmp_path / f"t.{end}" for end in ("html", "json", "md"))
+    done = run("timing", *logs, "--spec", ROOT / "specs" / "position_track.yaml",
+               "-o", f"html:{page}", "-o", f"json:{data}", "-o", f"markdown:{text}")  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    told = json.loads(data.read_text("utf-8"))
+    jsonschema.Draft202012Validator(result_schema("timing")).validate(told)
+    assert told["schema"] == "syncline-design/timing/v1"
+    wanted = {"sessions", "bound_s", "event_bound_s", "statistical_bound_s", "hard_bound_s",
+              "claim", "events", "entry"}  # fmt: skip
+    assert wanted <= set(told)
+    assert set(told["sessions"][0]) >= {"from", "to", "samples", "median_s", "quantile_s"}
+    assert set(told["claim"]) >= {"coverage", "session_share", "confidence", "sessions", "hours",
+                                  "rests_on", "made", "needs_sessions"}  # fmt: skip
+    from syncline_design.comparison.clock_meaning import TimingAndSpec
+
+    again = read_as(TimingAndSpec, data.read_text("utf-8"))
+    assert again.to_json() == told
+    for words in ("Offset over time", "TDEV and MTIE", "Sessions against the bound"):
+        assert words in page.read_text("utf-8")
+    assert "No τ changes" not in text.read_text("utf-8") or told["spec"]["before"]
+    assert sd.timing(logs).to_json()["bound_s"] == told["bound_s"]
+    assert run("timing", *logs).stdout == run("timing", *logs, "--seed", "3").stdout
