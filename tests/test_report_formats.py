@@ -15,6 +15,7 @@ import jsonschema
 import pytest
 
 import report_samples as samples
+from syncline_design.choice.outcome import Conflict
 from syncline_design.report.checks import CHECK_FORMATS, render_checks
 from syncline_design.report.ci import findings
 from syncline_design.report.json_out import json_text
@@ -144,11 +145,14 @@ def test_junit_fails_where_the_verdict_fails() -> None:
     (failed,) = [case for case in root.iter("testcase") if case.find("failure") is not None]
     assert failed.attrib["name"].startswith("ACC-1")
     assert failed.attrib["file"] == "specs/uav_corridor.yaml"
-    assert failed.attrib["line"] == "8"
+    line = samples.line_of(samples.PINNED, "ACC-1")
+    assert failed.attrib["line"] == str(line)
     failure = failed.find("failure")
     assert failure is not None
-    assert "93.91" in failure.attrib["message"]
-    assert "specs/uav_corridor.yaml:8:5" in (failure.text or "")
+    value = samples.failing().requirements[0].value
+    assert value is not None
+    assert f"{1000.0 * value:.4g}\u00a0mm" in failure.attrib["message"]
+    assert f"specs/uav_corridor.yaml:{line}:5" in (failure.text or "")
 
 
 def test_junit_of_an_infeasible_spec_fails_the_conflicting_requirements() -> None:
@@ -158,20 +162,28 @@ def test_junit_of_an_infeasible_spec_fails_the_conflicting_requirements() -> Non
         for case in root.iter("testcase")
         if case.find("failure") is not None
     }
-    assert failures == {"ACC-1 accuracy": "8", "COST-1 cost": "10"}
-    assert root.attrib["skipped"] == "1"  # SYNC-1: no design to judge it by
+    places = {identity: samples.line_of(samples.OPEN, identity) for identity in ("ACC-1", "COST-1")}
+    assert failures == {
+        "ACC-1 accuracy": str(places["ACC-1"]),
+        "COST-1 cost": str(places["COST-1"]),
+    }
+    assert root.attrib["skipped"] == "3"  # the others: no design to judge them by
     lines = render_checks("github", [samples.infeasible()]).splitlines()
-    (line,) = [line for line in lines if line.startswith("::error") and "line=8" in line]
+    wanted = f"line={places['ACC-1']}"
+    (line,) = [line for line in lines if line.startswith("::error") and wanted in line]
     assert "cannot be met together with COST-1" in line
-    assert "COST-1 by 3 400 EUR" in line
+    why = samples.infeasible().infeasibility
+    assert why is not None
+    (cost,) = [fix.text for fix in why.fixes if fix.requirement == "COST-1"]
+    assert cost.startswith("COST-1 by ")
+    assert cost in line
 
 
 def test_junit_of_an_infeasible_spec_without_a_conflict_still_fails() -> None:
     verdict = undecided(samples.infeasible())
-    why = samples.INFEASIBILITY | {"conflict": None}
-    root = junit_of(replace(verdict, infeasibility=why))
+    root = junit_of(samples.explained(verdict, conflict=Conflict((), False)))
     assert root.attrib["failures"] == "1"
-    assert root.attrib["skipped"] == "3"
+    assert root.attrib["skipped"] == str(len(verdict.requirements))
 
 
 def test_junit_of_no_verdict_errs() -> None:
@@ -215,7 +227,8 @@ def test_sarif_points_at_the_specs_line() -> None:
     (error,) = [result for result in results if result["level"] == "error"]
     place = error["locations"][0]["physicalLocation"]
     assert place["artifactLocation"]["uri"] == "specs/uav_corridor.yaml"
-    assert place["region"] == {"startLine": 8, "startColumn": 5}
+    line = samples.line_of(samples.PINNED, "ACC-1")
+    assert place["region"] == {"startLine": line, "startColumn": 5}
     rules = sarif_of(samples.failing())["runs"][0]["tool"]["driver"]["rules"]
     assert rules[error["ruleIndex"]]["id"] == error["ruleId"] == "accuracy"
 
@@ -267,7 +280,8 @@ def test_hostile_text_starts_no_github_command_of_its_own(text: str) -> None:
     lines = render_checks("github", [samples.with_hostile_text(text)]).splitlines()
     for line in lines:
         assert COMMAND.fullmatch(line), line
-    assert len(lines) == 5 + 1 + 1  # requirements, one warning, the outcome
+    warnings = len(samples.fixed_wing().warnings)
+    assert len(lines) == 5 + warnings + 1  # requirements, warnings, the outcome
 
 
 def runner_reads(line: str) -> tuple[dict[str, str], str]:
@@ -289,7 +303,7 @@ def test_github_runner_reads_back_what_was_meant(text: str) -> None:
     line = render_checks("github", [samples.with_hostile_text(text)]).splitlines()[0]
     properties, message = runner_reads(line)
     assert properties["title"] == f"ACC-1{visible(text)} accuracy"
-    assert properties["line"] == "8"
+    assert properties["line"] == str(samples.line_of(samples.OPEN, "ACC-1"))
     assert message.startswith(f"ACC-1{visible(text)}: ")
     assert message.endswith(visible(text))
 
@@ -382,7 +396,8 @@ def test_a_bare_verdict_is_enough(name: str) -> None:
 
 def test_findings_count_what_counts() -> None:
     levels = [finding.level for finding in findings(samples.failing())]
-    assert levels == ["fail", "pass", "pass", "pass", "pass", "warning"]
+    warnings = len(samples.failing().warnings)
+    assert levels == ["fail", "pass", "pass", "pass", "pass", *["warning"] * warnings]
 
 
 def test_unknown_format_is_refused() -> None:
@@ -391,11 +406,12 @@ def test_unknown_format_is_refused() -> None:
 
 
 def test_one_remedy_is_not_offered_as_a_choice() -> None:
-    fixes = samples.INFEASIBILITY["fixes"]
+    plain = samples.infeasible()
+    assert plain.infeasibility is not None
+    fix = plain.infeasibility.fixes[0]
     for count, lead in ((1, "This would do: "), (3, "Any one of these would do: ")):
-        ways_out = [dict(fixes[0], text=f"way {k}") for k in range(count)]
-        why = samples.INFEASIBILITY | {"fixes": ways_out}
-        verdict = replace(samples.infeasible(), infeasibility=why)
+        ways_out = tuple(replace(fix, text=f"way {k}") for k in range(count))
+        verdict = samples.explained(plain, fixes=ways_out)
         ways = "; ".join(f"way {k}" for k in range(count))
         said = [finding.message for finding in findings(verdict) if "would do" in finding.message]
         assert said

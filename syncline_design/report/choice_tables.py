@@ -3,94 +3,99 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.verdict_tables import currency_of
-from syncline_design.report.verdict_words import Json, items, named, plain
 from syncline_design.report.words import PRIMITIVES
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.tree import Verdict
+    from syncline_design.choice.outcome import PriceStep
+    from syncline_design.verdict.tree import (
+        Exclusion,
+        FrontDesign,
+        NamedDesign,
+        RankedDesign,
+        Verdict,
+    )
 
 
 def choice_tables(verdict: Verdict) -> list[Table]:
     """Every table of the choice that has rows."""
+    choice = verdict.choice
+    if choice is None:
+        return []
     found = (
-        priced(verdict, "front", "Pareto front: cost against error"),
-        staircase(verdict),
-        priced(verdict, "next_best", "What else almost won"),
-        excluded(verdict),
+        _priced(verdict, choice.front or (), "Pareto front: cost against error"),
+        _staircase(choice.staircase or (), currency_of(verdict)),
+        _priced(verdict, choice.next_best or (), "What else almost won"),
+        _excluded(choice.excluded or ()),
     )
     return [entry for entry in found if entry is not None]
 
 
-def staircase(verdict: Verdict) -> Table | None:
+def _money(amount: float | None, currency: str) -> Cell:
+    return Cell(numbers.money(amount, currency), amount)
+
+
+def _staircase(steps: Sequence[PriceStep], currency: str) -> Table | None:
     """What each accuracy costs: a row per step of the exact front."""
-    currency = currency_of(verdict)
     rows = []
-    for entry in items(verdict.choice, "staircase"):
-        tight, loose = entry["tightest_m"], entry["looser_than_m"]
+    for step in steps:
+        loose = step.looser_than_m
         below = f" to below {numbers.target(loose)}" if loose is not None else " and looser"
         rows.append((
-            Cell(numbers.target(tight) + below, numbers.finite(tight)),
-            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
-            Cell(numbers.money(entry.get("extra"), currency), numbers.finite(entry.get("extra"))),
+            Cell(numbers.target(step.tightest_m) + below, step.tightest_m),
+            _money(step.cost, currency),
+            _money(step.extra, currency),
         ))  # fmt: skip
     heads = ("Accuracy targets", "Price #", "More than the step before #")
     return table("Price staircase of accuracy", heads, rows) if rows else None
 
 
-def is_chosen(verdict: Verdict, entry: Json) -> bool:
+def is_chosen(verdict: Verdict, entry: FrontDesign | RankedDesign) -> bool:
     """Whether a point of the front is the chosen design: same price, same error."""
-    cost = plain(verdict.design).get("cost")
-    error = numbers.finite(entry.get("error_m"))
-    if cost is None or verdict.syncline is None or error is None or entry.get("cost") != cost:
+    if verdict.design is None or verdict.syncline is None or verdict.design.cost is None:
         return False
-    return math.isclose(error, verdict.syncline.total_m, rel_tol=1e-6)
+    if entry.cost != verdict.design.cost:
+        return False
+    return math.isclose(entry.error_m, verdict.syncline.total_m, rel_tol=1e-6)
 
 
-def priced(verdict: Verdict, key: str, caption: str) -> Table | None:
+def _priced(
+    verdict: Verdict, designs: Sequence[FrontDesign | RankedDesign], caption: str
+) -> Table | None:
     """A list of designs with price and error: the front, the next best."""
     currency = currency_of(verdict)
     rows = []
-    for entry in items(verdict.choice, key):
-        error = entry.get("error_m")
+    for entry in designs:
         shown: tuple[str, Tone] = ("\u25c6", "good") if is_chosen(verdict, entry) else ("", "")
         rows.append((
-            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
-            Cell(numbers.length(error), numbers.finite(error)),
-            Cell(design_text(entry.get("design")), tone=shown[1], mark=shown[0]),
+            _money(entry.cost, currency),
+            Cell(numbers.length(entry.error_m), entry.error_m),
+            Cell(_sensors(entry.design), tone=shown[1], mark=shown[0]),
         ))  # fmt: skip
     return table(caption, ("Cost #", "Error #", "Design"), rows) if rows else None
 
 
-def design_text(design: object) -> str:
-    """A design as words: text as it is; a design record as its sensors."""
-    if not isinstance(design, Mapping):
-        return str(design or "")
-    names = []
-    for stage in items(design, "stages"):
-        for _, entry in named(stage, "roles"):
-            method = entry.get("timestamping")
-            sensor = str(entry.get("name") or entry.get("sensor"))
-            names.append(f"{sensor} ({method})" if method else sensor)
-    return ", ".join(names)
+def _sensors(design: NamedDesign) -> str:
+    """A design as its sensors: `u-blox F9P (gpio), SBG Apogee (gpio)`."""
+    return ", ".join(f"{entry.name} ({entry.timestamping})" for _, _, entry in design.roles)
 
 
-def excluded(verdict: Verdict) -> Table | None:
+def _excluded(options: Sequence[Exclusion]) -> Table | None:
     """Options ruled out before the choice, with the reason."""
     rows = [
         (
-            f"{entry.get('stage')} \u00b7 {entry.get('role')}",
-            Cell(str(entry.get("sensor")), code=True),
-            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive") or "\u2013")),
-            Cell(str(entry.get("method") or "\u2013"), code=True),
-            str(entry.get("reason")),
+            f"{entry.stage} \u00b7 {entry.role}",
+            Cell(str(entry.sensor), code=True),
+            PRIMITIVES.get(str(entry.primitive), entry.primitive or "\u2013"),
+            Cell(entry.method or "\u2013", code=True),
+            entry.reason,
         )
-        for entry in items(verdict.choice, "excluded")
+        for entry in options
     ]
     heads = ("Role", "Sensor", "Primitive", "Timestamping", "Reason")
     return table("Options ruled out", heads, rows) if rows else None

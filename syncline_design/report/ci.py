@@ -9,13 +9,10 @@ from typing import Final, Literal
 from syncline_design.report import numbers
 from syncline_design.report.text import sentence_list
 from syncline_design.report.verdict_words import (
-    items,
     kind_text,
     margin_text,
     obstacle_sentence,
     outcome,
-    part,
-    plain,
     requirement_name,
     waiver_text,
 )
@@ -92,9 +89,8 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
 
 def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:
     """Ids of the conflict that a requirement is part of; empty where it is in none."""
-    why = plain(verdict.infeasibility)
-    further = why.get("further_conflicts") or ()
-    for members in (items(part(why, "conflict"), "requirements"), *further):
+    why = verdict.infeasibility
+    for members in () if why is None else why.conflicts:
         ids = [requirement_name(entry) for entry in members]
         if row.id in ids:
             return ids
@@ -108,12 +104,14 @@ def _conflict_text(row: RequirementResult, others: list[str], verdict: Verdict) 
 
 
 def _fixes(verdict: Verdict) -> str:
-    texts = [str(entry.get("text")) for entry in items(verdict.infeasibility, "fixes")]
+    why = verdict.infeasibility
+    if why is None:
+        return ""
+    texts = [fix.text for fix in why.fixes]
     if texts:
         lead = "This" if len(texts) == 1 else "Any one of these"
         return f" {lead} would do: {'; '.join(texts)}."
-    joint = plain(verdict.infeasibility).get("joint_fixes")
-    sets = [" and ".join(str(f.get("text")) for f in fixes) for fixes in joint or ()]
+    sets = [" and ".join(fix.text for fix in fixes) for fixes in why.joint_fixes]
     return f" Together these would do: {'; or '.join(sets)}." if sets else ""
 
 

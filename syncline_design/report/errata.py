@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Final
 
 from syncline_design.paper.errata import ERRATA
-from syncline_design.report.verdict_tables import roles
 
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import Verdict
@@ -21,7 +20,8 @@ NEEDED: Final[dict[str, frozenset[str]]] = {
 
 def relevant(verdict: Verdict) -> list[str]:
     """Reasons of the errata that touch this verdict's platforms, sensors or lever arms."""
-    present = {str(entry.get("sensor")) for _, _, entry in roles(verdict)}
+    design = verdict.design
+    present = set() if design is None else {entry.sensor for _, _, entry in design.roles}
     present |= {s.platform.id.replace("auv_printed", "auv") for s in verdict.spec.stages}
     return [
         f"{erratum.where[:1].upper()}{erratum.where[1:]}: {erratum.reason}"

@@ -42,9 +42,9 @@ from syncline_design.report.simulated import (
     simulation_facts,
 )
 from syncline_design.report.table import Table
-from syncline_design.report.verdict_words import Json, items, part, plain
 
 if TYPE_CHECKING:
+    from syncline_design.choice.outcome import Conflict, Fix, Members
     from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 MOST_OPEN = 12  # rows of a table of the choice that is not folded away
@@ -100,11 +100,11 @@ def _on_refused(refused: Refused) -> Document:
 
 def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     """Price, error, tightest margin: the answer in figures."""
-    design = plain(verdict.design)
+    design = verdict.design
     facts = []
-    if design.get("cost") is not None:
+    if design is not None and design.cost is not None:
         currency = verdict_tables.currency_of(verdict)
-        facts.append(("Price", numbers.money(design["cost"], currency)))
+        facts.append(("Price", numbers.money(design.cost, currency)))
     target = verdict_figures.lowest_limit(verdict, "accuracy")
     if verdict.syncline is not None:
         of = f" of {numbers.length(target)}" if target else ""
@@ -115,9 +115,10 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     within = verdict.monte_carlo and verdict.monte_carlo.probability_within_target
     if within:
         facts.append(("Simulated within target", numbers.percent(within.value, 4)))
-    for key, label, shown in (("mass", "Mass", numbers.mass), ("power", "Power", numbers.power)):
-        if design.get(key) is not None:
-            facts.append((label, shown(design[key])))
+    if design is not None and design.mass is not None:
+        facts.append(("Mass", numbers.mass(design.mass)))
+    if design is not None and design.power is not None:
+        facts.append(("Power", numbers.power(design.power)))
     return facts
 
 
@@ -132,62 +133,58 @@ def problems(refused: Refused) -> list[Node]:
 
 
 def _why_not(verdict: Verdict) -> list[Node]:
-    why = plain(verdict.infeasibility)
-    if not why:
+    why = verdict.infeasibility
+    if why is None:
         return []
-    told = [str(line).strip() for line in why.get("text") or ()]
+    told = [line.strip() for line in why.text]
     gaps = tuple(line for line in told if line.startswith(("No option for", "No clock for")))
     nodes: list[Node] = [Heading("Roles without any option"), Items(gaps)] if gaps else []
-    nodes += _conflict(part(why, "conflict"))
-    for members in why.get("further_conflicts") or ():
+    nodes += _conflict(why.conflict)
+    for members in why.further_conflicts:
         ending = " cannot hold together." if len(members) > 1 else " cannot be met either."
         nodes.append(Text(("Apart from that: ", *_members(members), ending)))
-    together = tuple(_joint(entries) for entries in why.get("joint_fixes") or ())
+    together = tuple(_joint(fixes) for fixes in why.joint_fixes)
     if together:
         nodes += [Heading("What would make it feasible together"), Items(together)]
-    alone = tuple(
-        (given(entry.get("text")), *([_PROVEN] if entry.get("proven") else []))
-        for entry in items(why, "fixes")
-    )
+    alone = tuple((given(fix.text), *([_PROVEN] if fix.proven else [])) for fix in why.fixes)
     if alone:
         nodes += [Heading("What would make it feasible, each alone"), Items(alone)]
-    elif not why.get("cut_short") and nodes:
+    elif not why.cut_short and nodes:
         nodes.append(Text("No single change of a requirement, platform or method was found to "
                           "help."))  # fmt: skip
-    if why.get("cut_short"):
+    if why.cut_short:
         which = "further" if alone or together else "any"
         nodes.append(Text(f"The time limit ended the search for reasons and remedies: whether "
                           f"{which} change would help was not worked out."))  # fmt: skip
     return nodes
 
 
-def _conflict(conflict: Json) -> list[Node]:
-    members = items(conflict, "requirements")
-    if not members:
+def _conflict(conflict: Conflict) -> list[Node]:
+    if not conflict.requirements:
         return []
-    several = len(members) > 1
+    several = len(conflict.requirements) > 1
     title = "Requirements that cannot hold together" if several else (
         "Requirement that no candidate meets"
     )  # fmt: skip
     proven = " Proven minimal: without any one of them the rest can be met."
-    minimal = proven if conflict.get("minimal") and several else ""
-    return [Heading(title), Text((*_members(members), f".{minimal}"))]
+    minimal = proven if conflict.minimal and several else ""
+    return [Heading(title), Text((*_members(conflict.requirements), f".{minimal}"))]
 
 
-def _members(members: Sequence[Json]) -> list[str | Span]:
+def _members(members: Members) -> list[str | Span]:
     """`ACC-1 (line 15), COST-1 (line 17)`, the names strong."""
     found: list[str | Span] = []
     for entry in members:
-        line = f" (line {entry.get('line')})" if entry.get("line") else ""
+        line = f" (line {entry.line})" if entry.line else ""
         comma = ", " if found else ""
         found += [comma, strong(verdict_words.requirement_name(entry)), line]
     return found
 
 
-def _joint(entries: Sequence[Json]) -> tuple[str | Span, ...]:
+def _joint(fixes: Sequence[Fix]) -> tuple[str | Span, ...]:
     told: list[str | Span] = []
-    for entry in entries:
-        told += [" and " if told else "", given(entry.get("text"))]
+    for fix in fixes:
+        told += [" and " if told else "", given(fix.text)]
     return (*told, _PROVEN)
 
 
@@ -199,16 +196,19 @@ def _warnings(verdict: Verdict) -> list[Node]:
 
 
 def _payload(verdict: Verdict) -> list[Node]:
+    design = verdict.design
+    if design is None:
+        return []
     return [
-        *show(verdict_tables.payload(verdict), silent=True),
-        *show(verdict_tables.shared(verdict)),
+        *show(verdict_tables.payload(verdict, design), silent=True),
+        *show(verdict_tables.shared(verdict, design)),
     ]
 
 
 def _timing(verdict: Verdict) -> list[Node]:
-    table = verdict_tables.taus(verdict)
-    if not table.rows:
+    if verdict.design is None:
         return []
+    table = verdict_tables.taus(verdict.design)
     lead = ("A sensor whose \u03c4 stays below its \u03c4_crit is limited by its own noise, not by "
             "its timestamps.")  # fmt: skip
     return [
@@ -279,14 +279,14 @@ def _folded(table: Table) -> list[Node]:
 
 def _proof(verdict: Verdict) -> str:
     """How it is known that nothing better exists."""
-    proof = part(verdict.choice, "proof")
-    if not proof:
+    proof = None if verdict.choice is None else verdict.choice.proof
+    if proof is None:
         return ""
-    method = ROADS.get(str(proof.get("method")), str(proof.get("method")))
+    method = ROADS.get(proof.method, proof.method)
     combinations = verdict.spec.combinations
     among = f" among {_grouped(combinations)} combinations" if combinations else ""
-    optimal = "proven optimal" if proof.get("optimal") else "not proven optimal"
-    checked = ", recomputed exactly afterwards" if proof.get("rechecked") else ""
+    optimal = "proven optimal" if proof.optimal else "not proven optimal"
+    checked = ", recomputed exactly afterwards" if proof.rechecked else ""
     return f"Found by {method}{among}: {optimal}{checked}."
 
 

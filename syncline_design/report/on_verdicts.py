@@ -79,7 +79,7 @@ def _answer(verdict: Checked) -> tuple[Cell, Cell, str]:
     unknown = Cell(numbers.MISSING)
     if isinstance(verdict, Refused):
         return unknown, unknown, numbers.MISSING
-    cost = verdict_words.plain(verdict.design).get("cost")
+    cost = None if verdict.design is None else verdict.design.cost
     total = None if verdict.syncline is None else verdict.syncline.total_m
     tight = verdict_words.tightest(verdict.requirements)
     return (

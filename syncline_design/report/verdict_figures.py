@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from syncline_design.report import choice_tables, numbers, verdict_tables, verdict_words
+from syncline_design.report import choice_tables, verdict_tables, verdict_words
 from syncline_design.report.document import Chart, Explorer, Node
 from syncline_design.report.text import shortened
-from syncline_design.report.verdict_words import items
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
@@ -83,16 +82,15 @@ def explorer(verdict: Verdict) -> list[Node]:
 
 def timing_chart(verdict: Verdict) -> list[Node]:
     """Each sensor's tau against its tau_crit."""
-    roles = [r for r in verdict_tables.roles(verdict) if numbers.finite(r[2].get("tau_s"))
-             is not None]  # fmt: skip
+    roles = [] if verdict.design is None else list(verdict.design.roles)
 
     def draw() -> InlineFigure:
         from syncline_design.report import figures
 
         bars = []
         for stage, role, entry in roles:
-            tau, crit = float(entry["tau_s"]), numbers.finite(entry.get("tau_crit_s"))
-            label = f"{shortened(stage, 18)} \u00b7 {role}"
+            tau, crit = entry.tau_s, entry.tau_crit_s
+            label = f"{shortened(stage.name, 18)} \u00b7 {role}"
             bars.append(figures.TauBar(label, tau, crit, crit is None or tau < crit))
         return figures.tau_bars(bars)
 
@@ -127,18 +125,19 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
 
 def choice_chart(verdict: Verdict) -> list[Node]:
     """The exact front of cost against error, the chosen design on it."""
-    points = []
-    for entry in items(verdict.choice, "front"):
-        price, error = numbers.finite(entry.get("cost")), numbers.finite(entry.get("error_m"))
-        if price is not None and error:
-            points.append((price, error, choice_tables.is_chosen(verdict, entry)))
+    front = () if verdict.choice is None else verdict.choice.front or ()
+    points = [
+        (entry.cost, entry.error_m, choice_tables.is_chosen(verdict, entry))
+        for entry in front
+        if entry.cost is not None and entry.error_m
+    ]
 
     def draw() -> InlineFigure:
         from syncline_design.report.figures_results import FrontPoint, pareto_front
 
         target, price = (lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
-        front = [FrontPoint(*point) for point in sorted(points, key=lambda point: point[0])]
-        return pareto_front(front, verdict_tables.currency_of(verdict), target, price)
+        drawn = [FrontPoint(*point) for point in sorted(points, key=lambda point: point[0])]
+        return pareto_front(drawn, verdict_tables.currency_of(verdict), target, price)
 
     caption = (
         "Every design on the line is the cheapest with that error; nothing exists below and left "

@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import (
-    Json,
-    items,
     kind_text,
     margin_text,
-    named,
     relative_margin,
     selection_reason,
     status_of,
@@ -23,14 +19,12 @@ from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, 
 from syncline_design.verdict.measured import claim_words
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
-
-
-def roles(verdict: Verdict) -> Iterator[tuple[str, str, Json]]:
-    """(stage, role, entry) of every chosen sensor."""
-    for stage in items(verdict.design, "stages"):
-        for role, entry in named(stage, "roles"):
-            yield str(stage.get("name")), role, entry
+    from syncline_design.verdict.tree import (
+        NamedDesign,
+        RequirementResult,
+        SynclineFigures,
+        Verdict,
+    )
 
 
 def requirements(verdict: Verdict) -> Table:
@@ -64,63 +58,57 @@ def _interval(row: RequirementResult, verdict: Verdict) -> str:
     return f"{confidence} interval, over all looks at the decision, {ends}"
 
 
-def payload(verdict: Verdict) -> Table:
+def payload(verdict: Verdict, design: NamedDesign) -> Table:
     """Chosen sensors, how each is timestamped, and why."""
-    currency = currency_of(verdict)
     rows = [
         (
-            f"{stage} \u00b7 {role}",
-            str(entry.get("name") or entry.get("sensor")),
-            PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive"))),
-            str(entry.get("timestamping_name") or entry.get("timestamping")),
-            TIMELINES.get(str(entry.get("timeline")), ""),
-            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
-            selection_reason(verdict, stage, role),
+            f"{stage.name} \u00b7 {role}",
+            entry.name,
+            PRIMITIVES.get(entry.primitive, entry.primitive),
+            entry.timestamping_name,
+            TIMELINES.get(entry.timeline, ""),
+            _price(entry.cost, verdict),
+            selection_reason(verdict, stage.name, role),
         )
-        for stage, role, entry in roles(verdict)
+        for stage, role, entry in design.roles
     ]
     heads = ("Role", "Sensor", "Primitive", "Timestamping", "Timeline", "Cost #", "Why")
     return table("Payload and timestamping", heads, rows)
 
 
-def shared(verdict: Verdict) -> Table | None:
+def _price(cost: float | None, verdict: Verdict) -> Cell:
+    return Cell(numbers.money(cost, currency_of(verdict)), cost)
+
+
+def shared(verdict: Verdict, design: NamedDesign) -> Table | None:
     """Shared hardware and clocks, bought once per vehicle."""
-    design = verdict.design
-    currency = currency_of(verdict)
     rows = [
         (
-            str(entry.get("name") or entry.get("id")),
-            str(entry.get("vehicle")),
-            Cell(numbers.count(entry.get("count")), numbers.finite(entry.get("count"))),
-            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
+            entry.name,
+            entry.vehicle,
+            Cell(numbers.count(entry.count), float(entry.count)),
+            _price(entry.cost, verdict),
         )
-        for entry in items(design, "infrastructure")
+        for entry in design.infrastructure
     ]
     rows += [
-        (
-            f"clock: {entry.get('name') or entry.get('id')}",
-            str(entry.get("vehicle")),
-            Cell("1", 1.0),
-            Cell(numbers.money(entry.get("cost"), currency), numbers.finite(entry.get("cost"))),
-        )
-        for entry in items(design, "clocks")
-        if entry.get("id")
+        (f"clock: {entry.name}", entry.vehicle, Cell("1", 1.0), _price(entry.cost, verdict))
+        for entry in design.clocks
     ]
     heads = ("Shared hardware", "Vehicle", "Count #", "Cost #")
     return table("Shared hardware and clocks", heads, rows) if rows else None
 
 
-def taus(verdict: Verdict) -> Table:
+def taus(design: NamedDesign) -> Table:
     """tau of each sensor against its tau_crit, as in the paper and with the lever arm."""
     rows = []
-    for stage, role, entry in roles(verdict):
-        tau, crit = numbers.finite(entry.get("tau_s")), numbers.finite(entry.get("tau_crit_s"))
-        ratio = None if tau is None or not crit else tau / crit
+    for stage, role, entry in design.roles:
+        tau, crit, lever = entry.tau_s, entry.tau_crit_s, entry.tau_crit_lever_arm_s
+        ratio = None if not crit else tau / crit
         within = ratio is None or ratio < 1.0
-        lever = entry.get("tau_crit_lever_arm_s")
         rows.append((
-            f"{stage} \u00b7 {role}",
-            str(entry.get("name") or entry.get("sensor")),
+            f"{stage.name} \u00b7 {role}",
+            entry.name,
             Cell(numbers.time(tau), tau),
             Cell(numbers.time_limit(crit), crit),
             Cell(
@@ -129,9 +117,8 @@ def taus(verdict: Verdict) -> Table:
                 "good" if within else "bad",
                 "\u2713" if within else "\u2717",
             ),
-            Cell(numbers.time_limit(lever), numbers.finite(lever)),
-            Cell(numbers.length(entry.get("sensor_error_m")),
-                 numbers.finite(entry.get("sensor_error_m"))),
+            Cell(numbers.time_limit(lever), lever),
+            Cell(numbers.length(entry.sensor_error_m), entry.sensor_error_m),
         ))  # fmt: skip
     heads = ("Role", "Sensor", "\u03c4 #", "\u03c4_crit #", "Used #", "\u03c4_crit, lever arm #",
              "Sensor error #")  # fmt: skip

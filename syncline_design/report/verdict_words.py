@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from syncline_design.choice.outcome import Explanation
-from syncline_design.machine.records import Record
+from syncline_design.choice.outcome import ConflictMember, Explanation
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
 from syncline_design.report.text import sentence_list, visible
@@ -22,35 +21,14 @@ from syncline_design.report.words import (
 )
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.tree import Checked, LedgerRow, RequirementResult, Status, Verdict
-
-Json = Mapping[str, Any]
-
-
-def plain(source: Record | Json | None) -> Json:
-    """A part of a verdict as plain data; of what is missing, nothing."""
-    return source.to_json() if isinstance(source, Record) else source or {}
-
-
-def part(source: Record | Json | None, key: str) -> Json:
-    """A nested mapping, empty when missing or null."""
-    value = plain(source).get(key)
-    return value if isinstance(value, Mapping) else {}
-
-
-def items(source: Record | Json | None, key: str) -> list[Json]:
-    """A nested list of mappings, empty when missing or null."""
-    value = plain(source).get(key)
-    return [entry for entry in value or [] if isinstance(entry, Mapping)]
-
-
-def named(source: Record | Json | None, key: str) -> list[tuple[str, Json]]:
-    """The entries of a nested mapping that are mappings themselves, with their names."""
-    return [
-        (str(name), entry)
-        for name, entry in part(source, key).items()
-        if isinstance(entry, Mapping)
-    ]
+    from syncline_design.verdict.tree import (
+        Checked,
+        LedgerRow,
+        NamedRole,
+        RequirementResult,
+        Status,
+        Verdict,
+    )
 
 
 def outcome(verdict: Checked) -> Outcome:
@@ -136,12 +114,10 @@ def term_text(entry: LedgerRow) -> str:
     return TERMS.get(entry.term, entry.term)
 
 
-def role_phrase(entry: Json) -> str:
+def role_phrase(entry: NamedRole) -> str:
     """`SBG Apogee (1PPS input, timer capture)`."""
-    primitive = PRIMITIVES.get(str(entry.get("primitive")), str(entry.get("primitive")))
-    method = entry.get("timestamping_name") or entry.get("timestamping")
-    how = primitive if not method else f"{primitive}, {method}"
-    return f"{entry.get('name') or entry.get('sensor')} ({how})"
+    primitive = PRIMITIVES.get(entry.primitive, entry.primitive)
+    return f"{entry.name} ({primitive}, {entry.timestamping_name})"
 
 
 def design_sentence(verdict: Checked) -> str:
@@ -149,35 +125,32 @@ def design_sentence(verdict: Checked) -> str:
     if verdict.verdict == "refused":
         plural = "problem" if len(verdict.problems) == 1 else "problems"
         return f"{len(verdict.problems)} {plural} in the file; nothing was computed."
-    stages = items(verdict.design, "stages")
-    if not stages:
+    if verdict.design is None:
         return obstacle_sentence(verdict.infeasibility)
-    many = len(stages) > 1
+    stages = verdict.design.stages
     phrases = []
     for stage in stages:
-        roles = [role_phrase(entry) for _, entry in named(stage, "roles")]
-        where = f" on {stage.get('name')}" if many else ""
+        roles = [role_phrase(entry) for entry in stage.roles.values()]
+        where = f" on {stage.name}" if len(stages) > 1 else ""
         phrases.append(sentence_list(roles) + where)
     platforms = sentence_list([stage.platform.name for stage in verdict.spec.stages])
     lead = "Chosen payload" if verdict.spec.open_roles else "Payload as pinned"
     return f"{lead} for {platforms}: {'; '.join(phrases)}."
 
 
-def requirement_name(entry: Json) -> str:
+def requirement_name(member: ConflictMember) -> str:
     """The id of a requirement, or words for the sync limit that no one wrote."""
-    return str(entry.get("id") or "the implied sync requirement")
+    return member.id or member.words
 
 
-def obstacle_sentence(infeasibility: Explanation | None) -> str:
+def obstacle_sentence(why: Explanation | None) -> str:
     """What stands in the way of a design, in one sentence."""
-    members = items(part(infeasibility, "conflict"), "requirements")
-    conflict = [requirement_name(member) for member in members]
+    conflict = [] if why is None else [requirement_name(m) for m in why.conflict.requirements]
     if conflict:
         listed = sentence_list(conflict)
         ending = "hold together" if conflict[1:] else "be met"
         return f"{listed[0].upper()}{listed[1:]} cannot {ending}."
-    stuck = [f"{r.get('stage')} {r.get('role')}"
-             for r in items(infeasibility, "roles_without_options")]  # fmt: skip
+    stuck = [] if why is None else [f"{r.stage} {r.role}" for r in why.roles_without_options]
     if stuck:
         return f"No candidate fits for {sentence_list(stuck)}."
     return "No design was found."
@@ -188,9 +161,10 @@ def selection_reason(verdict: Verdict, stage: str, role: str) -> str:
     if f"{stage}.{role}" not in verdict.spec.open_roles:
         return "pinned in the spec"
     word = OBJECTIVES[verdict.spec.objective]
-    excluded = [entry for entry in items(verdict.choice, "excluded")
-                if (entry.get("stage"), entry.get("role")) == (stage, role)]  # fmt: skip
-    if not excluded:
+    choice = verdict.choice
+    listed = () if choice is None else choice.excluded or ()
+    count = sum((entry.stage, entry.role) == (stage, role) for entry in listed)
+    if not count:
         return f"chosen for {word} of the whole design"
-    plural = "option" if len(excluded) == 1 else "options"
-    return f"chosen for {word} of the whole design; {len(excluded)} {plural} ruled out before"
+    plural = "option" if count == 1 else "options"
+    return f"chosen for {word} of the whole design; {count} {plural} ruled out before"
