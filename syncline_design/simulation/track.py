@@ -14,11 +14,35 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
-from syncline_design.simulation.chain import rotation_exp
+from syncline_design.simulation.chain import rotation_exp, screw_displacement
 
 _SMALL = 0.3  # h / T below which the closed weights would cancel
 _TERMS = 12  # of their series: 0.3**12 / 13! is 1e-16
+
+
+@dataclass(frozen=True, slots=True)
+class End:
+    """A file's first or last row: when, where, velocity [m/s] and turn of the path [rad/s], NED."""
+
+    time_s: float
+    position_m: Array
+    velocity_mps: Array
+    turn_radps: Array
+
+    def path(self, time_s: Array, derivative: int) -> Array:
+        """Position, velocity or acceleration (n, 3) where this velocity has always turned so."""
+        away_s = time_s - self.time_s
+        velocity, turn = (
+            np.broadcast_to(one, (away_s.shape[0], 3))
+            for one in (self.velocity_mps, self.turn_radps)
+        )
+        if derivative == 0:
+            moved: Array = self.position_m + screw_displacement(velocity, turn, away_s)
+            return moved
+        here = rotate(rotation_exp(turn * away_s[:, None]), velocity)
+        return here if derivative == 1 else np.cross(turn, here)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,6 +53,8 @@ class Track:
     turn_rad (k - 1, 3): rotation vector from each knot to the next, body axes.
     sight: range_m, azimuth_rad, elevation_rad (k,) where the file has them.
     period_s: after which a manoeuvre that goes on for ever has velocity and attitude again.
+    Times beyond the knots are those of later or earlier periods; before a file begins and after it
+    ends, speed and both turns (of the path, of the body) are those of its end.
     """
 
     time_s: Array
@@ -40,7 +66,9 @@ class Track:
     period_s: float | None = None
 
     def locate(self, time_s: Array) -> tuple[NDArray[np.intp], Array, Array]:
-        """(interval, fraction 0 to 1, its length [s]) of each time."""
+        """(interval, fraction 0 to 1, its length [s]) of each time; of a file also beyond."""
+        if self.period_s is not None:
+            time_s = time_s - self.period_s * self._periods(time_s)
         index = np.searchsorted(self.time_s, time_s, side="right") - 1
         index = np.clip(index, 0, self.time_s.shape[0] - 2)
         length = self.time_s[index + 1] - self.time_s[index]
@@ -48,7 +76,45 @@ class Track:
 
     def position(self, time_s: Array, derivative: int = 0) -> Array:
         """Position [m] (or its first or second derivative by time), NED, (n, 3)."""
-        return self.within(*self.locate(time_s), derivative)
+        found = self.within(*self.locate(time_s), derivative)
+        if self.period_s is not None:
+            if derivative == 0 and np.any(periods := self._periods(time_s)):
+                found += periods[:, None] * self._advance()
+            return found
+        for last, beyond in ((False, time_s < self.time_s[0]), (True, time_s > self.time_s[-1])):
+            if np.any(beyond):
+                found[beyond] = self.end(last).path(time_s[beyond], derivative)
+        return found
+
+    def _periods(self, time_s: Array) -> Array:
+        """How many whole periods of a manoeuvre each time lies beyond the knots, (n,)."""
+        assert self.period_s is not None
+        after = np.ceil((time_s - self.time_s[-1]) / self.period_s)
+        before = np.floor((time_s - self.time_s[0]) / self.period_s)
+        whole: Array = np.maximum(after, 0.0) + np.minimum(before, 0.0)
+        return whole
+
+    def _advance(self) -> Array:
+        """By how much a period of a manoeuvre moves the vehicle [m], (3,)."""
+        assert self.period_s is not None
+        ends = self.time_s[0] + np.array([0.0, self.period_s])
+        first, last = self.within(*self.locate(ends))
+        moved: Array = last - first
+        return moved
+
+    def end(self, last: bool) -> End:
+        """How a file begins or ends; the turn of its path is v x a / |v|^2."""
+        at = -1 if last else 0
+        here = self.time_s[at:] if last else self.time_s[:1]
+        inside = np.array([np.mean(self.time_s[-3:-1] if last else self.time_s[1:3])])
+        moving = self.position(inside, 1)[0]  # slopes at the end itself are one-sided
+        speed2 = max(float(moving @ moving), np.finfo(float).tiny)
+        return End(
+            float(here[0]),
+            self.position_m[at],
+            self.position(here, 1)[0],
+            np.cross(moving, self.acceleration(inside)[0]) / speed2,
+        )
 
     def within(
         self, index: NDArray[np.intp], u: Array, length: Array, derivative: int = 0
@@ -143,14 +209,10 @@ def _first(track: Track, time_constant_s: float) -> Array:
     The velocity has been turning at v x a / |v|^2 and the body at w, for long: what they leave is
     -T (1 + T S(turn))^-1 v, never more than T |v|, and -T R (1 + T S(w))^-1 S(w).
     """
-    here = track.time_s[:1]
-    velocity, rate = track.position(here, 1)[0], skew(track.rate(here))[0]
-    inside = np.array([np.mean(track.time_s[1:3])])  # slopes at the end are one-sided
-    moving = track.position(inside, 1)
-    speed2 = max(float(np.sum(moving**2)), np.finfo(float).tiny)
-    turn = skew(np.cross(moving, track.acceleration(inside)) / speed2)[0]
+    end, rate = track.end(last=False), skew(track.rate(track.time_s[:1]))[0]
     one = np.eye(3)
-    place = np.linalg.solve(one + time_constant_s * turn, velocity)
+    turn = skew(end.turn_radps[None, :])[0]
+    place = np.linalg.solve(one + time_constant_s * turn, end.velocity_mps)
     attitude = track.rotation[0] @ np.linalg.solve(one + time_constant_s * rate, rate)
     return -time_constant_s * np.concatenate([place, attitude.ravel()])
 
