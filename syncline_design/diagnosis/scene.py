@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from syncline_design.diagnosis.past import LoggedPast
 from syncline_design.diagnosis.trajectory import LoggedMotion, pieces
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
@@ -70,6 +71,8 @@ def cut_rows(rows: StageRows, index: Rows) -> StageRows:
     behind = rows.lagged
     if behind is None:
         return replace(rows, **cut)
+    if isinstance(behind, LoggedPast):
+        return replace(rows, **cut, lagged=behind.part(index))
 
     def lagged(constant_s: float) -> tuple[Array, Array]:
         place, turn = behind(constant_s)
@@ -161,6 +164,14 @@ def _stage_rows(
         antenna_m=antenna,
         ranging_m=ranging,
         target_m=position + rotate(rotation, ranging + vector),
+        lagged=LoggedPast(
+            log.time_s,
+            logged.velocity_track or Track(log.time_s, logged.velocity_mps),
+            log.time_s,
+            rotation,
+            logged.rate_radps,
+            logged.follows_position,
+        ),
     )
 
 

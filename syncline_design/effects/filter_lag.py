@@ -60,7 +60,7 @@ def _turned_back(turn: Array, vector: Array) -> Array:
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """The antenna reading lags by a first-order low pass, of the path itself where it is known."""
     time_constant_s = values["time_constant_s"]
-    if rows.lagged is None:
+    if rows.lagged is None or time_constant_s <= 0.0:  # what a fit may try has no past
         return Departures(position_m=lag_of_the_present(rows, time_constant_s))
     place, turn = rows.lagged(time_constant_s)
     return Departures(position_m=place + rotate(turn, rows.antenna_m))
