@@ -145,3 +145,11 @@ def test_an_axis_has_two_marks_or_more_wherever_it_begins(span: float) -> None:
         ticks = log_ticks(low, span * low)
         assert len(ticks) >= 2
         assert all(low <= tick <= span * low for tick in ticks)
+
+
+def test_an_assumed_figure_reads_as_its_catalog_writes_it() -> None:
+    """Keys that an entry leaves empty stood before the figure: `evidence [] events [] uniform`."""
+    verdict = check_file(ROOT / "specs" / "rov_relay.yaml", PLAIN)
+    values = {(one.entry, one.figure): one.value for one in verdict.assumptions or ()}
+    assert values["ocxo", "offset"] == "uniform low -1 us high 1 us"
+    assert not [value for value in values.values() if "[]" in value]

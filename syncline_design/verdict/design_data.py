@@ -192,7 +192,7 @@ def figure_text(value: Any) -> str:
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items()) + "}"
     if hasattr(value, "model_fields_set"):
-        parts = [(key, item) for key, item in value if item is not None]
+        parts = [(key, item) for key, item in value if item not in (None, (), [], {})]
         return " ".join(
             str(item) if key == "distribution" else f"{key} {figure_text(item)}"
             for key, item in parts
