@@ -109,7 +109,9 @@ def test_diagnose_and_study_and_reproduce_are_the_engines(tmp_path: Path) -> Non
         'grid: {"requirements[0].limit": [0.2 m, 0.3 m]}\n',
         "utf-8",
     )
-    assert len(list(sd.study(study, workers=1).cases())) == 2
+    done = sd.study(study, workers=1)
+    assert len(list(done.cases())) == 2
+    assert json.loads(_json(done)) == printed("study", str(study))
     assert sd.reproduce().ok
 
 

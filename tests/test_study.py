@@ -13,7 +13,7 @@ import pytest
 
 from study_specs import SPEC, STUDY, write
 from syncline_design.machine.records import json_of
-from syncline_design.report.study_rows import columns, study_csv, study_parquet
+from syncline_design.report.studies import study_csv, study_parquet
 from syncline_design.spec.keys import KeyPathError, label, put, resolve, split_key
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import parse
@@ -21,6 +21,7 @@ from syncline_design.studies import StudyResult, StudySettings, load_study, run_
 from syncline_design.studies.definition import figure_of, grid_values, sample_values
 from syncline_design.studies.result import study_verdict
 from syncline_design.studies.summary import boundaries, heat_map, summarise, winners
+from syncline_design.studies.table import columns
 from syncline_design.verdict.verify import CheckSettings, check_file
 
 DATA = parse(SPEC).data

@@ -20,9 +20,9 @@ from syncline_design.report.progress_line import ProgressLine, progress_text
 from syncline_design.report.render_console import console, table_lines
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.report.studies import STUDY_FORMATS, render_study
-from syncline_design.report.study_data import StudyData, study_data
 from syncline_design.report.table import table
 from syncline_design.studies import Progress, StudyResult, StudySettings, run_study
+from syncline_design.studies.data import StudyData, study_data
 from syncline_design.studies.record import SCHEMA as CASE_SCHEMA
 from syncline_design.studies.record import CaseRecord
 

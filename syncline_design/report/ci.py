@@ -6,16 +6,10 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Final, Literal
 
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
-from syncline_design.report.text import sentence_list
-from syncline_design.report.verdict_words import (
-    kind_text,
-    margin_text,
-    obstacle_sentence,
-    outcome,
-    requirement_name,
-    waiver_text,
-)
+from syncline_design.report.verdict_words import kind_text, margin_text, outcome, waiver_text
+from syncline_design.verdict.obstacle import obstacle_sentence, requirement_name
 from syncline_design.verdict.tree import (
     Caution,
     Checked,

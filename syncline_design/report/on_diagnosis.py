@@ -24,6 +24,7 @@ from syncline_design.diagnosis.result import (
     WholeGap,
 )
 from syncline_design.machine.records import with_texts
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.quantity import split_suffix
 from syncline_design.report import figures_diagnosis as drawings
 from syncline_design.report import numbers
@@ -43,7 +44,7 @@ from syncline_design.report.document import (
     show,
 )
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.text import visible
 
 DIAGNOSES: Final[dict[str, Outcome]] = {
     "agrees": Outcome(

@@ -12,11 +12,12 @@ from syncline_design.comparison.difference import (
     Standing,
     VerdictChange,
 )
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Document, Items, Node, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import kind_words, status_word
 from syncline_design.report.words import OUTCOMES
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import partial
 
 from syncline_design import __version__
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import figures_study, numbers
 from syncline_design.report.document import (
     Chart,
@@ -16,7 +17,6 @@ from syncline_design.report.document import (
     section,
     show,
 )
-from syncline_design.report.study_rows import reason
 from syncline_design.report.study_words import (
     LEAST_COST,
     MOST_DOWN,
@@ -29,13 +29,14 @@ from syncline_design.report.study_words import (
     winners_table,
 )
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.text import visible
 from syncline_design.report.words import OUTCOMES
 from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.scatter import Scatter, scatter
 from syncline_design.studies.summary import Brief, Front, Summary, heat_map, summarise, varied
+from syncline_design.studies.table import reason
 
 MOST_CASES = 500  # rows of the case table; CSV and Parquet have them all
 MOST_FRONTS = 8

@@ -42,6 +42,7 @@ from syncline_design.report.simulated import (
     simulation_facts,
 )
 from syncline_design.report.table import Table
+from syncline_design.verdict.obstacle import requirement_name
 
 if TYPE_CHECKING:
     from syncline_design.choice.outcome import Conflict, Fix, Members
@@ -177,7 +178,7 @@ def _members(members: Members) -> list[str | Span]:
     for entry in members:
         line = f" (line {entry.line})" if entry.line else ""
         comma = ", " if found else ""
-        found += [comma, strong(verdict_words.requirement_name(entry)), line]
+        found += [comma, strong(requirement_name(entry)), line]
     return found
 
 

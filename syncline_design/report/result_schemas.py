@@ -10,10 +10,10 @@ from syncline_design.comparison import clock_meaning, difference, meaning
 from syncline_design.diagnosis import result as diagnosis
 from syncline_design.machine.records import schema_of
 from syncline_design.paper import reproduce
-from syncline_design.report import study_data
 from syncline_design.report.formats import ResultName
 from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
+from syncline_design.studies import data as study
 from syncline_design.verdict import optimise
 from syncline_design.verdict import tree as verdict
 
@@ -23,7 +23,7 @@ _RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "optimisation": (optimise.Optimisation, optimise.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),
-    "study-result": (study_data.StudyData, study_data.SCHEMA),
+    "study-result": (study.StudyData, study.SCHEMA),
     "timing": (clock_meaning.TimingAndSpec, clocks.SCHEMA),
     "verdict": (verdict.Checked, verdict.SCHEMA),
     "verdicts": (verdict.Verdicts, verdict.SEVERAL_SCHEMA),

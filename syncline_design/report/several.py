@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-from syncline_design.report.text import sentence_list, visible
+from syncline_design.machine.sentences import sentence_list
+from syncline_design.report.text import visible
 from syncline_design.report.words import VERBS
 from syncline_design.spec.folders import Skipped
 from syncline_design.verdict.tree import Checked

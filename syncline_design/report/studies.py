@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from syncline_design.report.formats import STUDY_FORMATS as STUDY_FORMATS
+from syncline_design.report.text import visible
 from syncline_design.studies.result import StudyResult
+from syncline_design.studies.table import Value, columns, rows, text_columns
 
 
 def render_study(name: str, result: StudyResult) -> str | bytes:
     """The content of one format; each format's module loads only when it is asked for."""
     match name:
         case "csv":
-            from syncline_design.report.study_rows import study_csv
-
             return study_csv(result)
         case "parquet":
-            from syncline_design.report.study_rows import study_parquet
-
             return study_parquet(result)
         case "json":
             from syncline_design.report.json_out import json_text
-            from syncline_design.report.study_data import study_data
 
-            return json_text(study_data(result).to_json())
+            return json_text(result.to_json())
         case "html":
             from syncline_design.report.on_study import on_study
             from syncline_design.report.render_html import html
@@ -48,3 +47,30 @@ def _for_ci(name: str, result: StudyResult) -> str:
             return study_findings.study_github(result)
         case _:
             raise ValueError(f"unknown format {name}")
+
+
+def study_csv(result: StudyResult) -> str:
+    """The table as CSV; text that a spreadsheet would run is disarmed."""
+    from syncline_design.report.csv_out import csv_text
+
+    return csv_text(columns(result), rows(result))
+
+
+def study_parquet(result: StudyResult) -> bytes:
+    """The table as Parquet, figures as float64; unit in the column's name."""
+    import io
+
+    import polars as pl
+
+    text = text_columns(result)
+    names = columns(result)
+    schema: dict[str, Any] = {n: pl.String if n in text else pl.Float64 for n in names}
+    schema["case"] = pl.Int64
+    filled = ({n: _value(r.get(n)) for n in names} for r in rows(result))
+    stream = io.BytesIO()
+    pl.DataFrame(filled, schema=schema, orient="row").write_parquet(stream, statistics=False)
+    return stream.getvalue()
+
+
+def _value(value: Value) -> Value:
+    return visible(value) if isinstance(value, str) else value

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from syncline_design.report.ci import Level, Notice, requirement_sentence
-from syncline_design.report.study_rows import reason
 from syncline_design.report.study_words import outcome, rule_sentence
 from syncline_design.report.text import visible
 from syncline_design.studies.result import CaseResult, StudyResult
+from syncline_design.studies.table import reason
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
 from syncline_design.report.table import Cell, Table, table
-from syncline_design.report.text import sentence_list
 from syncline_design.report.words import OUTCOMES, VERBS
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (

@@ -54,13 +54,6 @@ def markdown_safe(text: object) -> str:
     return escaped.replace("@", "&#64;").replace("://", ":&#8203;//")
 
 
-def sentence_list(items: list[str]) -> str:
-    """`a`, `a and b`, `a, b and c`."""
-    if len(items) < 2:
-        return "".join(items)
-    return ", ".join(items[:-1]) + " and " + items[-1]
-
-
 def shortened(text: str, most: int = 30) -> str:
     """Text made harmless for a figure's label; the tables have it in full."""
     shown = visible(text)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from syncline_design.choice.outcome import ConflictMember, Explanation
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Outcome
-from syncline_design.report.text import sentence_list, visible
+from syncline_design.report.text import visible
 from syncline_design.report.words import (
     KINDS,
     OBJECTIVES,
@@ -19,6 +19,7 @@ from syncline_design.report.words import (
     STATUSES,
     TERMS,
 )
+from syncline_design.verdict.obstacle import obstacle_sentence
 
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import (
@@ -136,24 +137,6 @@ def design_sentence(verdict: Checked) -> str:
     platforms = sentence_list([stage.platform.name for stage in verdict.spec.stages])
     lead = "Chosen payload" if verdict.spec.open_roles else "Payload as pinned"
     return f"{lead} for {platforms}: {'; '.join(phrases)}."
-
-
-def requirement_name(member: ConflictMember) -> str:
-    """The id of a requirement, or words for the sync limit that no one wrote."""
-    return member.id or member.words
-
-
-def obstacle_sentence(why: Explanation | None) -> str:
-    """What stands in the way of a design, in one sentence."""
-    conflict = [] if why is None else [requirement_name(m) for m in why.conflict.requirements]
-    if conflict:
-        listed = sentence_list(conflict)
-        ending = "hold together" if conflict[1:] else "be met"
-        return f"{listed[0].upper()}{listed[1:]} cannot {ending}."
-    stuck = [] if why is None else [f"{r.stage} {r.role}" for r in why.roles_without_options]
-    if stuck:
-        return f"No candidate fits for {sentence_list(stuck)}."
-    return "No design was found."
 
 
 def selection_reason(verdict: Verdict, stage: str, role: str) -> str:

@@ -16,6 +16,7 @@ from syncline_design.verdict.tree import FileProblem, NamedDesign, RequirementRe
 
 SCHEMA = "syncline-design/study-case/v1"
 CaseWord = Literal["meets", "fails", "infeasible", "refused", "indeterminate"]
+StudyWord = Literal["meets", "fails", "indeterminate"]
 _ROUNDING = 1e-9  # of a printed figure against the exact one that was decided
 
 

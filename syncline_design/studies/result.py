@@ -6,16 +6,17 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, get_args
 
+from syncline_design.machine.records import Json
 from syncline_design.spec.keys import label
+from syncline_design.studies.data import study_data
 from syncline_design.studies.definition import MeetsWhen
 from syncline_design.studies.loading import Study
-from syncline_design.studies.record import CaseRecord, CaseWord
+from syncline_design.studies.record import CaseRecord, CaseWord, StudyWord
 from syncline_design.studies.store import Store, StoreError
 
 VERDICTS: tuple[CaseWord, ...] = get_args(CaseWord)
-StudyWord = Literal["meets", "fails", "indeterminate"]
 EXIT_CODES: dict[StudyWord, int] = {"meets": 0, "fails": 1, "indeterminate": 3}
 
 
@@ -101,6 +102,10 @@ class StudyResult:
     def exit_code(self) -> int:
         """0 meets, 1 does not, 3 no verdict."""
         return EXIT_CODES[self.verdict]
+
+    def to_json(self) -> Json:
+        """The study as data, with a row for every case: what `study --output json:-` prints."""
+        return study_data(self).to_json()
 
 
 def study_verdict(counts: Mapping[CaseWord, int], meets_when: MeetsWhen) -> StudyWord:

@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.record import CaseWord, FrontPoint, Pick
-from syncline_design.studies.result import CaseResult, StudyResult
+
+if TYPE_CHECKING:
+    from syncline_design.studies.result import CaseResult, StudyResult
 
 MOST_FRONTS = 500
 MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from syncline_design import __version__
 from syncline_design.machine.records import Named, Record
-from syncline_design.report.study_rows import Value, rows, si_unit
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import MeetsWhen
 from syncline_design.studies.loading import Study
-from syncline_design.studies.record import CaseWord
-from syncline_design.studies.result import StudyResult, StudyWord
+from syncline_design.studies.record import CaseWord, StudyWord
 from syncline_design.studies.summary import (
     Boundary,
     Front,
@@ -24,6 +22,10 @@ from syncline_design.studies.summary import (
     summarise,
     winners,
 )
+from syncline_design.studies.table import Value, rows, si_unit
+
+if TYPE_CHECKING:
+    from syncline_design.studies.result import StudyResult
 
 SCHEMA = "syncline-design/study/v1"
 

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 from syncline_design.model.unit_table import SI_UNITS
-from syncline_design.report.text import visible
-from syncline_design.report.verdict_words import obstacle_sentence
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.record import CaseRecord
-from syncline_design.studies.result import CaseResult, StudyResult
+from syncline_design.verdict.obstacle import obstacle_sentence
+
+if TYPE_CHECKING:
+    from syncline_design.studies.result import CaseResult, StudyResult
 
 FIGURES = (
     "cost", "mass_kg", "power_w", "error_m", "sensor_error_m", "sync_error_m", "tau_s",
@@ -110,30 +111,3 @@ def reason(case: CaseResult) -> str:
     fixes = [fix.text for fix in why.fixes]
     would = f" Either would do: {'; '.join(fixes)}." if fixes else ""
     return obstacle_sentence(why) + would
-
-
-def study_csv(result: StudyResult) -> str:
-    """The table as CSV; text that a spreadsheet would run is disarmed."""
-    from syncline_design.report.csv_out import csv_text
-
-    return csv_text(columns(result), rows(result))
-
-
-def study_parquet(result: StudyResult) -> bytes:
-    """The table as Parquet, figures as float64; unit in the column's name."""
-    import io
-
-    import polars as pl
-
-    text = text_columns(result)
-    names = columns(result)
-    schema: dict[str, Any] = {n: pl.String if n in text else pl.Float64 for n in names}
-    schema["case"] = pl.Int64
-    filled = ({n: _value(r.get(n)) for n in names} for r in rows(result))
-    stream = io.BytesIO()
-    pl.DataFrame(filled, schema=schema, orient="row").write_parquet(stream, statistics=False)
-    return stream.getvalue()
-
-
-def _value(value: Value) -> Value:
-    return visible(value) if isinstance(value, str) else value

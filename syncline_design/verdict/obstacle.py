@@ -1,0 +1,24 @@
+"""What stands in the way of a design, in words."""
+
+from __future__ import annotations
+
+from syncline_design.choice.outcome import ConflictMember, Explanation
+from syncline_design.machine.sentences import sentence_list
+
+
+def requirement_name(member: ConflictMember) -> str:
+    """The id of a requirement, or words for the sync limit that no one wrote."""
+    return member.id or member.words
+
+
+def obstacle_sentence(why: Explanation | None) -> str:
+    """What stands in the way of a design, in one sentence."""
+    conflict = [] if why is None else [requirement_name(m) for m in why.conflict.requirements]
+    if conflict:
+        listed = sentence_list(conflict)
+        ending = "hold together" if conflict[1:] else "be met"
+        return f"{listed[0].upper()}{listed[1:]} cannot {ending}."
+    stuck = [] if why is None else [f"{r.stage} {r.role}" for r in why.roles_without_options]
+    if stuck:
+        return f"No candidate fits for {sentence_list(stuck)}."
+    return "No design was found."
