@@ -112,6 +112,7 @@ NOTATIONS: dict[str, Callable[[datetime], str]] = {
     "comma": lambda t: t.strftime("%Y-%m-%d %H:%M:%S,%f+0000"),
     "nanoseconds": lambda t: t.strftime("%Y-%m-%dT%H:%M:%S.%f") + "000Z",
     "no zone": lambda t: t.strftime("%Y-%m-%dT%H:%M:%S.%f"),
+    "small letters": lambda t: t.strftime("%Y-%m-%dt%H:%M:%S.%fz"),
 }
 
 
@@ -169,6 +170,12 @@ def test_times_that_cannot_be_meant_name_the_way_out(tmp_path: Path) -> None:
     assert "zone" in refusal(zones)
     feb = with_times(tmp_path / "e.csv", "time", lambda t: t.isoformat().replace("03-01", "02-30"))
     assert "02-30" in refusal(feb)
+    leap = with_times(tmp_path / "f.csv", "time", lambda t: t.strftime("2016-12-31T23:59:60.%fZ"))
+    assert "time_s" in refusal(leap)
+    far = with_times(tmp_path / "g.csv", "time", lambda t: t.isoformat().replace("2026", "9999"))
+    assert "1678 to 2261" in refusal(far)
+    zone = with_times(tmp_path / "h.csv", "time", lambda t: t.strftime("%Y-%m-%dT%H:%M:%S+99:99"))
+    assert "text among numbers" in refusal(zone)
 
 
 @pytest.mark.parametrize(
@@ -360,6 +367,43 @@ def test_parquet_durations_carry_their_own_unit(tmp_path: Path, name: str) -> No
     path = tmp_path / "log.parquet"
     pl.DataFrame(columns()).with_columns(spans).select(order).write_parquet(path)
     assert read(path).time_s == pytest.approx(plain.time_s, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("unit", "counts"),
+    [
+        ("us", [-(2**63), *range(39)]),  # polars panicked over its own message: exit code 1
+        ("ms", [253_370_764_800_000 + k for k in range(40)]),  # the year 9999
+        ("us", [-62_135_596_800_000_000 + k for k in range(40)]),  # the year 1
+    ],
+)
+def test_parquet_times_beyond_all_logs_are_refused(
+    tmp_path: Path, unit: str, counts: list[int]
+) -> None:
+    import polars as pl
+
+    stamps = pl.Series("time", counts, dtype=pl.Int64).cast(pl.Datetime(unit))  # type: ignore[arg-type]
+    made = pl.DataFrame(columns()).drop("time_s").with_columns(stamps)
+    made.write_parquet(tmp_path / "log.parquet")
+    said = refusal(tmp_path / "log.parquet")
+    assert "time: no time of a log in row 1" in said
+    assert "1678 to 2261" in said
+
+
+def test_parquet_times_may_miss(tmp_path: Path) -> None:
+    import polars as pl
+
+    day = [None, *(20_454 + k for k in range(39))]
+    made = pl.DataFrame(columns()).drop("time_s")
+    dates = made.with_columns(pl.Series("time", day, dtype=pl.Int32).cast(pl.Date))
+    spans = made.with_columns(
+        pl.Series("time_s", [None, *range(39)], dtype=pl.Int64).cast(pl.Duration("ms"))
+    )
+    for frame, step in ((dates, 86_400.0), (spans, 1e-3)):
+        frame.write_parquet(tmp_path / "log.parquet")
+        log = read(tmp_path / "log.parquet")
+        assert log.time_s == pytest.approx(step * np.arange(39), abs=1e-9)
+        assert log.rejected == {"no time stamp": 1}
 
 
 @pytest.mark.parametrize("kind", ["categorical", "boolean", "list", "text", "time of day", "null"])

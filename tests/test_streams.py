@@ -14,9 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import typer
 from typer.testing import CliRunner
 
 from syncline_design.cli.app import app
+from syncline_design.cli.shared import guarded
 from syncline_design.comparison.diff import diff
 from syncline_design.machine.streams import harmless
 from syncline_design.report.on_difference import on_difference
@@ -215,3 +217,17 @@ def test_an_interrupted_cluster_ends_with_one_line(folder: Path, seconds: float)
     assert process.returncode == 130
     assert b"Traceback" not in said, said.decode()
     assert said.decode().splitlines()[-1] == "syncline-design: interrupted"
+
+
+def test_a_panic_in_a_library_is_no_verdict(capsys: pytest.CaptureFixture[str]) -> None:
+    """Panics in Rust are no `Exception`: one ended with a traceback and code 1, a verdict."""
+    panic = type("PanicException", (BaseException,), {})
+
+    @guarded
+    def command() -> int:
+        raise panic("invalid or out-of-range datetime")
+
+    with pytest.raises(typer.Exit) as ended:
+        command()
+    assert ended.value.exit_code == 3
+    assert "internal error, no verdict: PanicException" in capsys.readouterr().err

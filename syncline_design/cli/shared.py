@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 PAGE_S = 1.0  # what drawing a page takes
 BAD_INPUT, NO_VERDICT, INTERRUPTED = 2, 3, 130
+PANIC = "PanicException"  # of a library in Rust; it passes by `except Exception`
 DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal error
 
 P = ParamSpec("P")
@@ -90,8 +91,9 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
             refuse("syncline-design: interrupted", INTERRUPTED)
         except MemoryError:
             refuse("syncline-design: out of memory; no verdict", NO_VERDICT)
-        except Exception as error:
-            if DEBUG_VARIABLE in os.environ:
+        except BaseException as error:
+            foreign = isinstance(error, Exception) or type(error).__name__ == PANIC
+            if not foreign or DEBUG_VARIABLE in os.environ:
                 raise
             refuse_unexpected(error)
         raise typer.Exit(code)
@@ -112,7 +114,7 @@ def show(text: str) -> None:
     write_outputs([(Target("text", STDOUT), text)])
 
 
-def refuse_unexpected(error: Exception) -> NoReturn:
+def refuse_unexpected(error: BaseException) -> NoReturn:
     """Known errors speak for themselves; unknown ones are ours."""
     codes: dict[str, int] = {
         "NoVerdict": NO_VERDICT,

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from syncline_design.choice.problem import build_problem, sole_design, system_of
 from syncline_design.diagnosis.gross import Reread, mended
 from syncline_design.effects.acting import Acting, acting_of
+from syncline_design.logs.columns import ISO_TIMES, known_names, shown
 from syncline_design.logs.log import Log
 from syncline_design.logs.reading import read_log
+from syncline_design.model.quantity import si_name
 from syncline_design.model.system import System
 from syncline_design.spec.case import Case
+from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw, KeyPath
 
@@ -33,6 +36,7 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
     system = pinned_system(case)
     names = [stage.name for stage in system.stages]
     mapping = case.spec.log.columns if case.spec.log else {}
+    _demand_known_columns(case, mapping, names)
     origin = case.spec.log.origin if case.spec.log else None
     ranges = system.stages[-1].ranging is not None
     files = list(paths) or own_files(case)
@@ -50,6 +54,17 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
             log = mended(log, one, reread)
     kept = tuple(one for one in known if one.effect.kind != "discrete")
     return Measured(system, log, kept, tuple(path.name for path in files), reread)
+
+
+def _demand_known_columns(case: Case, mapping: Mapping[str, str], stages: Sequence[str]) -> None:
+    """Refuse `ranger_m: ...`: nothing would be read for it, and nobody would notice."""
+    known = known_names(stages if len(stages) > 1 else ())
+    for name in mapping:
+        if si_name(name) not in known and name not in ISO_TIMES:
+            written = [shown(one) for one in sorted(known)]
+            hint = did_you_mean(name, written)
+            expected = "a column of a log such as range_m or roll_deg"
+            raise _refuse(case, ("log", "columns", name), "no such column", expected, hint)
 
 
 def own_files(case: Case) -> list[Path]:

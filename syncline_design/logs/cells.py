@@ -19,9 +19,11 @@ LONGEST_CELL = 200  # characters; no figure and no name of a target is longer
 NOTHING = ("", "nan", "NaN", "NAN", "NA", "N/A", "null")
 NO_TIME = np.iinfo(np.int64).min
 ISO = (
-    r"^(\d{4})-?(\d\d)-?(\d\d)[T ](\d\d):?(\d\d):?(\d\d)(?:[.,](\d{1,9})\d*)?"
-    r"\s*(Z|z|[+-]\d\d(?::?\d\d)?)?$"
+    r"^(\d{4})-?(\d\d)-?(\d\d)[Tt ](\d\d):?(\d\d):?(\d\d)(?:[.,](\d{1,9})\d*)?"
+    r"\s*(Z|z|[+-](?:0\d|1[0-8])(?::?[0-5]\d)?)?$"
 )
+YEARS = (1678, 2261)  # which 64 bits of nanoseconds since 1970 hold whole
+LEAP = "UTC's leap seconds have no place of their own; give seconds that go on, as time_s"
 COMMA, POINT = ",", "."
 ONE_ZONE = "a zone (Z or +01:00) in every row or in none"
 ONE_MARK = "one decimal mark, point or comma, in all of a file"
@@ -121,10 +123,14 @@ def iso_times(text: pl.Series) -> tuple[Stamps, bool | None]:
     bad = text.is_not_null() & at.is_null()
     mixed = at.is_not_null() & (zoned != bool(zoned.any()))
     wanted = "an ISO 8601 time such as 2026-03-01T12:00:00.125Z"
-    for wrong, expected in ((bad, wanted), (mixed, ONE_ZONE)):
+    far = at.is_not_null() & ~at.dt.year().is_between(*YEARS)
+    years = f"a year from {YEARS[0]} to {YEARS[1]}"
+    leaps = (second == "60").fill_null(False)
+    faults = ((leaps, wanted, LEAP), (bad, wanted, ""), (mixed, ONE_ZONE, ""), (far, years, ""))
+    for wrong, expected, hint in faults:
         rows = wrong.fill_null(True).arg_true()
         if len(rows):
-            raise BadCellError(int(rows[0]), str(text[int(rows[0])]), expected)
+            raise BadCellError(int(rows[0]), str(text[int(rows[0])]), expected, hint)
     seconds = at.dt.epoch("s") - _offset_s(zone)
     nanoseconds = fraction.fill_null("0").str.pad_end(9, "0").cast(pl.Int64)
     stamps = (seconds * 1_000_000_000 + nanoseconds).fill_null(NO_TIME)

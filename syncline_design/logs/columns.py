@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Container, Iterable, Mapping
 
 from syncline_design.model.quantity import UNITS, si_name, suffix_unit
 from syncline_design.spec.spec import split_column
@@ -43,8 +43,8 @@ def si_columns(
     """SI name -> (column of the file, factor to SI) for everything the diagnosis can use.
 
     A name of the mapping wins over the column's own; `their.name [unit]` brings its own unit,
-    without brackets the canonical name's suffix is the unit.  The factor is NaN for a time column
-    whose name has no unit.  A heading is a yaw.
+    whether or not the file's own name ends in it, and without brackets the canonical name's suffix
+    is the unit.  The factor is NaN for a time column whose name has no unit.  A heading is a yaw.
     """
     names = dict.fromkeys(present)
     found: dict[str, tuple[str, float]] = {}
@@ -53,7 +53,7 @@ def si_columns(
         if si in wanted and si not in found:
             found[si] = (name, 1.0 if name == TARGET_ID else suffix_unit(name)[0])
     for canonical, theirs in mapping.items():
-        column, unit = split_column(theirs)
+        column, unit = named_column(theirs, names)
         if column in names:
             factor = float(UNITS[unit][1]) if unit else suffix_unit(canonical)[0]
             found[si_name(canonical)] = (column, factor)
@@ -65,6 +65,34 @@ def si_columns(
         heading = found.pop(si)
         found.setdefault(si.removesuffix(HEADING) + YAW, heading)
     return found
+
+
+def named_column(theirs: str, present: Container[str]) -> tuple[str, str]:
+    """The column that a mapping means, and the unit it brings (empty: none)."""
+    column, unit = split_column(theirs)
+    return (theirs if theirs in present else column), unit
+
+
+def passed_over(
+    header: Iterable[str], found: Mapping[str, tuple[str, float]], mapping: Mapping[str, str]
+) -> tuple[str, ...]:
+    """What to say of columns that give what another one is read for: `yaw_rad` beside `yaw_deg`.
+
+    A column that the spec maps is meant, and nothing is said of its rivals.
+    """
+    meant = {_as_found(name) for name in mapping}
+    notes = []
+    for name in header:
+        si = _as_found(name)
+        if si in found and found[si][0] != name and si not in meant:
+            notes.append(f"{name} was not read, as {found[si][0]} is there too")
+    return tuple(notes)
+
+
+def _as_found(name: str) -> str:
+    """The SI name under which a column would be found."""
+    si = TIME if name in ISO_TIMES else si_name(name)
+    return si.removesuffix(HEADING) + YAW if si.endswith(HEADING) else si
 
 
 def headings(found: Mapping[str, tuple[str, float]]) -> tuple[str, ...]:

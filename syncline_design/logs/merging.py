@@ -20,6 +20,7 @@ from syncline_design.logs.columns import (
     REFERENCE,
     TIME,
     VELOCITY,
+    shown,
 )
 from syncline_design.logs.derivatives import derived_velocity
 from syncline_design.logs.log import Track
@@ -58,6 +59,11 @@ def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
         if table is base:
             continue
         taken = {k: v for k, v in table.columns.items() if k not in columns and k != TIME}
+        twice = sorted(shown(k) for k in table.columns if k in columns and k != TIME)
+        if twice:
+            notes.append(
+                f"{table.path.name}: not read, as another file gives it: {', '.join(twice)}"
+            )
         found, covered = interpolated(table, taken, stamps, prefixes)
         columns |= found
         tracks |= _tracks(table, taken, prefixes)

@@ -29,6 +29,7 @@ from syncline_design.logs.cells import (
     trimmed,
 )
 from syncline_design.logs.parquet_footer import FooterError, chunks
+from syncline_design.logs.parquet_times import FarTimeError, calendar, spans
 from syncline_design.logs.refusals import refuse
 from syncline_design.spec.load import BadInput
 
@@ -352,18 +353,24 @@ class ParquetSource:
         kind = self._schema[name]
         if kind == pl.Datetime or kind == pl.Date:
             zoned = isinstance(kind, pl.Datetime) and kind.time_zone is not None
-            column = self._column(name)
-            if isinstance(kind, pl.Datetime):  # kept as UTC, whatever the zone
-                column = column.to_physical().cast(pl.Datetime(kind.time_unit))
-            at = column.cast(pl.Datetime("ns"))
-            stamps = at.to_physical().fill_null(NO_TIME).to_numpy().astype(np.int64)
-            return Clock(None, stamps, zoned)
+            return Clock(None, self._calendar(name), zoned)
         if kind == pl.Duration:
-            spans = self._column(name).dt.total_nanoseconds()
-            return Clock(spans.cast(pl.Float64).to_numpy() / NANOSECONDS, None, spans=True)
+            return Clock(spans(self._column(name)), None, spans=True)
         if self._is_text(name):
             return self._text_clock(name)
         return Clock(self._figures(name), None)
+
+    def _calendar(self, name: str) -> Stamps:
+        try:
+            return calendar(self._column(name))
+        except FarTimeError as far:
+            raise refuse(
+                self.path,
+                f"no time of a log in row {far.row + 1}",
+                field=name,
+                expected="a year from 1678 to 2261, or nothing",
+                found=far.found,
+            ) from None
 
     def _text_clock(self, name: str) -> Clock:
         seconds: list[Array] = []

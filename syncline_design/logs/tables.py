@@ -11,10 +11,20 @@ import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.logs.cells import NO_TIME, Stamps
-from syncline_design.logs.columns import TARGET_ID, TIME, headings, known_names, si_columns
+from syncline_design.logs.columns import (
+    TARGET_ID,
+    TIME,
+    headings,
+    known_names,
+    named_column,
+    passed_over,
+    si_columns,
+)
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_choice import Arranged, arranged, thinned
 from syncline_design.logs.sources import NANOSECONDS, Clock, Source, opened
+from syncline_design.model.quantity import si_name
+from syncline_design.spec.fields import did_you_mean
 
 DAY = 86_400 * NANOSECONDS
 Slip = tuple[Sequence[str], float]  # files with one of these columns have stamps ahead by so much
@@ -60,7 +70,8 @@ def read_tables(
     slip: Slip = ((), 0.0),
 ) -> list[Table]:
     """Read CSV or Parquet files that belong together; raises BadInput."""
-    files = _on_one_scale([_opened(path, mapping, stages) for path in paths])
+    files = [_opened(path, mapping, stages) for path in paths]
+    files = _on_one_scale(_with_absent(files, mapping))
     names, ahead_s = slip
     stamps = [
         f.seconds - ahead_s if ahead_s and any(n in f.found for n in names) else f.seconds
@@ -86,11 +97,35 @@ def _opened(path: Path, mapping: Mapping[str, str], stages: tuple[str, ...]) -> 
         )
     name, factor = found[TIME]
     clock = source.clock(name)
-    notes = headings(found)
+    notes = (*headings(found), *passed_over(source.header, found, mapping))
     seconds, day, said = _seconds(path, name, factor, clock)
     if not seconds.shape[0]:
         raise refuse(path, "no rows below the header", line=2, column=1)
     return _Open(source, found, seconds, day, (*notes, *said))
+
+
+def _with_absent(files: list[_Open], mapping: Mapping[str, str]) -> list[_Open]:
+    """Refuse, or say, where the spec maps columns that no file has.
+
+    Another column must not silently stand in for the one that is meant.
+    """
+    headers = {name for one in files for name in one.source.header}
+    notes = []
+    for canonical, theirs in mapping.items():
+        if named_column(theirs, headers)[0] in headers:
+            continue
+        column = f"log.columns.{canonical}: no file has a column {theirs!r}"
+        for one in files:
+            if si_name(canonical) in one.found:
+                raise refuse(
+                    one.source.path,
+                    column,
+                    expected="one of the file's columns, or nothing: the file has "
+                    + one.found[si_name(canonical)][0],
+                    hint=did_you_mean(theirs, sorted(headers)),
+                )
+        notes.append(column)
+    return [replace(files[0], notes=(*files[0].notes, *notes)), *files[1:]]
 
 
 def _seconds(
