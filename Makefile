@@ -40,6 +40,7 @@ bench: $(DEV)
 	$(BIN)/python benchmarks/simulate.py
 	$(BIN)/python benchmarks/diagnose.py
 	$(BIN)/python benchmarks/study.py
+	$(BIN)/python -m benchmarks.timing
 
 # The full study of the diagnosis on hidden-world logs; resumes where it was stopped.
 study: $(DEV)
