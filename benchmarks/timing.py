@@ -247,7 +247,8 @@ def main() -> None:
     text = report(found, chosen.studies, chosen.seed)
     missed = misses(found)
     said = "\n".join(f"- {one}" for one in missed) or "- none"
-    text += f"\nMissed by the first six (lower limit 92 % at 20 and 60, 88 % at 5; width 2 at 20, 1.6 at 60):\n\n{said}\n"
+    asked = "lower limit 92 % at 20 and 60, 88 % at 5; width 2 at 20, 1.6 at 60"
+    text += f"\nMissed by the first six ({asked}):\n\n{said}\n"
     print(text)
     if chosen.write is not None:
         page = chosen.write.read_text("utf-8")
