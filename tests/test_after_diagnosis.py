@@ -15,7 +15,8 @@ import numpy as np
 import pytest
 
 from diagnosis_samples import diagnosis
-from syncline_design.comparison.meaning import DesignMeaning, format_duration, meaning
+from syncline_design.comparison.meaning import DesignMeaning, meaning
+from syncline_design.model.quantity import format_duration
 from syncline_design.report import numbers
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.render_console import console
@@ -164,8 +165,12 @@ def test_page_and_markdown_show_all_three_beside_each_other() -> None:
 
 @pytest.mark.parametrize(
     ("seconds", "words"),
-    [(3600.0, "1 h"), (5400.0, "1.5 h"), (600.0, "10 min"), (45.0, "45 s"), (100.0, "100 s")],
-)
+    [
+        (3600.0, "1 h"), (5400.0, "1.5 h"), (600.0, "10 min"), (45.0, "45 s"), (100.0, "100 s"),
+        (6000.0, "100 min"), (2220.0, "37 min"), (5000.25, "1.389 h"), (1e8, "27780 h"),
+        (0.005, "5 ms"),
+    ],
+)  # fmt: skip
 def test_durations_read_as_missions_are_planned(seconds: float, words: str) -> None:
     assert format_duration(seconds) == words
 

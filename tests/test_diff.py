@@ -9,13 +9,16 @@ import jsonschema
 import pytest
 
 from study_specs import SPEC
+from syncline_design.comparison import diff as comparison_diff
 from syncline_design.comparison.diff import diff
 from syncline_design.comparison.difference import SCHEMA, Difference
 from syncline_design.machine.records import read_as, schema_of
 from syncline_design.report.json_out import json_text
 from syncline_design.report.on_difference import DIFF_FORMATS, headline, on_difference, render_diff
 from syncline_design.report.render_console import console
+from syncline_design.spec.files import Collection
 from syncline_design.spec.load import BadInput
+from syncline_design.spec.yaml_text import ParsedFile
 from syncline_design.verdict.verify import CheckSettings, check_file
 
 ROOT = Path(__file__).parent.parent
@@ -329,3 +332,20 @@ def test_a_verdict_of_an_earlier_state_says_so(files: tuple[Path, Path]) -> None
     stored.write_text(json_text(told), encoding="utf-8")
     with pytest.raises(BadInput, match="horizon: missing; perhaps an earlier syncline-design"):
         diff(stored, stored)
+
+
+def test_the_catalogs_are_read_once_for_each_file(
+    files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """They were parsed anew for every change that is tried alone."""
+    change(files[1], DISTANCE, ("limit: 0.30 m", "limit: 0.15 m"))
+    read: list[Path] = []
+    plain = comparison_diff.catalogs_of
+
+    def counted(document: ParsedFile, path: Path) -> Collection:
+        read.append(path)
+        return plain(document, path)
+
+    monkeypatch.setattr(comparison_diff, "catalogs_of", counted)
+    assert len(diff(*files, PLAIN).causes) == 2
+    assert read == list(files)

@@ -18,6 +18,7 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.records import Json
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SECTIONS
+from syncline_design.spec.files import Collection
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
 from syncline_design.spec.load import BadInput, catalogs_of, load_document, without_simulated
 from syncline_design.spec.yaml_text import KeyPath, ParsedFile, parse
@@ -38,6 +39,7 @@ class Side:
     verdict: Verdict
     case: Case | None = None
     document: ParsedFile | None = None
+    catalogs: Collection | None = None
 
 
 Found = Iterator[tuple[Cause, KeyPath | None]]  # with its place in the old spec, where it has one
@@ -66,8 +68,9 @@ def read_side(path: Path, settings: CheckSettings) -> Side:
     document = parse(text_of(path), str(path))
     if document.data is None:
         raise BadInput(document.problems)
-    case = load_document(document, path, catalogs_of(document, path))
-    return Side(str(path), check_loaded(case, settings), case, document)
+    catalogs = catalogs_of(document, path)
+    case = load_document(document, path, catalogs)
+    return Side(str(path), check_loaded(case, settings), case, document, catalogs)
 
 
 def _causes(before: Side, after: Side) -> Found:
@@ -260,7 +263,8 @@ def _tried(
         data = put(original, place, value)
         document = replace(before.document, data=data)
         path = before.case.path
-        alone = load_document(document, path, catalogs_of(document, path))
+        same = before.catalogs if place[0] != "catalogs" else None
+        alone = load_document(document, path, same or catalogs_of(document, path))
         verdict = check_loaded(without_simulated(alone), plain)
         start = check_loaded(without_simulated(before.case), plain)
     except Exception:  # a change that needs the others; the whole difference stands without it

@@ -11,7 +11,7 @@ from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.quantity import Dimension, format_duration, format_quantity
 from syncline_design.simulation.results import QuantileEstimate
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
@@ -214,14 +214,6 @@ def horizon_words(horizon: MissionHorizon, *, given: bool) -> str:
         f"Horizon: {duration}, {extent} about the origin, tilt up to {tilt} ({whose}). "
         "What drifts or grows with distance is charged for all of it."
     )
-
-
-def format_duration(seconds: float) -> str:
-    """`1 h`, `90 min`, `45 s`: a time that people plan missions in."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if seconds >= size and (seconds / size) % 0.5 == 0.0:
-            return f"{seconds / size:g} {unit}"
-    return format_quantity(seconds, Dimension.TIME)
 
 
 def _lines(before: _Checked, after: _Checked) -> Iterator[str]:

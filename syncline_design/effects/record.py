@@ -321,7 +321,7 @@ class Effect:
                 yield Misfit(("parameters", name), "unknown parameter", name, names)
         for one in self.parameters:
             if one.name not in values:
-                yield Misfit(("parameters",), f"missing parameter {one.name}", "", names)
+                yield Misfit(("parameters",), f"missing parameter {one.name}", "", (one.name,))
             elif wrong := one.misfit(values[one.name], sensor):
                 wanted = one.choices_of(sensor) or (one.domain,)
                 yield Misfit(("parameters", one.name), wrong, str(values[one.name]), wanted)

@@ -341,11 +341,18 @@ def format_like(written: str, si_value: float, digits: int = 4) -> str:
 
 
 def format_duration(duration_s: float) -> str:
-    """`1 h`, `20 min`, `45 s`."""
-    for unit, size in (("h", 3600.0), ("min", 60.0)):
-        if duration_s >= size:
-            return f"{duration_s / size:.4g} {unit}"
-    return f"{duration_s:.4g} s"
+    """`1.5 h`, `100 s`, `100 min`: the first of h, min and s that gives a short multiple of a half.
+
+    Else in the largest of them that is reached, to four figures; below a second as other times.
+    """
+    units = [one for one in (("h", 3600.0), ("min", 60.0), ("s", 1.0)) if duration_s >= one[1]]
+    for unit, size in units:
+        if (duration_s / size) % 0.5 == 0.0 and duration_s < 1e4 * size:
+            return f"{duration_s / size:g} {unit}"
+    if not units:
+        return format_quantity(duration_s, Dimension.TIME)
+    unit, size = units[0]
+    return f"{_figure(duration_s / size, 4)} {unit}"
 
 
 def format_estimate(value: float, uncertainty: float | None = None, unit: str = "") -> str:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from difflib import get_close_matches
 
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.quantity import format_estimate
+from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import problem_at
 from syncline_design.spec.spec import EffectChoice, Spec
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
@@ -53,10 +53,8 @@ def _transponder_problem(
 def _problem(
     document: ParsedFile, path: KeyPath, message: str, found: str, known: tuple[str, ...]
 ) -> Flaw:
-    close = get_close_matches(found, known, 1)
-    hint = f"did you mean {close[0]}?" if close else ""
     expected = f"one of {', '.join(known)}" if len(known) > 1 else known[0]
-    return problem_at(document, path, message, expected, found, hint)
+    return problem_at(document, path, message, expected, found, did_you_mean(found, known))
 
 
 def describe(entry: EffectEntry) -> str:
