@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import math
 
 import pytest
 
 from syncline_design.report.checks import render_checks
+from syncline_design.report.on_choice import on_choice
 from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.optimisations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import load_text
+from syncline_design.verdict.optimise import OptimizeSettings, optimize
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
@@ -251,3 +255,31 @@ def test_console_and_csv_tell_a_waived_requirement_from_a_failed_one(
 
 def csv_of(found: Verdict) -> str:
     return render_checks("csv", [found])
+
+
+@pytest.mark.parametrize(("limit", "warns"), [("0.80 m", True), ("1.9 m", False)])
+def test_optimize_warns_as_check_does(limit: str, warns: bool) -> None:
+    """In text, JSON and headline, where the worst case by hand exceeds the limit and only there."""
+    found = optimize(load_text(SPEC.format(limit=limit, more=""), "boat.yaml"), OptimizeSettings())
+    assert found.result.verdict == "meets"
+    assert (worst_by_hand_m() > float(limit.split()[0])) == warns
+    codes = [w["code"] for w in json.loads(render_optimize("json", found))["warnings"]]
+    assert (WORST in codes) == warns
+    told = " ".join(console(on_choice(found), colour=False).split())
+    assert (f"({WORST})" in told) == warns
+    assert ("its certified worst case at one sigma exceeds the limit of NEAR" in told) == warns
+    # what check says of the design itself, in the same words (assumptions and simulation apart)
+    checked = {w.message for w in verdict(limit).warnings if w.code != "assumption"}
+    assert {w.message for w in found.result.warnings} == checked
+
+
+def test_a_spec_that_pins_everything_fails_in_check_and_optimize() -> None:
+    """2 (m/s) 20 ms alone are 4 cm: nothing to choose, nothing infeasible, the same exit code."""
+    found = optimize(
+        load_text(SPEC.format(limit="3 cm", more=""), "boat.yaml"), OptimizeSettings()
+    ).result
+    assert (found.verdict, found.exit_code) == ("fails", 1)
+    assert found.designs == ()
+    assert found.infeasibility is not None
+    checked = verdict("3 cm")
+    assert (checked.verdict, checked.exit_code) == ("fails", 1)

@@ -22,6 +22,7 @@ from syncline_design.report.document import (
     show,
 )
 from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.verdict_words import qualification, warning_nodes
 from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
@@ -40,6 +41,7 @@ def on_choice(found: Optimised) -> Document:
         sections=(
             *_why_not(found.result),
             *section("designs", "Best designs", show(designs, silent=True)),
+            *section("warnings", "Warnings", warning_nodes(found.result.warnings)),
             *_front(found),
             *section("hinges", "What it hinges on", hinges_nodes(found.result)),
             *section("incomplete", "Not complete", _items(incomplete_lines(found.result))),
@@ -58,7 +60,7 @@ def _outcome(found: Optimised) -> Outcome:
     objective = found.case.spec.objective
     best = OBJECTIVES.get(objective, objective)
     how = "proven" if found.result.proof.optimal else "not proven optimal"
-    return Outcome("good", "\u2713", f"Design of {best}, {how}")
+    return Outcome("good", "\u2713", f"Design of {best}, {how}{qualification(found.result)}")
 
 
 def _sentences(found: Optimised) -> list[str]:

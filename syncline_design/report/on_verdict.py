@@ -70,7 +70,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
                      "Why not"),
             *section("requirements", "Requirements",
                      show(verdict_tables.requirements(verdict), silent=True)),
-            *section("warnings", "Warnings", _warnings(verdict)),
+            *section("warnings", "Warnings", verdict_words.warning_nodes(verdict.warnings)),
             *section("payload", "Payload and timestamping", _payload(verdict), "Payload"),
             *section("timing", "Timestamp error of each sensor", _timing(verdict), "Timing"),
             *section("syncline", "Syncline", _syncline(verdict)),
@@ -187,13 +187,6 @@ def _joint(fixes: Sequence[Fix]) -> tuple[str | Span, ...]:
     for fix in fixes:
         told += [" and " if told else "", given(fix.text)]
     return (*told, _PROVEN)
-
-
-def _warnings(verdict: Verdict) -> list[Node]:
-    entries: tuple[Inline, ...] = tuple(
-        (given(entry.message), " (", code(entry.code), ")") for entry in verdict.warnings
-    )
-    return [Items(entries, "!", "warn")] if entries else []
 
 
 def _payload(verdict: Verdict) -> list[Node]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
-from syncline_design.report.document import Outcome
+from syncline_design.report.document import Inline, Items, Node, Outcome, code, given
 from syncline_design.report.text import visible
 from syncline_design.report.words import (
     KINDS,
@@ -22,7 +22,9 @@ from syncline_design.report.words import (
 from syncline_design.verdict.obstacle import obstacle_sentence
 
 if TYPE_CHECKING:
+    from syncline_design.verdict.optimise import Optimisation
     from syncline_design.verdict.tree import (
+        Caution,
         Checked,
         LedgerRow,
         NamedRole,
@@ -43,7 +45,7 @@ def outcome(verdict: Checked) -> Outcome:
     return replace(found, word=found.word + qualification(verdict))
 
 
-def qualification(verdict: Verdict) -> str:
+def qualification(verdict: Verdict | Optimisation) -> str:
     """What a headline adds to `meets`: warnings that a figure exceeds the limit; else nothing."""
     if verdict.verdict != "meets":
         return ""
@@ -54,6 +56,14 @@ def qualification(verdict: Verdict) -> str:
         if entry.code == code
     ]
     return f", but {sentence_list(told)}" if told else ""
+
+
+def warning_nodes(cautions: Sequence[Caution]) -> list[Node]:
+    """Warnings as a list: the sentence, then the code to filter by."""
+    entries: tuple[Inline, ...] = tuple(
+        (given(entry.message), " (", code(entry.code), ")") for entry in cautions
+    )
+    return [Items(entries, "!", "warn")] if entries else []
 
 
 def status_of(row: RequirementResult) -> Outcome:

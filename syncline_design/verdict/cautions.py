@@ -27,15 +27,22 @@ def cautions(
 ) -> tuple[Caution, ...]:
     """The `warnings` of a verdict: a code to filter by, a sentence to read, what it is about."""
     return (
+        *design_cautions(case, verified),
+        *_waivers(verified),
+        *_simulation(verified),
+        *_assumptions(assumed),
+        *_transcripts(copied),
+    )
+
+
+def design_cautions(case: Case, verified: Verified) -> tuple[Caution, ...]:
+    """What a reader has to know of the design itself, whatever command speaks of it."""
+    return (
         *_worst_case(verified),
         *_lever_arm(verified),
         *_clocks(case, verified),
         *_coverage(verified),
         *_untyped(case, verified),
-        *_waivers(verified),
-        *_simulation(verified),
-        *_assumptions(assumed),
-        *_transcripts(copied),
     )
 
 

@@ -19,7 +19,7 @@ from syncline_design.choice.outcome import (
     Road,
     Unfinished,
 )
-from syncline_design.choice.problem import selection_of
+from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem, ResourceName
 from syncline_design.choice.tolerance import (
@@ -34,8 +34,10 @@ from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
+from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
+from syncline_design.verdict.cautions import design_cautions
 from syncline_design.verdict.choice_data import (
     front_designs,
     left_out,
@@ -45,6 +47,7 @@ from syncline_design.verdict.choice_data import (
 from syncline_design.verdict.open_choice import Picked, pick
 from syncline_design.verdict.tree import (
     EXIT_CODES,
+    Caution,
     Exclusion,
     FrontDesign,
     RankedDesign,
@@ -98,10 +101,10 @@ class MadeFrom(Record):
 class Optimisation(Record):
     """What `optimize` says: the best designs, or why there is none.
 
-    cut_short: what the time limit left out or incomplete; gave_up: what lacks designs because too
-    many were simulated; message: what ended a search that found no design; front: with `--pareto`,
-    `front_left_out` what has no place on it; slack, tolerances, measure_next: of a design that
-    meets, null where that was not worked out.
+    warnings: of the first design, as `check` gives them; cut_short: what the time limit left out
+    or incomplete; gave_up: what lacks designs because too many were simulated; message: what ended
+    a search that found no design; front: with `--pareto`, `front_left_out` what has no place on
+    it; slack, tolerances, measure_next: of a design that meets, null where that was not worked out.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
@@ -110,6 +113,7 @@ class Optimisation(Record):
     proof: Proof
     combinations: str | None
     designs: tuple[RankedDesign, ...] = ()
+    warnings: tuple[Caution, ...] = ()
     excluded: tuple[Exclusion, ...]
     excluded_count: int
     cut_short: tuple[str, ...] = ()
@@ -192,9 +196,10 @@ def _optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         if picked.verified.word == "meets":
             kind, more = Hinged, _hinges((case, problem, designs[0], build), pieces)
     result = kind(
-        verdict=_word(picked),
+        verdict=_word(case, problem, picked),
         **_frame(case, problem, settings, picked.choice.proof),
         designs=ranked_designs(case, problem, designs),
+        warnings=design_cautions(case, picked.verified) if designs and picked.verified else (),
         cut_short=tuple(pieces.cut_short),
         gave_up=tuple(pieces.gave_up),
         **_front(case, problem, settings, points),
@@ -227,10 +232,14 @@ def _unfinished(
     return Optimised(case, problem, settings, (), (), result, verdict)
 
 
-def _word(picked: Picked) -> Word:
-    """Whether there is a design; open where simulation leaves it open."""
+def _word(case: Case, problem: Problem, picked: Picked) -> Word:
+    """Whether there is a design; open where simulation leaves it open.
+
+    As in `check`, a spec that pins everything fails; one that leaves a choice is infeasible.
+    """
     if picked.verified is None:
-        return "infeasible"
+        pinned_all = sole_design(problem) is not None and not names_candidates(case)
+        return "fails" if pinned_all else "infeasible"
     return "meets" if picked.verified.word == "meets" else "indeterminate"
 
 
