@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
+import json
 import math
 import random
 from fractions import Fraction
+from pathlib import Path
 
+from syncline_design.choice.options import Option, Resources
 from syncline_design.choice.table import (
     NO_CLOCK,
     ClockOption,
     Infrastructure,
     Limits,
-    Option,
     Pair,
     Problem,
-    Resources,
     RoleTable,
     VehicleTable,
 )
@@ -120,3 +121,76 @@ def _clocks(count: int) -> tuple[ClockOption, ...]:
         ClockOption(f"clock{i}", offset, Resources(Fraction(cost)))
         for i, (offset, cost) in enumerate(figures[:count])
     )
+
+
+def write_spec(
+    folder: Path,
+    stages: int,
+    sensors: int,
+    methods: int = 8,
+    seed: int = 0,
+    *,
+    accuracy_m: float | None = None,
+    sync: float = 1.0,
+) -> Path:
+    """The chain of `instance` as a spec with a catalog of its own, for whole processes."""
+    problem_roles = instance(stages, sensors, methods, seed).roles
+    catalog: dict[str, dict[str, object]] = {"sensors": {}, "timestamping": {}}
+    names: dict[tuple[int, str], list[str]] = {}
+    for role in problem_roles:
+        for option in role.options:
+            entry = f"{role.role}{role.stage}_{option.sensor}"
+            here = names.setdefault((role.stage, role.role), [])
+            if entry not in catalog["sensors"]:
+                here.append(entry)
+                catalog["sensors"][entry] = _sensor_entry(role.role, option)
+    for name, tau, timeline, cost, _ in METHODS[:methods]:
+        catalog["timestamping"][f"m_{name}"] = {
+            "name": name, "primitives": ["pps"], "timeline": timeline,
+            "error": {"distribution": "uniform", "low": f"{-tau!r} s", "high": f"{tau!r} s"},
+            "cost": f"{cost} EUR", "mass": "0 g", "power": "0 W",
+        }  # fmt: skip
+    (folder / "catalog.yaml").write_text(json.dumps(catalog, indent=1), "utf-8")
+    requirements: list[dict[str, object]] = [
+        {"id": "SYNC-1", "kind": "sync", "limit": sync},
+        {"id": "ACC-1", "kind": "accuracy", "limit": f"{accuracy_m or 0.5 * stages!r} m"},
+    ]
+    spec = {
+        "syncline": 1, "name": f"{stages} x {sensors} x {methods}", "catalogs": ["catalog.yaml"],
+        "requirements": requirements,
+        "stages": [_stage_entry(stage, names) for stage in range(stages)],
+        "timestamping": {"candidates": [f"m_{name}" for name, *_ in METHODS[:methods]]},
+    }  # fmt: skip
+    path = folder / "spec.yaml"
+    path.write_text(json.dumps(spec, indent=1), "utf-8")
+    return path
+
+
+def _sensor_entry(role: str, option: Option) -> dict[str, object]:
+    """A catalog entry whose term of the sensor error is the option's, at 10 m distance."""
+    cost = option.resources.cost or Fraction(0)
+    entry: dict[str, object] = {
+        "name": option.sensor, "modality": role, "primitives": ["pps"], "mass": "100 g",
+        "power": "1 W", "cost": f"{float(cost):.2f} EUR",
+    }  # fmt: skip
+    if role == "ranging":
+        half = option.sensor_error_m / 2.0
+        entry |= {
+            "sigma_range": f"{half:.9f} m",
+            "sigma_bearing": f"{half / math.sqrt(200.0):.9f} rad",
+        }
+    else:
+        each = option.sensor_error_m / math.sqrt(3.0) / (1.0 if role == "position" else 10.0)
+        unit = "m" if role == "position" else "rad"
+        entry[f"sigma_{role}"] = [f"{each:.9f} {unit}"] * 3
+    return entry
+
+
+def _stage_entry(stage: int, names: dict[tuple[int, str], list[str]]) -> dict[str, object]:
+    platform = {"name": f"platform {stage}", "v_max": "2 m/s", "omega_max": "0.8 rad/s",
+                "distance": "10 m", "baseline": "1 m"}  # fmt: skip
+    entry: dict[str, object] = {"name": f"stage{stage}", "platform": platform}
+    for role in ("position", "attitude", "ranging"):
+        if (stage, role) in names:
+            entry[role] = {"candidates": names[stage, role]}
+    return entry

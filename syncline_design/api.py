@@ -20,8 +20,8 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, load
 
 if TYPE_CHECKING:
+    from syncline_design.choice.options import ResourceName
     from syncline_design.choice.outcome import Road
-    from syncline_design.choice.table import ResourceName
     from syncline_design.clocks.study import TimingSettings
     from syncline_design.comparison.clock_meaning import TimingAndSpec
     from syncline_design.comparison.difference import Difference

@@ -15,6 +15,7 @@ from syncline_design.choice import decide
 from syncline_design.choice.decide import best, choose
 from syncline_design.choice.enumerate import all_designs
 from syncline_design.choice.evaluate import broken, evaluate, rank, total_error_m
+from syncline_design.choice.options import Resources
 from syncline_design.choice.outcome import Choice, Infeasible, NoVerdict, TooLarge
 from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import (
@@ -24,7 +25,6 @@ from syncline_design.choice.table import (
     Limits,
     Objective,
     Problem,
-    Resources,
     with_limits,
 )
 from test_front import one_stage, option

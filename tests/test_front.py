@@ -18,18 +18,10 @@ from syncline_design.choice import front as front_module
 from syncline_design.choice.enumerate import all_designs, best_by_enumeration
 from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
 from syncline_design.choice.front import front, merged_front
+from syncline_design.choice.options import Option, Resources
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.pareto import Columns, undominated
-from syncline_design.choice.table import (
-    NO_CLOCK,
-    Limits,
-    Option,
-    Pair,
-    Problem,
-    Resources,
-    RoleTable,
-    VehicleTable,
-)
+from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
 from tests.plain_front import front_by_enumeration
 
 

@@ -14,18 +14,9 @@ import pytest
 
 from syncline_design.choice.decide import choose
 from syncline_design.choice.front import front
+from syncline_design.choice.options import RESOURCES, Option, Resources
 from syncline_design.choice.outcome import Choice
-from syncline_design.choice.table import (
-    NO_CLOCK,
-    RESOURCES,
-    Limits,
-    Option,
-    Pair,
-    Problem,
-    Resources,
-    RoleTable,
-    VehicleTable,
-)
+from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
 
 ROLES = ("position", "attitude", "ranging")
 SPEED, TURN = 2, 3  # m/s

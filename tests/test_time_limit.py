@@ -147,7 +147,7 @@ def test_designs_come_in_the_documented_order_by_splitting(seed: int) -> None:
     )
     places = [tuple(int(name[1:]) for name in entry[-1]) for entry in keyed]
     # names s<i // 2>, m<i>: their order is that of the places, which have one digit here
-    every = [d.options for d in iter_differing(problem, lambda o: o.names, clocks=True)]
+    every = [d.options for d in iter_differing(problem, "names", clocks=True)]
     assert every == places
     seen: dict[tuple[int, ...], tuple[int, ...]] = {}
     for place in places:

@@ -10,7 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+import numpy as np
+
 from syncline_design.choice.narrowed import Narrowed, kept
+from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Deadline
 from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import Design, Judgement, Problem
@@ -68,11 +71,13 @@ def promising(problem: Problem) -> Narrowed:
     """The problem without the options that simulation rules out by their sensor alone."""
     judge = problem.judge
     assert judge is not None
-    return kept(
-        problem,
-        lambda r, option: not judge.hopeless(problem, r, option),
-        lambda _, clock: True,
-    )
+
+    def hopeful(r: int, options: Options) -> Bools:
+        _, first = np.unique(options.sensor, return_index=True)
+        gone = [p for p in first.tolist() if judge.hopeless(problem, r, p)]
+        return ~np.isin(options.sensor, options.sensor[gone])
+
+    return kept(problem, hopeful, lambda _, clock: True)
 
 
 def without_simulation(problem: Problem) -> Problem:

@@ -10,12 +10,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 
+import numpy as np
+
 from syncline_design.choice.evaluate import Amount, broken, evaluate, known_or_more, rank
 from syncline_design.choice.narrowed import Narrowed, narrowed
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import Choice, Proof, TooLarge
 from syncline_design.choice.partition import best_of
 from syncline_design.choice.ranked import lower_bound
-from syncline_design.choice.table import Design, Option, Problem
+from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Deadline, OutOfTime
 
 FEW = (3, 9)  # options per role and aim
@@ -51,21 +54,15 @@ def in_hand(problem: Problem, deadline: Deadline) -> InHand | None:
 def few(problem: Problem, count: int) -> Narrowed:
     """The problem with a few options of each role; every clock stays."""
     rate = float(problem.sync_rate())
-    objective = "cost" if problem.objective == "error" else problem.objective
-
-    def aims(option: Option) -> tuple[Amount, ...]:
-        amount = known_or_more(option.resources.of(objective))
-        caused = rate * option.tau_s
-        return (amount, option.sensor_error_m, caused, option.sensor_error_m + caused)
-
+    objective: ResourceName = "cost" if problem.objective == "error" else problem.objective
     places = []
     for table in problem.roles:
-        figures = [aims(option) for option in table.options]
-        kept: set[int] = set()
-        for k in range(4):
-            keys = [(own[k], own, o.names) for own, o in zip(figures, table.options, strict=True)]
-            kept.update(sorted(range(len(keys)), key=keys.__getitem__)[:count])
-        places.append(sorted(kept))
+        options = table.options
+        caused = rate * options.tau
+        amount = options.spent(objective).order()
+        aims = (amount, options.error, caused, options.error + caused)
+        orders = [np.lexsort((options.rank, *aims[::-1], aim)) for aim in aims]
+        places.append(np.unique(np.concatenate([order[:count] for order in orders])))
     return narrowed(problem, places, [range(len(v.clocks)) for v in problem.vehicles])
 
 

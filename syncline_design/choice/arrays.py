@@ -2,29 +2,28 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
-from syncline_design.choice.outcome import TooLarge
-from syncline_design.choice.pareto import (
+from syncline_design.choice.options import (
+    INT64_ROOM,
+    RESOURCES,
     Bools,
     Column,
-    Columns,
     Floats,
     Indices,
-    undominated,
+    Options,
+    ResourceName,
 )
-from syncline_design.choice.table import RESOURCES, Option, Problem, ResourceName, RoleTable
+from syncline_design.choice.outcome import TooLarge
+from syncline_design.choice.pareto import Columns, undominated
+from syncline_design.choice.table import Problem
 
-MARGIN = 1e-12  # sums of floats are trusted to this; what lies closer to a limit is decided exactly
-INT64_ROOM = 2**61
 MOST_CHANNELS = 1000
 
 
@@ -85,7 +84,7 @@ class Tables:
 
     problem: Problem
     roles: tuple[RoleArrays, ...]
-    order: tuple[tuple[int, ...], ...]  # per role: table index of each place
+    order: tuple[Indices, ...]  # per role: table index of each place
     keys: tuple[Scaled, ...]
     ties: tuple[Scaled, ...]
     tracked: tuple[int, ...]  # infrastructure indices that some option or clock requires
@@ -100,78 +99,44 @@ def tabulate(problem: Problem, primary: ResourceName) -> Tables:
     """Arrays for a front of `primary` against error; other budgets become further keys."""
     names = [primary]
     names += [n for n in RESOURCES if n != primary and problem.limits.budget(n) is not None]
-    orders = tuple(_by_name(table) for table in problem.roles)
-    options = [
-        [table.options[i] for i in order]
-        for table, order in zip(problem.roles, orders, strict=True)
-    ]
-    amounts = {name: _Amounts(problem, name, options) for name in RESOURCES}
-    ties = [n for n in RESOURCES if n not in names and amounts[n].matter]
-    tracked = _tracked(problem, options)
+    tracked = _tracked(problem)
+    ties = [n for n in RESOURCES if n not in names and _matters(problem, n, tracked)]
+    keys, rest = ([_scaled(problem, n, tracked) for n in some] for some in (names, ties))
+    orders = tuple(table.options.by_name() for table in problem.roles)
     roles = tuple(
-        _role_arrays(
-            problem, role, [amounts[n].columns[r] for n in (*names, *ties)], len(names), tracked
-        )
-        for r, role in enumerate(options)
+        _role_arrays(problem, table.options.take(order), keys, rest, tracked)
+        for table, order in zip(problem.roles, orders, strict=True)
     )
-    keys = tuple(amounts[name].scaled for name in names)
-    return Tables(problem, roles, orders, keys, tuple(amounts[n].scaled for n in ties), tracked)
+    return Tables(problem, roles, orders, tuple(keys), tuple(rest), tracked)
 
 
-_names = attrgetter("sensor", "primitive", "method")
+def _beside(
+    problem: Problem, name: ResourceName, tracked: tuple[int, ...]
+) -> list[Fraction | None]:
+    """Amounts of a resource that clocks and shared hardware take."""
+    out = [clock.resources.of(name) for v in problem.vehicles for clock in v.clocks]
+    return out + [problem.infrastructure[i].resources.of(name) for i in tracked]
 
 
-def _by_name(table: RoleTable) -> tuple[int, ...]:
-    names = [_names(option) for option in table.options]
-    return tuple(sorted(range(len(names)), key=names.__getitem__))
+def _matters(problem: Problem, name: ResourceName, tracked: tuple[int, ...]) -> bool:
+    """Whether a resource can tell designs apart."""
+    amounts = _beside(problem, name, tracked)
+    return any(a is None or a for a in amounts) or any(
+        table.options.spent(name).whole.any() for table in problem.roles
+    )
 
 
-class _Amounts:
-    """One resource of all options as integer columns, with the scale they share."""
-
-    def __init__(self, problem: Problem, name: ResourceName, options: list[list[Option]]) -> None:
-        spent = [[option.resources for option in role] for role in options]
-        amount_of = attrgetter(name)
-        others = [c.resources for v in problem.vehicles for c in v.clocks]
-        others += [problem.infrastructure[i].resources for i in _tracked(problem, options)]
-        known = all(amount_of(r) is not None for r in itertools.chain(others, *spent))
-        rest = [a for a in (*map(amount_of, others), problem.limits.budget(name)) if a is not None]
-        ratios = [_ratios(list(map(amount_of, role))) for role in spent]
-        denominator = math.lcm(
-            *(b for _, bottoms in ratios for b in set(bottoms)), *(a.denominator for a in rest)
-        )
-        largest = max(
-            (abs(top) for tops, _ in ratios for top in tops if top != math.inf), default=0
-        )
-        largest = max(largest * denominator, *(int(abs(a * denominator)) for a in rest), 0)
-        self.matter = any(any(tops) for tops, _ in ratios) or any(rest) or not known
-        fits = known and largest * _most_terms(problem) < INT64_ROOM
-        self.scaled = Scaled(name, denominator, np.int64 if fits else object, known)
-        self.columns = [
-            _whole(*ratio, len(role), self.scaled)
-            for ratio, role in zip(ratios, spent, strict=True)
-        ]
-
-
-def _ratios(amounts: list[Fraction | None]) -> tuple[Sequence[int | float], Sequence[int]]:
-    """Numerators and denominators; infinite where the catalog does not say."""
-    if all(amount is not None and not amount for amount in amounts):
-        return (), ()
-    pairs = [(math.inf, 1) if a is None else a.as_integer_ratio() for a in amounts]
-    tops, bottoms = zip(*pairs, strict=True)
-    return tops, bottoms
-
-
-def _whole(
-    tops: Sequence[int | float], bottoms: Sequence[int], count: int, scaled: Scaled
-) -> Column:
-    if not tops:
-        return np.zeros(count, dtype=np.int64)
-    column = np.array(tops, dtype=scaled.dtype)
-    if scaled.denominator == 1:
-        return column
-    factors = scaled.denominator // np.array(bottoms, dtype=scaled.dtype)
-    return np.asarray(column * factors)
+def _scaled(problem: Problem, name: ResourceName, tracked: tuple[int, ...]) -> Scaled:
+    """The unit in which all amounts of a resource are whole, and how their sums are held."""
+    spent = [table.options.spent(name) for table in problem.roles]
+    beside = _beside(problem, name, tracked)
+    rest = [a for a in (*beside, problem.limits.budget(name)) if a is not None]
+    unit = math.lcm(*(one.denominator for one in spent), *(a.denominator for a in rest))
+    largest = [one.largest * (unit // one.denominator) for one in spent]
+    largest += [int(abs(a * unit)) for a in rest]
+    known = all(a is not None for a in beside) and all(one.known for one in spent)
+    fits = known and max(largest) * _most_terms(problem) < INT64_ROOM
+    return Scaled(name, unit, np.int64 if fits else object, known)
 
 
 def _most_terms(problem: Problem) -> int:
@@ -180,8 +145,8 @@ def _most_terms(problem: Problem) -> int:
     return roles * (1 + len(problem.infrastructure) * MOST_CHANNELS)
 
 
-def _tracked(problem: Problem, options: list[list[Option]]) -> tuple[int, ...]:
-    needs = {o.requires for role in options for o in role}
+def _tracked(problem: Problem) -> tuple[int, ...]:
+    needs = {kind for table in problem.roles for kind in table.options.required}
     needs |= {c.requires for v in problem.vehicles for c in v.clocks}
     wanted = {name for requires in needs for name, _ in requires}
     if any(count > MOST_CHANNELS for requires in needs for _, count in requires):
@@ -191,35 +156,19 @@ def _tracked(problem: Problem, options: list[list[Option]]) -> tuple[int, ...]:
 
 def _role_arrays(
     problem: Problem,
-    options: list[Option],
-    columns: list[Column],
-    keys: int,
+    options: Options,
+    keys: Sequence[Scaled],
+    ties: Sequence[Scaled],
     tracked: tuple[int, ...],
 ) -> RoleArrays:
-    channels = [
-        np.array([_channels(o.requires, problem.infrastructure[i].id) for o in options], dtype=int)
-        for i in tracked
-    ]
+    def columns(scales: Sequence[Scaled]) -> tuple[Column, ...]:
+        return tuple(options.spent(s.name).scaled(s.denominator, s.dtype) for s in scales)
+
+    channels = tuple(options.channels(problem.infrastructure[i].id) for i in tracked)
     return RoleArrays(
-        np.arange(len(options)),
-        np.array([_added_m(o) for o in options], dtype=float),
-        np.array([o.sensor_error_m for o in options], dtype=float),
-        np.array([o.tau_s for o in options], dtype=float),
-        np.array([o.timeline == "host" for o in options], dtype=bool),
-        tuple(columns[:keys]),
-        tuple(columns[keys:]),
-        tuple(channels),
-    )
-
-
-def _added_m(option: Option) -> float:
-    if option.systematic_m == 0.0:
-        return option.sensor_error_m
-    return float(option.error() + option.systematic())
-
-
-def _channels(requires: tuple[tuple[str, int], ...], name: str) -> int:
-    return sum(count for item, count in requires if item == name) if requires else 0
+        np.arange(len(options)), options.added, options.error, options.tau, options.host,
+        columns(keys), columns(ties), channels,
+    )  # fmt: skip
 
 
 def tie_order(tables: Tables, resources: Sequence[Column], ties: Sequence[Column]) -> list[Column]:

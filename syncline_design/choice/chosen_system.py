@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from syncline_design.choice.table import Design, Option, Problem
+from syncline_design.choice.options import Option
+from syncline_design.choice.table import Design, Problem
 from syncline_design.model import timing
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Platform, Sensor, Stage, System

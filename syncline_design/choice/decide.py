@@ -12,6 +12,7 @@ from syncline_design.choice.anytime import in_hand, unproven
 from syncline_design.choice.enumerate import best_by_enumeration
 from syncline_design.choice.evaluate import broken, evaluate, rank
 from syncline_design.choice.front import merged_front
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import (
     METHODS,
     Choice,
@@ -26,7 +27,7 @@ from syncline_design.choice.outcome import (
 )
 from syncline_design.choice.partition import iter_differing
 from syncline_design.choice.ranked import iter_best
-from syncline_design.choice.table import Design, Judgement, Problem, ResourceName, is_empty
+from syncline_design.choice.table import Design, Judgement, Problem, is_empty
 from syncline_design.machine.deadline import in_force
 
 SMALL = 300  # combinations up to which the automatic road also enumerates
@@ -47,7 +48,7 @@ def choose(
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
-    empty = tuple(r for r, role in enumerate(problem.roles) if not role.options)
+    empty = tuple(r for r, role in enumerate(problem.roles) if not len(role.options))
     if is_empty(problem):
         return Infeasible(Proof("tables", True, True), empty)
     deadline = in_force().inner(time_limit_s)
@@ -215,7 +216,7 @@ def _differing(problem: Problem) -> Iterator[Design]:
     try:
         if problem.judge is not None:
             raise TooLarge("simulation decides design by design")
-        for design in iter_differing(problem, lambda option: option.sensor):
+        for design in iter_differing(problem, "sensor"):
             seen.add(_sensors(problem, design))
             yield design
     except TooLarge:  # couplings that merging and splitting do not remove

@@ -12,8 +12,11 @@ from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any
 
+import numpy as np
+
+from syncline_design.choice.candidates import SensorEffects
 from syncline_design.choice.chosen_system import system_of
-from syncline_design.choice.problem import SensorEffects, build_problem, with_everything
+from syncline_design.choice.problem import build_problem, with_everything
 from syncline_design.choice.table import Design, Problem, is_empty
 from syncline_design.effects import registry
 from syncline_design.effects.acting import known_of
@@ -96,8 +99,10 @@ class _Systems:
         """Role and first option of every candidate sensor."""
         found: dict[Key, tuple[int, int]] = {}
         for r, table in enumerate(self.problem.roles):
-            for place, option in enumerate(table.options):
-                found.setdefault((table.stage_name, table.role, option.sensor), (r, place))
+            _, first = np.unique(table.options.sensor, return_index=True)
+            for place in np.sort(first).tolist():
+                sensor = table.options[place].sensor
+                found[table.stage_name, table.role, sensor] = (r, place)
         return list(found.items())
 
     def __iter__(self) -> Iterator[Key]:

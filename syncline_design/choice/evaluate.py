@@ -10,16 +10,8 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-from syncline_design.choice.table import (
-    RESOURCES,
-    ClockOption,
-    Design,
-    Option,
-    Pair,
-    Problem,
-    ResourceName,
-    Resources,
-)
+from syncline_design.choice.options import RESOURCES, Option, ResourceName, Resources
+from syncline_design.choice.table import ClockOption, Design, Pair, Problem
 
 
 @dataclass(frozen=True, slots=True)

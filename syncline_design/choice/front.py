@@ -22,7 +22,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from syncline_design.choice.arrays import MARGIN, Tables, tabulate, tie_order, useful_options
+from syncline_design.choice.arrays import Tables, tabulate, tie_order, useful_options
 from syncline_design.choice.evaluate import (
     Rank,
     error_key,
@@ -34,9 +34,10 @@ from syncline_design.choice.evaluate import (
 from syncline_design.choice.labels import Labels, concatenate, total_m
 from syncline_design.choice.merge import Ceiling, Merge, lowered
 from syncline_design.choice.narrowed import says_all, stated
+from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, ResourceName
 from syncline_design.choice.outcome import Deadline, FrontPoint, PriceStep, TooLarge
-from syncline_design.choice.pareto import Bools, Columns, Floats, Indices, undominated
-from syncline_design.choice.table import ClockOption, Design, Problem, ResourceName, is_empty
+from syncline_design.choice.pareto import Columns, undominated
+from syncline_design.choice.table import ClockOption, Design, Problem, is_empty
 from syncline_design.machine.deadline import in_force, within
 
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.choice.arrays import RoleArrays
+from syncline_design.choice.options import Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import TooLarge
-from syncline_design.choice.pareto import Bools, Column, Floats, Indices
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
 

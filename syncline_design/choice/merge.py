@@ -13,18 +13,11 @@ from functools import partial
 
 import numpy as np
 
-from syncline_design.choice.arrays import MARGIN, RoleArrays, Tables, tie_order
+from syncline_design.choice.arrays import RoleArrays, Tables, tie_order
 from syncline_design.choice.labels import Addition, Labels, concatenate, extend, total_m, with_pair
+from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline
-from syncline_design.choice.pareto import (
-    Bools,
-    Column,
-    Columns,
-    Floats,
-    Guard,
-    Indices,
-    undominated,
-)
+from syncline_design.choice.pareto import Columns, Guard, undominated
 from syncline_design.choice.safety import Safety, TimingClass
 from syncline_design.choice.table import Problem, VehicleTable
 

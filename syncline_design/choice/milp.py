@@ -18,10 +18,11 @@ from typing import Any
 
 import numpy as np
 
-from syncline_design.choice.arrays import MARGIN, Scaled, Tables, tabulate
+from syncline_design.choice.arrays import Scaled, Tables, tabulate
 from syncline_design.choice.evaluate import broken, evaluate
+from syncline_design.choice.options import MARGIN, ResourceName
 from syncline_design.choice.outcome import Deadline, NoVerdict
-from syncline_design.choice.table import Design, Pair, Problem, ResourceName, is_empty
+from syncline_design.choice.table import Design, Pair, Problem, is_empty
 
 LEAST_HIGHSPY = (1, 15)
 MOST_CUTS = 40
@@ -356,7 +357,7 @@ class _Model:
                 return None
             places = [int(np.argmax(x.value)) for x in self.x]
             clocks = tuple(int(np.argmax(c.value)) for c in self.c)
-            options = (order[i] for order, i in zip(self.tables.order, places, strict=True))
+            options = (int(order[i]) for order, i in zip(self.tables.order, places, strict=True))
             design = Design(tuple(options), clocks)
             if not broken(self.problem, evaluate(self.problem, design)):
                 return design

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from syncline_design.choice.table import (
-    RESOURCES,
-    ClockOption,
-    Design,
-    Option,
-    Problem,
-    ResourceName,
-    Resources,
-)
+import numpy as np
+
+from syncline_design.choice.options import RESOURCES, Bools, Indices, Options, ResourceName
+from syncline_design.choice.table import ClockOption, Design, Problem, RoleTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,28 +17,28 @@ class Narrowed:
     """The smaller problem; options, clocks: places in the whole one, per role and vehicle."""
 
     problem: Problem
-    options: tuple[tuple[int, ...], ...]
+    options: tuple[Indices, ...]
     clocks: tuple[tuple[int, ...], ...]
 
     @property
     def is_empty(self) -> bool:
         """Whether a role or a vehicle has nothing left to choose."""
-        return not all(self.options) or not all(self.clocks)
+        return not all(map(len, self.options)) or not all(self.clocks)
 
     def whole(self, design: Design) -> Design:
         """A design of the smaller problem as one of the whole problem."""
         return Design(
-            tuple(places[i] for places, i in zip(self.options, design.options, strict=True)),
+            tuple(int(places[i]) for places, i in zip(self.options, design.options, strict=True)),
             tuple(places[i] for places, i in zip(self.clocks, design.clocks, strict=True)),
         )
 
 
 def narrowed(
-    problem: Problem, options: Sequence[Sequence[int]], clocks: Sequence[Sequence[int]]
+    problem: Problem, options: Sequence[Indices], clocks: Sequence[Sequence[int]]
 ) -> Narrowed:
     """The problem with these options per role and these clocks per vehicle alone."""
     roles = tuple(
-        replace(table, options=tuple(table.options[i] for i in places))
+        table if len(places) == len(table.options) else _part(table, places)
         for table, places in zip(problem.roles, options, strict=True)
     )
     vehicles = tuple(
@@ -50,21 +46,22 @@ def narrowed(
         for table, places in zip(problem.vehicles, clocks, strict=True)
     )
     smaller = replace(problem, roles=roles, vehicles=vehicles)
-    return Narrowed(smaller, tuple(map(tuple, options)), tuple(map(tuple, clocks)))
+    return Narrowed(smaller, tuple(options), tuple(map(tuple, clocks)))
+
+
+def _part(table: RoleTable, places: Indices) -> RoleTable:
+    return replace(table, options=table.options.take(places))
 
 
 def kept(
     problem: Problem,
-    option: Callable[[int, Option], bool],
+    option: Callable[[int, Options], Bools],
     clock: Callable[[int, ClockOption], bool],
 ) -> Narrowed:
-    """The problem with what two tests keep, by (role, option) and (vehicle, clock)."""
+    """The problem with what two tests keep, by (role, its options) and (vehicle, clock)."""
     return narrowed(
         problem,
-        [
-            [i for i, one in enumerate(table.options) if option(r, one)]
-            for r, table in enumerate(problem.roles)
-        ],
+        [np.flatnonzero(option(r, table.options)) for r, table in enumerate(problem.roles)],
         [
             [i for i, one in enumerate(table.clocks) if clock(v, one)]
             for v, table in enumerate(problem.vehicles)
@@ -79,17 +76,24 @@ def stated(problem: Problem, resource: ResourceName) -> Narrowed:
     """
     silent = {item.id for item in problem.infrastructure if item.resources.of(resource) is None}
 
-    def says(one: Option | ClockOption) -> bool:
-        resources: Resources = one.resources
-        needed = {name for name, _ in one.requires}
-        return resources.of(resource) is not None and not silent & needed
+    def says(clock: ClockOption) -> bool:
+        needed = {name for name, _ in clock.requires}
+        return clock.resources.of(resource) is not None and not silent & needed
 
-    return kept(problem, lambda _, one: says(one), lambda _, one: says(one))
+    def say(options: Options) -> Bools:
+        spent = options.spent(resource)
+        quiet = [any(name in silent for name, _ in kind) for kind in options.needs]
+        out = ~np.array([*quiet, False])[options.need]
+        return out if spent.known else out & (spent.whole != math.inf)
+
+    return kept(problem, lambda _, options: say(options), lambda _, one: says(one))
 
 
 def says_all(problem: Problem) -> bool:
     """Whether every option, clock and shared hardware says its cost, mass and power."""
     spent = [item.resources for item in problem.infrastructure]
-    spent += [option.resources for table in problem.roles for option in table.options]
     spent += [clock.resources for table in problem.vehicles for clock in table.clocks]
-    return not any(resources.of(name) is None for resources in spent for name in RESOURCES)
+    said = not any(resources.of(name) is None for resources in spent for name in RESOURCES)
+    return said and all(
+        table.options.spent(name).known for table in problem.roles for name in RESOURCES
+    )

@@ -8,14 +8,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from syncline_design.choice.options import Bools, Column, Floats, Indices
 from syncline_design.machine.deadline import in_force
 
-Column = NDArray[Any]
-Floats = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-Indices = NDArray[np.intp]
 Also = Callable[[int, int], bool] | None
 
 BLOCK = 256

@@ -11,17 +11,21 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
 
 from syncline_design.choice.evaluate import Rank, broken, evaluate, rank
 from syncline_design.choice.front import merged_front
 from syncline_design.choice.narrowed import Narrowed, narrowed
-from syncline_design.choice.table import Design, Option, Problem, ResourceName
+from syncline_design.choice.options import Indices, ResourceName
+from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Deadline, in_force
 
-Label = Callable[[Option], Hashable]
-Open = tuple[tuple[int, ...], ...]  # places still open, per role or vehicle
+Label = Literal["sensor", "names"]
+Open = tuple[Indices, ...]  # places still open, per role
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +33,7 @@ class _Part:
     """A set of designs: what is open in it."""
 
     options: Open
-    clocks: Open
+    clocks: tuple[tuple[int, ...], ...]
 
 
 def iter_differing(
@@ -42,7 +46,7 @@ def iter_differing(
     """
     end = deadline or in_force()
     whole = _Part(
-        tuple(tuple(range(len(role.options))) for role in problem.roles),
+        tuple(np.arange(len(role.options)) for role in problem.roles),
         tuple(tuple(range(len(vehicle.clocks))) for vehicle in problem.vehicles),
     )
     counter = itertools.count()
@@ -84,10 +88,10 @@ def _split(
     """The rest of a part without the designs that carry the labels of one."""
     options = list(part.options)
     for r, table in enumerate(problem.roles):
-        own = label(table.options[design.options[r]])
-        alike = tuple(i for i in options[r] if label(table.options[i]) == own)
-        others = tuple(i for i in options[r] if label(table.options[i]) != own)
-        if others:
+        number = table.options.sensor if label == "sensor" else table.options.rank
+        same = number[options[r]] == number[design.options[r]]
+        alike, others = options[r][same], options[r][~same]
+        if len(others):
             yield _Part((*options[:r], others, *options[r + 1 :]), part.clocks)
         options[r] = alike
     if not clocks:

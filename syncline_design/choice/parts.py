@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 from syncline_design.choice.acceptable import iter_acceptable
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import Evaluation, evaluate
+from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice, Infeasible, TooLarge, Unfinished
-from syncline_design.choice.table import RESOURCES, Limits, Objective, Problem, with_limits
+from syncline_design.choice.table import Limits, Objective, Problem, with_limits
 
 KINDS = ("accuracy", "sync", "cost", "mass", "power")
 SIMULATED = "monte_carlo"

@@ -13,10 +13,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 
+import numpy as np
+
 from syncline_design.choice.acceptable import without_simulation
+from syncline_design.choice.options import Option
 from syncline_design.choice.outcome import Fix
 from syncline_design.choice.parts import CLOSE, is_feasible
-from syncline_design.choice.table import Option, Pair, Problem, RoleTable, sync_ratio, with_limits
+from syncline_design.choice.table import NOTHING, Pair, Problem, RoleTable, with_limits
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
     Build,
@@ -245,11 +248,18 @@ def _slower(one: Pair, other: Pair) -> Pair:
 
 
 def _better_role(one: RoleTable, other: RoleTable, limit: float) -> RoleTable:
-    options = []
-    for a, b in zip(one.options, other.options, strict=True):
-        if min(sync_ratio(a), sync_ratio(b)) < limit:
-            options.append(_better_option(a, b))
-    return replace(one, options=tuple(options), excluded=())
+    first, second = one.options, other.options
+    keeps = first.keep_own_tau_crit(limit) | second.keep_own_tau_crit(limit)
+    beside = dict(zip(first.at.tolist(), second.at.tolist(), strict=True))
+    better = replace(
+        first,
+        make=lambda place: _better_option(first.make(place), second.make(beside[place])),
+        error=np.maximum(first.error, second.error),
+        added=np.minimum(first.added, second.added),
+        tau=np.minimum(first.tau, second.tau),
+        crit=np.full(len(first), math.inf),
+    )
+    return replace(one, options=better.take(keeps), excluded=NOTHING)
 
 
 def _better_option(one: Option, other: Option) -> Option:

@@ -18,19 +18,21 @@ from typing import Any
 
 import numpy as np
 
-from syncline_design.choice.arrays import MARGIN, RoleArrays, Scaled, tabulate
+from syncline_design.choice.arrays import RoleArrays, Scaled, tabulate
 from syncline_design.choice.evaluate import Amount, broken, error_key, evaluate, rank
-from syncline_design.choice.outcome import Deadline, TooLarge
-from syncline_design.choice.pareto import Bools, Column, Columns, Floats, Indices, undominated
-from syncline_design.choice.partition import iter_differing
-from syncline_design.choice.table import (
+from syncline_design.choice.options import (
+    MARGIN,
     RESOURCES,
-    Design,
-    Problem,
+    Bools,
+    Column,
+    Floats,
+    Indices,
     ResourceName,
-    VehicleTable,
-    is_empty,
 )
+from syncline_design.choice.outcome import Deadline, TooLarge
+from syncline_design.choice.pareto import Columns, undominated
+from syncline_design.choice.partition import iter_differing
+from syncline_design.choice.table import Design, Problem, VehicleTable, is_empty
 from syncline_design.machine.deadline import in_force
 
 PATIENCE = 4000  # steps without a further design before splitting takes over
@@ -59,7 +61,7 @@ def iter_best(
             seen.add(design)
             yield design
     except TooLarge:
-        rest = iter_differing(problem, lambda option: option.names, clocks=True, deadline=end)
+        rest = iter_differing(problem, "names", clocks=True, deadline=end)
         yield from (design for design in rest if design not in seen)
 
 
@@ -298,7 +300,7 @@ class _Search:
         return sums[self.main]
 
     def _push_design(self, heap: list[Entry], node: _Node) -> None:
-        options = tuple(self.tables.order[r][place] for r, place in enumerate(node.places))
+        options = tuple(int(self.tables.order[r][place]) for r, place in enumerate(node.places))
         clocks = tuple(order[i] for order, i in zip(self.clock_order, node.clocks, strict=True))
         design = Design(options, clocks)
         found = evaluate(self.problem, design)

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from syncline_design.choice.arrays import MARGIN, Tables
+from syncline_design.choice.arrays import Tables
 from syncline_design.choice.labels import Labels
-from syncline_design.choice.pareto import Bools, Floats, Indices
+from syncline_design.choice.options import MARGIN, Bools, Floats, Indices
 from syncline_design.choice.table import Pair
 
 

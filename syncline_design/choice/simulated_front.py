@@ -13,9 +13,10 @@ from dataclasses import replace
 
 from syncline_design.choice.acceptable import judgement, promising
 from syncline_design.choice.evaluate import error_key, evaluate
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint, Unfinished
 from syncline_design.choice.ranked import iter_best
-from syncline_design.choice.table import Problem, ResourceName
+from syncline_design.choice.table import Problem
 
 
 def accepted_front(

@@ -12,14 +12,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate, pair_bound
 from syncline_design.choice.narrowed import narrowed
+from syncline_design.choice.options import Option, Options
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime, Unfinished
 from syncline_design.choice.partition import best_of
 from syncline_design.choice.problem import build_problem
-from syncline_design.choice.table import Design, Option, Problem, RoleTable
+from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
     Build,
@@ -96,7 +99,7 @@ def _error_slack(problem: Problem, design: Design, r: int) -> Slack:
         fails = float(own.error() + (Fraction(limit) - total) / slope)
 
     def changed(value: float) -> Problem:
-        return _with_sensor(problem, r, own.sensor, Fraction(value))
+        return _with_sensor(problem, r, own, Fraction(value))
 
     row = Slack(f"{table.role} sensor error", table.stage_name, own.sensor_error_m, "m", fails,
                 None if fails is None else "accuracy", None)  # fmt: skip
@@ -104,11 +107,11 @@ def _error_slack(problem: Problem, design: Design, r: int) -> Slack:
     return _with_payload(row, problem, design, changed, fails_never=sure)
 
 
-def _with_sensor(problem: Problem, r: int, sensor: str, error_m: Fraction) -> Problem:
-    """The problem with one sensor's error in one role set; its exclusions are judged anew."""
+def _with_sensor(problem: Problem, r: int, own: Option, error_m: Fraction) -> Problem:
+    """The problem with the error of one sensor in one role set; its exclusions are judged anew."""
 
     def grown(option: Option) -> Option:
-        if option.sensor != sensor:
+        if option.sensor != own.sensor:
             return option
         ratio = error_m / option.error()
         crit = option.tau_crit_s
@@ -124,22 +127,19 @@ def _with_sensor(problem: Problem, r: int, sensor: str, error_m: Fraction) -> Pr
             noise_systematic_m=option.noise_systematic_m * ratio,
         )
 
-    return _with_options(problem, grown, {r})
+    new = grown(own)
+    pool = problem.roles[r].pool()
+    rows = pool.sensor == pool.sensor[pool.place_of(own.names)]
+    pool = pool.changed(
+        rows, grown, error=new.sensor_error_m, added=new.added_m(), crit=new.tau_crit_s
+    )
+    return _with_pool(problem, r, pool)
 
 
-def _with_options(problem: Problem, change: Callable[[Option], Option], rows: set[int]) -> Problem:
+def _with_pool(problem: Problem, r: int, pool: Options) -> Problem:
     """The problem with options changed; those that now keep or break their tau_crit move over."""
-    from syncline_design.choice.table import with_limits
-
-    def pooled(table: RoleTable) -> RoleTable:
-        back = tuple(one.option for one in table.excluded if one.option is not None)
-        options = tuple(change(option) for option in (*table.options, *back))
-        rest = tuple(one for one in table.excluded if one.option is None)
-        return replace(table, options=options, excluded=rest)
-
-    roles = tuple(pooled(t) if r in rows else t for r, t in enumerate(problem.roles))
-    open_limits = replace(problem.limits, sync=math.inf)
-    return with_limits(replace(problem, roles=roles, limits=open_limits), problem.limits)
+    table = problem.roles[r].with_pool(pool, problem.limits.sync)
+    return replace(problem, roles=(*problem.roles[:r], table, *problem.roles[r + 1 :]))
 
 
 def _tau_slack(problem: Problem, design: Design, r: int) -> Slack:
@@ -151,21 +151,23 @@ def _tau_slack(problem: Problem, design: Design, r: int) -> Slack:
                 None if fails is None else float(fails), kind, None)  # fmt: skip
 
     def changed(value: float) -> Problem:
-        return _with_method(problem, r, own.method, Fraction(value))
+        return _with_method(problem, r, own, Fraction(value))
 
     sure = not limits and problem.judge is None
     return _with_payload(row, problem, design, changed, fails_never=sure)
 
 
-def _with_method(problem: Problem, r: int, method: str, tau_s: Fraction) -> Problem:
+def _with_method(problem: Problem, r: int, own: Option, tau_s: Fraction) -> Problem:
     """The problem with the error of one method in one role set, whatever primitive it stamps."""
 
     def grown(option: Option) -> Option:
-        if option.method != method:
+        if option.method != own.method:
             return option
         return replace(option, tau_s=float(tau_s), exact_tau_s=tau_s)
 
-    return _with_options(problem, grown, {r})
+    pool = problem.roles[r].pool()
+    rows = pool.method == pool.method[pool.place_of(own.names)]
+    return _with_pool(problem, r, pool.changed(rows, grown, tau=float(tau_s)))
 
 
 def _tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
@@ -230,10 +232,10 @@ def same_design(problem: Problem, design: Design, other: Problem) -> Design | No
     """The design of the same names in another problem; None where an option is gone."""
     places = []
     for table, option in zip(other.roles, chosen_options(problem, design), strict=True):
-        names = [one.names for one in table.options]
-        if option.names not in names:
+        place = table.options.place_of(option.names)
+        if place is None:
             return None
-        places.append(names.index(option.names))
+        places.append(place)
     return Design(tuple(places), design.clocks)
 
 
@@ -305,7 +307,7 @@ def _chosen(problem: Problem) -> Design | None:
     if problem.judge is None:
         whole = narrowed(
             problem,
-            [range(len(table.options)) for table in problem.roles],
+            [np.arange(len(table.options)) for table in problem.roles],
             [range(len(table.clocks)) for table in problem.vehicles],
         )
         return best_of(whole, in_force())
@@ -316,8 +318,8 @@ def _chosen(problem: Problem) -> Design | None:
 def _is_sole(problem: Problem) -> bool:
     """Whether there is one payload only, sync limit or not."""
     for table in problem.roles:
-        pool = [*table.options, *(o.option for o in table.excluded if o.option is not None)]
-        if len({(option.sensor, option.method) for option in pool}) > 1:
+        pool = table.pool()
+        if len(set(zip(pool.sensor.tolist(), pool.method.tolist(), strict=True))) > 1:
             return False
     return True
 

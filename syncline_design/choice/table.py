@@ -7,89 +7,25 @@ these tables from a loaded spec.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal, Protocol
 
+import numpy as np
+
+from syncline_design.choice.options import (
+    Exclusions,
+    Options,
+    Requires,
+    ResourceName,
+    Resources,
+    exactly,
+)
 from syncline_design.model.roles import RoleName
 
+NOTHING = Exclusions.of(())
 Objective = Literal["cost", "mass", "power", "error"]
-ResourceName = Literal["cost", "mass", "power"]
 SyncModel = Literal["syncline", "per_sensor"]
-RESOURCES: tuple[ResourceName, ...] = ("cost", "mass", "power")
-
-
-@dataclass(frozen=True, slots=True)
-class Resources:
-    """What a choice uses up, exactly as written; None: the catalog does not say."""
-
-    cost: Fraction | None = None  # in the spec's currency
-    mass: Fraction | None = None  # kg
-    power: Fraction | None = None  # W
-
-    def of(self, name: ResourceName) -> Fraction | None:
-        """The amount of one resource."""
-        if name == "cost":
-            return self.cost
-        return self.mass if name == "mass" else self.power
-
-
-@dataclass(frozen=True, slots=True)
-class Option:
-    """One (sensor, primitive, timestamping method) for a role, every constant resolved."""
-
-    sensor: str
-    primitive: str
-    method: str
-    sensor_error_m: float  # this sensor's term of the roof
-    tau_s: float  # bound of its timestamp error, with what known effects add
-    tau_crit_s: float  # inf when motion does not matter
-    timeline: Literal["host", "utc"]
-    resources: Resources  # sensor plus timestamping, per sensor
-    requires: tuple[tuple[str, int], ...] = ()  # (infrastructure id, channels)
-    exact_error_m: Fraction | None = None
-    exact_tau_s: Fraction | None = None
-    systematic_m: float = 0.0  # known effects whose size hangs on this sensor
-    exact_systematic_m: Fraction | None = None
-    noise_systematic_m: Fraction = Fraction(0)  # the share of it that is in proportion to the noise
-    own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
-
-    @property
-    def names(self) -> tuple[str, str, str]:
-        """What tells this option from the others of its role; ties are broken by it."""
-        return (self.sensor, self.primitive, self.method)
-
-    def error(self) -> Fraction:
-        """Sensor error [m], exactly."""
-        return exactly(self.sensor_error_m, self.exact_error_m)
-
-    def tau(self) -> Fraction:
-        """Bound of the timestamp error [s], exactly."""
-        return exactly(self.tau_s, self.exact_tau_s)
-
-    def systematic(self) -> Fraction:
-        """Known systematic error that comes with this sensor [m], exactly."""
-        return exactly(self.systematic_m, self.exact_systematic_m)
-
-
-@dataclass(frozen=True, slots=True)
-class Excluded:
-    """A candidate removed before the choice, with the reason in words and by how much it misses.
-
-    primitive, method: empty where the reason is the sensor's.
-    """
-
-    sensor: str
-    primitive: str
-    method: str
-    reason: str
-    ratio: float | None = None  # tau / tau_crit where that is the reason
-    option: Option | None = None  # what it would be, were the sync limit relaxed
-    code: str = "primitive"
-    figure: float | str | None = None  # what the entry says
-    limit: float | str | None = None  # what is asked of it
-    impossible: tuple[Option, ...] = ()  # what cannot work here, whatever limit is relaxed
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,8 +36,26 @@ class RoleTable:
     stage_name: str
     role: RoleName
     vehicle: int
-    options: tuple[Option, ...]
-    excluded: tuple[Excluded, ...] = ()
+    options: Options
+    excluded: Exclusions = NOTHING
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.options, Options):  # given one by one
+            object.__setattr__(self, "options", Options.of(self.options))
+        if not isinstance(self.excluded, Exclusions):
+            object.__setattr__(self, "excluded", Exclusions.of(self.excluded))
+
+    def pool(self) -> Options:
+        """The options with those that break their own tau_crit."""
+        return self.options.joined(self.excluded.poor)
+
+    def with_pool(self, pool: Options, limit: float) -> RoleTable:
+        """The table with these options, as far as they keep their own tau_crit times a limit."""
+        if np.any(np.diff(pool.rank) < 0):
+            pool = pool.take(pool.by_name())
+        keeps = pool.keep_own_tau_crit(limit)
+        kept, poor = pool.parted(keeps)
+        return replace(self, options=kept, excluded=Exclusions.in_turn(self.excluded.rest, poor))
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +65,7 @@ class ClockOption:
     id: str | None
     offset_bound_s: float
     resources: Resources
-    requires: tuple[tuple[str, int], ...] = ()
+    requires: Requires = ()
     exact_offset_s: Fraction | None = None
 
     def offset(self) -> Fraction:
@@ -217,8 +171,8 @@ class Judge(Protocol):
         """How often a search ended because too many designs had been simulated."""
         ...
 
-    def hopeless(self, problem: Problem, role: int, option: Option) -> bool:
-        """Whether a sensor's noise alone already fails a limit, whatever it is combined with."""
+    def hopeless(self, problem: Problem, role: int, place: int) -> bool:
+        """Whether an option's sensor alone, by its noise, fails a limit whatever joins it."""
         ...
 
     def judge(self, problem: Problem, design: Design) -> Judgement:
@@ -276,49 +230,26 @@ class Design:
     clocks: tuple[int, ...]
 
 
-def exactly(value: float, fraction: Fraction | None) -> Fraction:
-    """The exact figure behind a float: the fraction where there is one, else the float itself."""
-    return Fraction(value) if fraction is None else fraction
-
-
 def with_limits(problem: Problem, limits: Limits) -> Problem:
     """The same problem under other limits; a relaxed sync limit brings excluded options back."""
     if limits.sync == problem.limits.sync:
         return replace(problem, limits=limits)
-    roles = tuple(_under_sync_limit(table, limits.sync) for table in problem.roles)
+    roles = tuple(table.with_pool(table.pool(), limits.sync) for table in problem.roles)
     return replace(problem, roles=roles, limits=limits)
-
-
-def sync_ratio(option: Option) -> float:
-    """tau / tau_crit of one option, rounded once; 0 where motion does not matter."""
-    if option.tau_crit_s == float("inf") or option.tau_s == 0.0:
-        return 0.0
-    if option.own_rate_mps is not None:
-        caused, error = option.tau() * option.own_rate_mps, option.error()
-        return float(caused / error) if error > 0 else float("inf")
-    return option.tau_s / option.tau_crit_s if option.tau_crit_s > 0.0 else float("inf")
-
-
-def breaks_own_tau_crit(option: Option, ratio: float) -> Excluded:
-    """The record of an option whose timestamps are too poor for its own noise."""
-    reason = (
-        f"its timestamp error reaches {ratio:.3g} times its own tau_crit: the sensor would be "
-        "limited by its timestamps, not by its noise"
-    )
-    limit = option.tau_s / ratio if 0.0 < ratio < math.inf else option.tau_crit_s
-    return Excluded(
-        *option.names, reason, ratio, option, code="tau", figure=option.tau_s, limit=limit
-    )
 
 
 def with_impossible(problem: Problem) -> Problem:
     """The problem with what cannot work put back: what a spec that pins it has to be judged by."""
     roles = []
     for table in problem.roles:
-        back = [option for one in table.excluded for option in one.impossible]
-        options = tuple(sorted((*table.options, *back), key=lambda option: option.names))
-        rest = tuple(one for one in table.excluded if not one.impossible)
-        roles.append(replace(table, options=options, excluded=rest))
+        back = [option for one in table.excluded.rest for option in one.impossible]
+        if not back:
+            roles.append(table)
+            continue
+        options = Options.of(sorted((*table.options, *back), key=lambda option: option.names))
+        rest = [one for one in table.excluded.rest if not one.impossible]
+        excluded = Exclusions.in_turn(rest, table.excluded.poor)
+        roles.append(replace(table, options=options, excluded=excluded))
     vehicles = tuple(
         replace(v, clocks=(*v.clocks, *(one.clock for one in v.excluded)), excluded=())
         for v in problem.vehicles
@@ -328,24 +259,6 @@ def with_impossible(problem: Problem) -> Problem:
 
 def is_empty(problem: Problem) -> bool:
     """Whether a role has no option, or a vehicle no clock, so that there is no design at all."""
-    return not all(role.options for role in problem.roles) or not all(
+    return not all(len(role.options) for role in problem.roles) or not all(
         vehicle.clocks for vehicle in problem.vehicles
-    )
-
-
-def _under_sync_limit(table: RoleTable, limit: float) -> RoleTable:
-    """Options and exclusions of a role sorted anew under another sync limit."""
-    pool = [(option, sync_ratio(option)) for option in table.options]
-    pool += [
-        (one.option, one.ratio)
-        for one in table.excluded
-        if one.option is not None and one.ratio is not None
-    ]
-    pool.sort(key=lambda entry: entry[0].names)
-    keep = tuple(option for option, ratio in pool if ratio < limit)
-    out = tuple(breaks_own_tau_crit(option, ratio) for option, ratio in pool if not ratio < limit)
-    return replace(
-        table,
-        options=keep,
-        excluded=(*(one for one in table.excluded if one.option is None), *out),
     )

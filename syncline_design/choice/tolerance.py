@@ -18,10 +18,11 @@ from typing import Literal
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import chosen_options, evaluate
+from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
 from syncline_design.choice.problem import build_problem, selection_of, with_everything
 from syncline_design.choice.slack import payload
-from syncline_design.choice.table import RESOURCES, Design, Problem
+from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import (
     Build,
     SheetFigure,
@@ -93,8 +94,9 @@ def _errors(
     everything = with_everything(build(case))
     places = []
     for table, one in zip(everything.roles, selected, strict=True):
-        names = [option.names for option in table.options]
-        places.append(names.index((one.sensor, one.primitive, one.method)))
+        place = table.options.place_of((one.sensor, one.primitive, one.method))
+        assert place is not None
+        places.append(place)
     design = Design(tuple(places), (0,) * len(everything.vehicles))
     return everything, design, [o.error() for o in chosen_options(everything, design)]
 

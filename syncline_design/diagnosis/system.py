@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from syncline_design.choice.problem import build_problem, sole_design, system_of
+from syncline_design.choice.chosen_system import system_of
+from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis.gross import Reread, mended
 from syncline_design.effects.acting import Acting, acting_of
 from syncline_design.logs.columns import ISO_TIMES, known_names, shown

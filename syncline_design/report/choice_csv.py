@@ -8,8 +8,9 @@ from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
 
 from syncline_design.choice.evaluate import chosen_clocks, chosen_options, evaluate
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
-from syncline_design.choice.table import Design, Problem, ResourceName
+from syncline_design.choice.table import Design, Problem
 from syncline_design.verdict.optimise import Optimised
 
 FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")

@@ -7,9 +7,10 @@ from fractions import Fraction
 
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.evaluate import chosen_options, evaluate
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import ROADS, FrontPoint, PriceStep
 from syncline_design.choice.slack import Slack
-from syncline_design.choice.table import Design, Problem, ResourceName
+from syncline_design.choice.table import Design, Problem
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Document,

@@ -6,7 +6,6 @@ a what-if (another distance, another limit) meets the same random numbers as the
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from datetime import date
 from fractions import Fraction
@@ -14,9 +13,9 @@ from typing import Any, NoReturn
 
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
+from syncline_design.choice.options import Option
 from syncline_design.choice.outcome import Unfinished
-from syncline_design.choice.problem import with_everything
-from syncline_design.choice.table import Design, Judge, Judgement, Option, Problem
+from syncline_design.choice.table import Design, Judge, Judgement, Problem, RoleTable
 from syncline_design.machine.input_files import FileContent
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
@@ -104,16 +103,19 @@ class Simulations:
         if not wanted:
             return problem
         limits = tuple((r.id, float(r.limit)) for r in wanted)
-        figures = {
-            (table.stage_name, table.role, option.names): (option.error(), option.tau())
-            for table in with_everything(problem).roles
-            for option in table.options
-        }
-        return replace(problem, judge=_SpecJudge(self, case, tuple(wanted), limits, figures))
+        return replace(problem, judge=_SpecJudge(self, case, tuple(wanted), limits, problem))
 
     def _is_waived(self, requirement: Requirement) -> bool:
         waiver = requirement.waiver
         return waiver is not None and waiver.holds_on(self.today or date.today())
+
+
+def _as_asked(table: RoleTable, option: Option) -> tuple[Fraction, Fraction]:
+    """Error [m] and tau [s] that an option of the same names has in a table."""
+    for options in (table.options, table.excluded.poor):
+        if (place := options.place_of(option.names)) is not None:
+            return options[place].error(), options[place].tau()
+    raise KeyError(option.names)
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,14 +126,14 @@ class _SpecJudge:
     case: Case
     requirements: tuple[Requirement, ...]
     limits: tuple[tuple[str, float], ...]
-    figures: Mapping[tuple[str, RoleName, tuple[str, str, str]], tuple[Fraction, Fraction]]
+    asked: Problem  # as the spec has it: a what-if may have grown an error or a tau
 
     @property
     def refusals(self) -> int:
         """How often a design was not simulated because the command had simulated too many."""
         return self.simulations.refusals
 
-    def hopeless(self, problem: Problem, role: int, option: Option) -> bool:
+    def hopeless(self, problem: Problem, role: int, place: int) -> bool:
         """Whether the noise of a sensor alone, with all else perfect, fails a limit by 1 %.
 
         Independent errors never make a symmetric, unimodal one less dispersed (T. W. Anderson,
@@ -141,7 +143,7 @@ class _SpecJudge:
         if self._noise_is_changed():
             return False
         places = [0] * len(problem.roles)
-        places[role] = problem.roles[role].options.index(option)
+        places[role] = place
         design = Design(tuple(places), (0,) * len(problem.vehicles))
         table = problem.roles[role]
         bare = _noise_alone(system_of(self.case, problem, design), table.stage, table.role)
@@ -170,9 +172,11 @@ class _SpecJudge:
     def _system(self, problem: Problem, design: Design) -> System:
         """The design's system; an option whose error or tau was grown has its sensor's grown."""
         system = system_of(self.case, problem, design)
-        for table, place in zip(problem.roles, design.options, strict=True):
+        for table, whole, place in zip(
+            problem.roles, self.asked.roles, design.options, strict=True
+        ):
             option = table.options[place]
-            error, tau = self.figures[table.stage_name, table.role, option.names]
+            error, tau = _as_asked(whole, option)
             noise = option.error() / error if error else Fraction(1)
             shift = option.tau() / tau if tau else Fraction(1)
             if noise != 1 or shift != 1:

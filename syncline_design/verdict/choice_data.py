@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.effect_tables import design_budget
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
-from syncline_design.choice.table import Design, Problem, ResourceName
+from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Case
 from syncline_design.spec.references import parts_in_use
@@ -122,8 +124,9 @@ def left_out(case: Case, problem: Problem, resource: ResourceName) -> tuple[str,
     """
     usable = {f"clock {clock.id}" for vehicle in problem.vehicles for clock in vehicle.clocks}
     usable |= {f"shared hardware {item.id}" for item in problem.infrastructure}
-    for option in (option for table in problem.roles for option in table.options):
-        usable |= {f"sensor {option.sensor}", f"timestamping method {option.method}"}
+    for options in (table.options for table in problem.roles):
+        usable |= {f"sensor {one.sensor}" for one in options.first_of_each(options.sensor)}
+        usable |= {f"timestamping method {o.method}" for o in options.first_of_each(options.method)}
     return tuple(
         label
         for _, label, entry in parts_in_use(case)
@@ -145,8 +148,10 @@ def ruled_out(problem: Problem) -> tuple[tuple[Exclusion, ...], int]:
 
     One row a sensor where the reason is the sensor's, else one an option; then clocks.
     """
-    rows = [*_excluded_options(problem), *_excluded_clocks(problem)]
-    return tuple(rows[:MOST_EXCLUDED]), len(rows)
+    count = sum(len(table.excluded) for table in problem.roles)
+    count += sum(len(vehicle.excluded) for vehicle in problem.vehicles)
+    rows = itertools.chain(_excluded_options(problem), _excluded_clocks(problem))
+    return tuple(itertools.islice(rows, MOST_EXCLUDED)), count
 
 
 def _excluded_options(problem: Problem) -> Iterator[Exclusion]:

@@ -8,7 +8,8 @@ from fractions import Fraction
 from typing import Any
 
 from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_options, evaluate
-from syncline_design.choice.table import Design, Option, Problem
+from syncline_design.choice.options import Option
+from syncline_design.choice.table import Design, Problem
 from syncline_design.model.budget import Budget, SensorRow
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName

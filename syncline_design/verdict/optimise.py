@@ -11,6 +11,7 @@ from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.decide import best
 from syncline_design.choice.explain import explain
 from syncline_design.choice.front import front, staircase
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import (
     Explanation,
     FrontPoint,
@@ -21,7 +22,7 @@ from syncline_design.choice.outcome import (
 )
 from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.choice.slack import Slack, slack_ledger
-from syncline_design.choice.table import Design, Limits, Problem, ResourceName
+from syncline_design.choice.table import Design, Limits, Problem
 from syncline_design.choice.tolerance import (
     Measurement,
     ToleranceVerdict,

@@ -1,0 +1,437 @@
+"""What a role can be: options as columns, an Option itself made only where one is asked for.
+
+The columns are floats within a few units in the last place of the exact figures, and whole numbers
+where sums decide; whatever lies closer to a limit than `MARGIN` is decided on the exact option.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields, replace
+from fractions import Fraction
+from typing import Any, Literal, overload
+
+import numpy as np
+from numpy.typing import NDArray
+
+Column = NDArray[Any]
+Floats = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+ResourceName = Literal["cost", "mass", "power"]
+RESOURCES: tuple[ResourceName, ...] = ("cost", "mass", "power")
+MARGIN = 1e-12  # sums of floats are trusted to this; what lies closer to a limit is decided exactly
+INT64_ROOM = 2**61
+Requires = tuple[tuple[str, int], ...]  # (infrastructure id, channels)
+Names = tuple[str, str, str]  # sensor, primitive, method
+
+
+@dataclass(frozen=True, slots=True)
+class Resources:
+    """What a choice uses up, exactly as written; None: the catalog does not say."""
+
+    cost: Fraction | None = None  # in the spec's currency
+    mass: Fraction | None = None  # kg
+    power: Fraction | None = None  # W
+
+    def of(self, name: ResourceName) -> Fraction | None:
+        """The amount of one resource."""
+        if name == "cost":
+            return self.cost
+        return self.mass if name == "mass" else self.power
+
+
+@dataclass(frozen=True, slots=True)
+class Option:
+    """One (sensor, primitive, timestamping method) for a role, every constant resolved."""
+
+    sensor: str
+    primitive: str
+    method: str
+    sensor_error_m: float  # this sensor's term of the roof
+    tau_s: float  # bound of its timestamp error, with what known effects add
+    tau_crit_s: float  # inf when motion does not matter
+    timeline: Literal["host", "utc"]
+    resources: Resources  # sensor plus timestamping, per sensor
+    requires: Requires = ()
+    exact_error_m: Fraction | None = None
+    exact_tau_s: Fraction | None = None
+    systematic_m: float = 0.0  # known effects whose size hangs on this sensor
+    exact_systematic_m: Fraction | None = None
+    noise_systematic_m: Fraction = Fraction(0)  # the share of it that is in proportion to the noise
+    own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
+
+    @property
+    def names(self) -> Names:
+        """What tells this option from the others of its role; ties are broken by it."""
+        return (self.sensor, self.primitive, self.method)
+
+    def error(self) -> Fraction:
+        """Sensor error [m], exactly."""
+        return exactly(self.sensor_error_m, self.exact_error_m)
+
+    def tau(self) -> Fraction:
+        """Bound of the timestamp error [s], exactly."""
+        return exactly(self.tau_s, self.exact_tau_s)
+
+    def systematic(self) -> Fraction:
+        """Known systematic error that comes with this sensor [m], exactly."""
+        return exactly(self.systematic_m, self.exact_systematic_m)
+
+    def added_m(self) -> float:
+        """What the sensor adds to the total [m], its systematic part included."""
+        if self.systematic_m == 0.0:
+            return self.sensor_error_m
+        return float(self.error() + self.systematic())
+
+
+def exactly(value: float, fraction: Fraction | None) -> Fraction:
+    """The exact figure behind a float: the fraction where there is one, else the float itself."""
+    return Fraction(value) if fraction is None else fraction
+
+
+def sync_ratio(option: Option) -> float:
+    """tau / tau_crit of one option, rounded once; 0 where motion does not matter."""
+    if option.tau_crit_s == float("inf") or option.tau_s == 0.0:
+        return 0.0
+    if option.own_rate_mps is not None:
+        caused, error = option.tau() * option.own_rate_mps, option.error()
+        return float(caused / error) if error > 0 else float("inf")
+    return option.tau_s / option.tau_crit_s if option.tau_crit_s > 0.0 else float("inf")
+
+
+@dataclass(frozen=True, slots=True)
+class Spent:
+    """One resource of many choices in whole multiples of 1/denominator, so that sums are exact.
+
+    whole: infinite where the catalog does not say; int64 where every amount is known and fits.
+    """
+
+    whole: Column
+    denominator: int
+
+    @classmethod
+    def of(cls, amounts: Sequence[Fraction | None]) -> Spent:
+        """The amounts in the least unit that holds them all."""
+        if all(amount is not None and not amount for amount in amounts):
+            return cls(np.zeros(len(amounts), dtype=np.int64), 1)
+        pairs = [(math.inf, 1) if a is None else a.as_integer_ratio() for a in amounts]
+        unit = math.lcm(*{bottom for _, bottom in pairs})
+        tops = [top if top == math.inf else top * (unit // bottom) for top, bottom in pairs]
+        return cls(whole_column(tops), unit)
+
+    @property
+    def known(self) -> bool:
+        """Whether every amount is given."""
+        return self.whole.dtype != object or not any(top == math.inf for top in self.whole)
+
+    @property
+    def largest(self) -> int:
+        """The largest known amount, without its sign, in whole units."""
+        if self.whole.dtype != object:
+            return int(np.abs(self.whole).max(initial=0))
+        return max((abs(top) for top in self.whole.tolist() if top != math.inf), default=0)
+
+    def take(self, rows: Indices | Bools) -> Spent:
+        """Some of the choices."""
+        return Spent(self.whole[rows], self.denominator)
+
+    def order(self) -> Column:
+        """Figures in the order of the amounts, for sorting."""
+        return np.unique(self.whole, return_inverse=True)[1]
+
+    def followed_by(self, other: Spent) -> Spent:
+        """These choices and then others."""
+        unit = math.lcm(self.denominator, other.denominator)
+        return Spent(np.concatenate([self.scaled(unit), other.scaled(unit)]), unit)
+
+    def plus(self, other: Spent) -> Spent:
+        """Sums of two choices each."""
+        unit = math.lcm(self.denominator, other.denominator)
+        return Spent(_sum(self.scaled(unit), other.scaled(unit)), unit)
+
+    def scaled(self, unit: int, dtype: Any = None) -> Column:
+        """The amounts in whole multiples of 1/unit."""
+        factor = unit // self.denominator
+        fits = self.whole.dtype != object and self.largest * factor < INT64_ROOM
+        kind = dtype or (np.int64 if fits else object)
+        column = self.whole.astype(kind, copy=False)
+        return column if factor == 1 else np.asarray(column * factor)
+
+
+def whole_column(tops: Sequence[int | float]) -> Column:
+    """Whole numbers as a column, of Python's own where int64 does not hold their sums."""
+    fits = all(top != math.inf and abs(top) < INT64_ROOM for top in tops)
+    return np.array(tops, dtype=np.int64 if fits else object)
+
+
+def _sum(one: Column, other: Column) -> Column:
+    if one.dtype == object or other.dtype == object:
+        return np.asarray(one.astype(object) + other.astype(object))
+    return np.asarray(one + other)  # both below 2^61
+
+
+Make = Callable[[int], Option]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Options(Sequence[Option]):
+    """Options of one role by columns.
+
+    make: the option at a place of the source; at: that place.  rank: place in the order of names.
+    error, added: sensor error alone, and with its systematic part [m]; crit: its own tau_crit [s].
+    sensor, method: numbers that tell them apart.  needs: kinds of `requires`; need: which.
+    """
+
+    make: Make
+    at: Indices
+    rank: Indices
+    sensor: Indices
+    method: Indices
+    error: Floats
+    added: Floats
+    tau: Floats
+    crit: Floats
+    host: Bools
+    spends: tuple[Spent, ...]
+    needs: tuple[Requires, ...]
+    need: Indices
+
+    @classmethod
+    def of(cls, options: Sequence[Option]) -> Options:
+        """Columns of options that are there."""
+        count = len(options)
+        names = [option.names for option in options]
+        needs = tuple(dict.fromkeys(option.requires for option in options))
+        spends = tuple(Spent.of([o.resources.of(name) for o in options]) for name in RESOURCES)
+        return cls(
+            options.__getitem__,
+            np.arange(count),
+            ranked(names),
+            numbered([name[0] for name in names]),
+            numbered([name[2] for name in names]),
+            _floats(o.sensor_error_m for o in options),
+            _floats(o.added_m() for o in options),
+            _floats(o.tau_s for o in options),
+            _floats(o.tau_crit_s for o in options),
+            np.array([o.timeline == "host" for o in options], dtype=bool),
+            spends,
+            needs,
+            np.array([needs.index(o.requires) for o in options], dtype=np.intp),
+        )
+
+    def __len__(self) -> int:
+        return len(self.at)
+
+    @overload
+    def __getitem__(self, place: int) -> Option: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[Option, ...]: ...
+    def __getitem__(self, place: int | slice) -> Option | tuple[Option, ...]:
+        if isinstance(place, slice):
+            return tuple(map(self.make, self.at[place].tolist()))
+        return self.make(int(self.at[place]))
+
+    def __iter__(self) -> Iterator[Option]:
+        return map(self.make, self.at.tolist())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Options) and tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def spent(self, name: ResourceName) -> Spent:
+        """One resource."""
+        return self.spends[RESOURCES.index(name)]
+
+    def channels(self, item: str) -> Column:
+        """Channels of one piece of shared hardware that each option takes."""
+        each = [sum(count for name, count in kind if name == item) for kind in self.needs]
+        return np.array(each, dtype=np.int64)[self.need]
+
+    @property
+    def required(self) -> set[Requires]:
+        """What the options require, each kind once."""
+        return {self.needs[kind] for kind in np.unique(self.need).tolist()}
+
+    def first_of_each(self, numbers: Indices) -> tuple[Option, ...]:
+        """The first option of each sensor, or of each method."""
+        _, first = np.unique(numbers, return_index=True)
+        return tuple(self[place] for place in np.sort(first).tolist())
+
+    def take(self, rows: Indices | Bools | Sequence[int]) -> Options:
+        """Some of the options."""
+        chosen = np.asarray(rows) if len(rows) else np.zeros(0, dtype=np.intp)
+        changes: dict[str, Any] = {name: getattr(self, name)[chosen] for name in _ARRAYS}
+        return replace(self, spends=tuple(s.take(chosen) for s in self.spends), **changes)
+
+    def parted(self, keeps: Bools) -> tuple[Options, Options]:
+        """The options that are kept, and the others."""
+        if keeps.all():
+            return self, self.take(())
+        return self.take(keeps), self.take(~keeps)
+
+    def by_name(self) -> Indices:
+        """Rows in the order of their names."""
+        return np.argsort(self.rank, kind="stable")
+
+    def place_of(self, names: Names) -> int | None:
+        """The row of that name; None where there is none."""
+        order = self.by_name()
+        low, high = 0, len(order)
+        while low < high:
+            middle = (low + high) // 2
+            if self[int(order[middle])].names < names:
+                low = middle + 1
+            else:
+                high = middle
+        found = low < len(order) and self[int(order[low])].names == names
+        return int(order[low]) if found else None
+
+    def joined(self, other: Options) -> Options:
+        """These options and others of the role."""
+        if not len(other):
+            return self
+        if other.make != self.make or other.needs is not self.needs:
+            return Options.of((*self, *other))
+        changes: dict[str, Any] = {
+            name: np.concatenate([getattr(self, name), getattr(other, name)]) for name in _ARRAYS
+        }
+        spends = tuple(map(Spent.followed_by, self.spends, other.spends))
+        return replace(self, spends=spends, **changes)
+
+    def changed(
+        self, rows: Indices | Bools, change: Callable[[Option], Option], **columns: float
+    ) -> Options:
+        """The options with some of them changed; columns: their new figures, the same for all.
+
+        change leaves alone what is not meant.
+        """
+        make = self.make
+        out: dict[str, Any] = {}
+        for name, value in columns.items():
+            out[name] = getattr(self, name).copy()
+            out[name][rows] = value
+        return replace(self, make=functools.cache(lambda place: change(make(place))), **out)
+
+    def keep_own_tau_crit(self, limit: float) -> Bools:
+        """Which options keep tau < limit * tau_crit; close calls are decided exactly."""
+        if math.isinf(limit):
+            return np.asarray(self._own_ratios() < limit)
+        ratios = self._own_ratios()
+        keeps = np.asarray(ratios < limit * (1.0 - MARGIN))
+        for row in np.flatnonzero(~keeps & (ratios <= limit * (1.0 + MARGIN))).tolist():
+            keeps[row] = sync_ratio(self[row]) < limit
+        return keeps
+
+    def _own_ratios(self) -> Floats:
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratios = self.tau / self.crit
+        return np.where(np.isinf(self.crit) | (self.tau == 0.0), 0.0, ratios)
+
+
+_ARRAYS = tuple(one.name for one in fields(Options) if one.name not in ("make", "spends", "needs"))
+
+
+def _floats(values: Iterable[float]) -> Floats:
+    return np.fromiter(values, dtype=np.float64)
+
+
+def numbered(names: Sequence[str]) -> Indices:
+    """A number for each name, in the order of their coming."""
+    found: dict[str, int] = {}
+    return np.array([found.setdefault(name, len(found)) for name in names], dtype=np.intp)
+
+
+def ranked(names: Sequence[Any]) -> Indices:
+    """Place of each in their order."""
+    places = np.arange(len(names))
+    out = np.empty_like(places)
+    out[sorted(range(len(names)), key=names.__getitem__)] = places
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Excluded:
+    """A candidate removed before the choice, with the reason in words and by how much it misses.
+
+    primitive, method: empty where the reason is the sensor's.
+    """
+
+    sensor: str
+    primitive: str
+    method: str
+    reason: str
+    ratio: float | None = None  # tau / tau_crit where that is the reason
+    option: Option | None = None  # what it would be, were the sync limit relaxed
+    code: str = "primitive"
+    figure: float | str | None = None  # what the entry says
+    limit: float | str | None = None  # what is asked of it
+    impossible: tuple[Option, ...] = ()  # what cannot work here, whatever limit is relaxed
+
+
+def breaks_own_tau_crit(option: Option) -> Excluded:
+    """The record of an option whose timestamps are too poor for its own noise."""
+    ratio = sync_ratio(option)
+    reason = (
+        f"its timestamp error reaches {ratio:.3g} times its own tau_crit: the sensor would be "
+        "limited by its timestamps, not by its noise"
+    )
+    limit = option.tau_s / ratio if 0.0 < ratio < math.inf else option.tau_crit_s
+    return Excluded(
+        *option.names, reason, ratio, option, code="tau", figure=option.tau_s, limit=limit
+    )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Exclusions(Sequence[Excluded]):
+    """What a role cannot be, each record made where it is asked for.
+
+    poor: options that break their own tau_crit; rest: everything else.  order: places in the
+    two, one after the other.
+    """
+
+    rest: Sequence[Excluded]
+    poor: Options
+    order: Indices
+
+    @classmethod
+    def of(cls, records: Sequence[Excluded]) -> Exclusions:
+        """From records that are there."""
+        poor = [one.option for one in records if one.option is not None]
+        rest = [one for one in records if one.option is None]
+        first, second = itertools.count(), itertools.count(len(rest))
+        order = [next(first if one.option is None else second) for one in records]
+        return cls(rest, Options.of(poor), np.array(order, dtype=np.intp))
+
+    @classmethod
+    def in_turn(cls, rest: Sequence[Excluded], poor: Options) -> Exclusions:
+        """The rest first."""
+        return cls(rest, poor, np.arange(len(rest) + len(poor)))
+
+    def __len__(self) -> int:
+        return len(self.order)
+
+    @overload
+    def __getitem__(self, place: int) -> Excluded: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[Excluded, ...]: ...
+    def __getitem__(self, place: int | slice) -> Excluded | tuple[Excluded, ...]:
+        if isinstance(place, slice):
+            return tuple(map(self._at, self.order[place].tolist()))
+        return self._at(int(self.order[place]))
+
+    def _at(self, place: int) -> Excluded:
+        count = len(self.rest)
+        return self.rest[place] if place < count else breaks_own_tau_crit(self.poor[place - count])
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Exclusions) and tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
