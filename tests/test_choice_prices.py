@@ -19,7 +19,7 @@ from syncline_design.choice.evaluate import broken, evaluate
 from syncline_design.choice.front import front, staircase
 from syncline_design.choice.outcome import Choice, Infeasible, PriceStep
 from syncline_design.choice.problem import build_problem, selection_of
-from syncline_design.choice.slack import Slack, payload, same_design, slack_ledger
+from syncline_design.choice.slack import Slack, payload, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem
 from syncline_design.choice.tolerance import measure_next, tolerance_verdict
 from syncline_design.choice.variations import (
@@ -29,6 +29,7 @@ from syncline_design.choice.variations import (
     with_figure,
     with_platform_figure,
 )
+from syncline_design.choice.what_if import same_design
 from syncline_design.machine.records import read_as
 from syncline_design.model.known import Known
 from syncline_design.model.quantity import Dimension

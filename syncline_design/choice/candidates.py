@@ -72,6 +72,10 @@ class Motion:
     turn: Fraction
     ranges: bool
 
+    def lets_in(self, role: RoleName) -> bool:
+        """Whether a role's noise enters the error: attitude alone does not."""
+        return self.ranges or role == "position"
+
     @property
     def turning(self) -> Fraction:
         """d omega_max [m/s]."""
@@ -81,6 +85,18 @@ class Motion:
     def rate(self) -> Fraction:
         """v_max + d omega_max [m/s]."""
         return self.speed + self.turning
+
+
+def sensor_error(sensor: SensorEntry, role: RoleName, motion: Motion) -> Fraction:
+    """A role's term of the sensor-induced error [m] (eq. sensor_error_ub)."""
+    if not motion.lets_in(role):
+        return Fraction(0)
+    if role == "position":
+        return norm(sensor.sigma_position or 0.0, 3)
+    if role == "attitude":
+        return norm(sensor.sigma_attitude or 0.0, 3) * motion.distance
+    bearing = norm(sensor.sigma_bearing or 0.0, 2) * motion.distance
+    return fraction_of(sensor.sigma_range or 0.0) + bearing
 
 
 def motion_of(stage: StageCase) -> Motion:
@@ -158,20 +174,15 @@ class Candidates:
         return table.with_pool(pool, sync_limit)
 
     @property
-    def _enters(self) -> bool:
-        """Whether the role's noise enters the error: attitude alone does not."""
-        return self.motion.ranges or self.role.role == "position"
-
-    @property
     def _rate(self) -> Fraction | None:
         """What its own tau_crit is taken against [m/s]; None where motion does not matter."""
         rate = self.motion.speed if self.role.role == "position" else self.motion.rate
-        return rate if self._enters and rate > 0 else None
+        return rate if self.motion.lets_in(self.role.role) and rate > 0 else None
 
     def _figures(self) -> tuple[Floats, Floats, Floats]:
         """Of each sensor: its error, what it adds to the total [m] and its own tau_crit [s]."""
         error = self.fixed + self.turned * float(self.motion.distance)
-        if not self._enters:
+        if not self.motion.lets_in(self.role.role):
             error = np.zeros(len(error))
         added = error.copy()
         for place, one in enumerate(self.effects):
@@ -210,16 +221,8 @@ class Candidates:
             yield own.take(sensors).plus(stamp.take(ways))
 
     def _error(self, place: int) -> Fraction:
-        """A sensor's term of the sensor-induced error [m] (eq. sensor_error_ub)."""
-        sensor, role = self.role.sensors[place].entry, self.role.role
-        if not self._enters:
-            return Fraction(0)
-        if role == "position":
-            return norm(sensor.sigma_position or 0.0, 3)
-        if role == "attitude":
-            return norm(sensor.sigma_attitude or 0.0, 3) * self.motion.distance
-        bearing = norm(sensor.sigma_bearing or 0.0, 2) * self.motion.distance
-        return fraction_of(sensor.sigma_range or 0.0) + bearing
+        """A sensor's term of the sensor-induced error [m], exactly."""
+        return sensor_error(self.role.sensors[place].entry, self.role.role, self.motion)
 
     def __call__(self, row: int) -> Option:
         """The option of one row."""

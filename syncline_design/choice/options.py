@@ -293,6 +293,13 @@ class Options(Sequence[Option]):
         found = low < len(order) and self[int(order[low])].names == names
         return int(order[low]) if found else None
 
+    def place_like(self, other: Options, place: int) -> int | None:
+        """The row of the name that a row of other options has."""
+        if other.needs is not self.needs:  # another source
+            return self.place_of(other[place].names)
+        found = np.flatnonzero(self.rank == other.rank[place])
+        return int(found[0]) if len(found) else None
+
     def joined(self, other: Options) -> Options:
         """These options and others of the role."""
         if not len(other):

@@ -61,21 +61,27 @@ def build_problem(
         for role in stage.roles
     )
     vehicle_tables = tuple(_vehicle(case, name) for name in vehicles)
-    rate = sum((motion.rate for motion in motions), Fraction(0))
     fixed = sum((Fraction(value) for _, _, value in known.systematic), Fraction(0))
-    return Problem(
+    problem = Problem(
         roles=tables,
-        pairs=_pairs(tables, motions),
+        pairs=(),
         vehicles=vehicle_tables,
         infrastructure=tuple(_infrastructure(case, _required(tables, vehicle_tables))),
-        sync_rate_mps=float(rate),
+        sync_rate_mps=0.0,
         fixed_error_m=float(fixed),
         limits=limits,
         sync_model=spec.sync_model,
         objective=spec.objective,
-        exact_sync_rate_mps=rate,
         exact_fixed_error_m=fixed,
     )
+    return with_motions(problem, motions)
+
+
+def with_motions(problem: Problem, motions: Sequence[Motion]) -> Problem:
+    """The problem with the rates at which its stages move."""
+    rate = sum((motion.rate for motion in motions), Fraction(0))
+    pairs = _pairs(problem.roles, motions)
+    return replace(problem, pairs=pairs, sync_rate_mps=float(rate), exact_sync_rate_mps=rate)
 
 
 def selection_of(problem: Problem, design: Design) -> Selection:
@@ -140,7 +146,7 @@ def _role_table(
     return found.table(vehicles.index(stage.choice.vehicle_name), sync_limit)
 
 
-def _pairs(tables: tuple[RoleTable, ...], motions: list[Motion]) -> tuple[Pair, ...]:
+def _pairs(tables: tuple[RoleTable, ...], motions: Sequence[Motion]) -> tuple[Pair, ...]:
     """Pairs of timestamps that meet: (position, ranging) and (attitude, ranging) of each stage."""
     place = {(table.stage, table.role): r for r, table in enumerate(tables)}
     pairs = []

@@ -12,17 +12,13 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
-import numpy as np
-
 from syncline_design.choice.acceptable import judgement
+from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate, pair_bound
-from syncline_design.choice.narrowed import narrowed
-from syncline_design.choice.options import Option, Options
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime, Unfinished
-from syncline_design.choice.partition import best_of
 from syncline_design.choice.problem import build_problem
-from syncline_design.choice.table import Design, Problem
+from syncline_design.choice.table import NOTHING, Design, Problem
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
     Build,
@@ -31,7 +27,14 @@ from syncline_design.choice.variations import (
     quantity,
     with_platform_figure,
 )
-from syncline_design.machine.deadline import in_force
+from syncline_design.choice.what_if import (
+    Moving,
+    of_method,
+    of_sensor,
+    same_design,
+    with_method_tau,
+    with_sensor_error,
+)
 from syncline_design.machine.records import Record
 from syncline_design.spec.case import Case
 
@@ -71,26 +74,48 @@ def slack_ledger(
     A sensor whose noise enters no error (the attitude of a stage without ranging) has no such row.
     """
     rows: list[Slack] = []
+    asked = _Asked(problem, design, Beside(problem))
     for index, stage in enumerate(case.spec.stages):
         for r, table in enumerate(problem.roles):
             if table.stage == index:
                 if chosen_options(problem, design)[r].error() > 0:
-                    rows.append(_error_slack(problem, design, r))
-                rows.append(_tau_slack(problem, design, r))
+                    rows.append(_error_slack(asked, r))
+                rows.append(_tau_slack(asked, r))
+        what_if = _platform_what_if(case, problem, build, index)
         for figure in PLATFORM_FIGURES:
-            row = _platform_slack(case, problem, design, build, index, figure)
+            row = _platform_slack(
+                asked, float(platform_figure(case, index, figure)), figure, what_if
+            )
             rows += [replace(row, stage=stage.name)] if row else []
     return tuple(rows)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """What a ledger is of."""
+
+    problem: Problem
+    design: Design
+    beside: Beside
+
+    def alone(self) -> tuple[Problem, Design]:
+        """The problem with the design's options alone, whatever else there is to choose."""
+        roles = tuple(
+            replace(table, options=table.options.take([place]), excluded=NOTHING)
+            for table, place in zip(self.problem.roles, self.design.options, strict=True)
+        )
+        return replace(self.problem, roles=roles), Design((0,) * len(roles), self.design.clocks)
 
 
 Limit = tuple[Fraction, str]  # value at which a requirement of a kind breaks
 
 
-def _error_slack(problem: Problem, design: Design, r: int) -> Slack:
+def _error_slack(asked: _Asked, r: int) -> Slack:
     """A sensor error may grow by what is left of the accuracy limit; sync only gains from it.
 
     What known effects add in proportion to the noise grows with it.
     """
+    problem, design = asked.problem, asked.design
     table, own = problem.roles[r], chosen_options(problem, design)[r]
     limit, fails = problem.limits.accuracy_m, None
     if limit is not None:
@@ -98,76 +123,33 @@ def _error_slack(problem: Problem, design: Design, r: int) -> Slack:
         slope = 1 + own.noise_systematic_m / own.error()
         fails = float(own.error() + (Fraction(limit) - total) / slope)
 
+    rows = of_sensor(problem, r, design.options[r])
+
     def changed(value: float) -> Problem:
-        return _with_sensor(problem, r, own, Fraction(value))
+        return with_sensor_error(problem, r, rows, Fraction(value))
 
     row = Slack(f"{table.role} sensor error", table.stage_name, own.sensor_error_m, "m", fails,
                 None if fails is None else "accuracy", None)  # fmt: skip
     sure = limit is None and problem.judge is None
-    return _with_payload(row, problem, design, changed, fails_never=sure)
+    return _with_payload(row, asked, changed, fails_never=sure)
 
 
-def _with_sensor(problem: Problem, r: int, own: Option, error_m: Fraction) -> Problem:
-    """The problem with the error of one sensor in one role set; its exclusions are judged anew."""
-
-    def grown(option: Option) -> Option:
-        if option.sensor != own.sensor:
-            return option
-        ratio = error_m / option.error()
-        crit = option.tau_crit_s
-        crit = float(Fraction(crit) * ratio) if math.isfinite(crit) else crit
-        added = option.systematic() + option.noise_systematic_m * (ratio - 1)
-        return replace(
-            option,
-            sensor_error_m=float(error_m),
-            exact_error_m=error_m,
-            tau_crit_s=crit,
-            systematic_m=float(added),
-            exact_systematic_m=added if added else None,
-            noise_systematic_m=option.noise_systematic_m * ratio,
-        )
-
-    new = grown(own)
-    pool = problem.roles[r].pool()
-    rows = pool.sensor == pool.sensor[pool.place_of(own.names)]
-    pool = pool.changed(
-        rows, grown, error=new.sensor_error_m, added=new.added_m(), crit=new.tau_crit_s
-    )
-    return _with_pool(problem, r, pool)
-
-
-def _with_pool(problem: Problem, r: int, pool: Options) -> Problem:
-    """The problem with options changed; those that now keep or break their tau_crit move over."""
-    table = problem.roles[r].with_pool(pool, problem.limits.sync)
-    return replace(problem, roles=(*problem.roles[:r], table, *problem.roles[r + 1 :]))
-
-
-def _tau_slack(problem: Problem, design: Design, r: int) -> Slack:
+def _tau_slack(asked: _Asked, r: int) -> Slack:
     """A timestamp bound may grow until its own tau_crit, the system's, or the accuracy is met."""
+    problem, design = asked.problem, asked.design
     table, own = problem.roles[r], chosen_options(problem, design)[r]
     limits = list(_tau_limits(problem, design, r))
     fails, kind = min(limits) if limits else (None, None)
     row = Slack(f"{table.role} timestamp error", table.stage_name, own.tau_s, "s",
                 None if fails is None else float(fails), kind, None)  # fmt: skip
 
+    rows = of_method(problem, r, design.options[r])
+
     def changed(value: float) -> Problem:
-        return _with_method(problem, r, own, Fraction(value))
+        return with_method_tau(problem, r, rows, Fraction(value))
 
     sure = not limits and problem.judge is None
-    return _with_payload(row, problem, design, changed, fails_never=sure)
-
-
-def _with_method(problem: Problem, r: int, own: Option, tau_s: Fraction) -> Problem:
-    """The problem with the error of one method in one role set, whatever primitive it stamps."""
-
-    def grown(option: Option) -> Option:
-        if option.method != own.method:
-            return option
-        return replace(option, tau_s=float(tau_s), exact_tau_s=tau_s)
-
-    pool = problem.roles[r].pool()
-    rows = pool.method == pool.method[pool.place_of(own.names)]
-    return _with_pool(problem, r, pool.changed(rows, grown, tau=float(tau_s)))
+    return _with_payload(row, asked, changed, fails_never=sure)
 
 
 def _tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
@@ -200,43 +182,45 @@ def _tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
 
 
 def _platform_slack(
-    case: Case,
-    problem: Problem,
-    design: Design,
-    build: Build,
-    stage: int,
-    figure: PlatformFigure,
+    asked: _Asked, value: float, figure: PlatformFigure, what_if: WhatIf
 ) -> Slack | None:
     """Growth of a platform figure: the same design evaluated, and the choice made, anew."""
-    words, dimension = PLATFORM_FIGURES[figure]
-    value = float(platform_figure(case, stage, figure))
     if value <= 0.0:
         return None
-
-    def changed(at: float) -> Problem:
-        return build(with_platform_figure(case, stage, figure, quantity(at, dimension)))
+    alone, only = asked.alone()
 
     def kinds_broken(at: float) -> tuple[str, ...]:
-        other = changed(at)
-        same = same_design(problem, design, other)
+        other = what_if(alone, figure, at)
+        same = same_design(alone, only, other)
         return ("sync",) if same is None else broken(other, evaluate(other, same))
 
     fails = _first(lambda at: not kinds_broken(at), _tried(value, GROWTHS))
     unit = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}[figure]
     kind = None if fails is None else next(iter(kinds_broken(fails)), None)
-    row = Slack(words, "", value, unit, fails, kind, None)
-    return _with_payload(row, problem, design, changed, fails_never=False)
+    row = Slack(PLATFORM_FIGURES[figure][0], "", value, unit, fails, kind, None)
+
+    def changed(at: float) -> Problem:
+        return what_if(asked.problem, figure, at)
+
+    return _with_payload(row, asked, changed, fails_never=False)
 
 
-def same_design(problem: Problem, design: Design, other: Problem) -> Design | None:
-    """The design of the same names in another problem; None where an option is gone."""
-    places = []
-    for table, option in zip(other.roles, chosen_options(problem, design), strict=True):
-        place = table.options.place_of(option.names)
-        if place is None:
-            return None
-        places.append(place)
-    return Design(tuple(places), design.clocks)
+WhatIf = Callable[[Problem, PlatformFigure, float], Problem]
+
+
+def _platform_what_if(case: Case, problem: Problem, build: Build, stage: int) -> WhatIf:
+    """A problem by the value of a figure of one stage's platform.
+
+    Known effects and simulation hang on how a platform moves: there the whole is built anew.
+    """
+    if not case.effects and problem.judge is None:
+        return Moving.of(case, problem, stage).at
+
+    def built(_: Problem, figure: PlatformFigure, at: float) -> Problem:
+        value = quantity(at, PLATFORM_FIGURES[figure][1])
+        return build(with_platform_figure(case, stage, figure, value))
+
+    return built
 
 
 def payload(problem: Problem, design: Design) -> tuple[tuple[str, str], ...]:
@@ -245,18 +229,14 @@ def payload(problem: Problem, design: Design) -> tuple[tuple[str, str], ...]:
 
 
 def _with_payload(
-    row: Slack,
-    problem: Problem,
-    design: Design,
-    changed: Callable[[float], Problem],
-    *,
-    fails_never: bool,
+    row: Slack, asked: _Asked, changed: Callable[[float], Problem], *, fails_never: bool
 ) -> Slack:
     """The row with the least value at which the choice, made anew, names another payload.
 
     Every value is solved again: a term that grows can lose a tie of price long before a limit, and
     a worse sensor can make a cheaper design keep its sync limit.
     """
+    problem, design = asked.problem, asked.design
     row = _simulated(row, problem, design, changed)
     never = ("verdict",) if fails_never else ()
     if fails_never and _is_sole(problem):
@@ -265,7 +245,7 @@ def _with_payload(
 
     def same(at: float) -> bool:
         other = changed(at)
-        found = _chosen(other)
+        found = _chosen(other, same_design(problem, design, other), asked.beside)
         return found is not None and payload(other, found) == now
 
     values = _tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
@@ -302,15 +282,10 @@ def _simulated(
     return replace(row, fails_at=at, limited_by="monte_carlo")
 
 
-def _chosen(problem: Problem) -> Design | None:
+def _chosen(problem: Problem, at_hand: Design | None, beside: Beside) -> Design | None:
     """The choice of a changed problem; None where nothing meets it."""
     if problem.judge is None:
-        whole = narrowed(
-            problem,
-            [np.arange(len(table.options)) for table in problem.roles],
-            [range(len(table.clocks)) for table in problem.vehicles],
-        )
-        return best_of(whole, in_force())
+        return best_from(problem, at_hand, beside)
     found = choose(problem, "front")
     return found.design if isinstance(found, Choice) else None
 

@@ -16,6 +16,7 @@ from fractions import Fraction
 from typing import Literal
 
 from syncline_design.choice.acceptable import judgement
+from syncline_design.choice.core import Beside, Known, best_from
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import chosen_options, evaluate
 from syncline_design.choice.options import RESOURCES
@@ -30,6 +31,7 @@ from syncline_design.choice.variations import (
     sigma_figures,
     with_figure,
 )
+from syncline_design.choice.what_if import same_design, sensors_that_matter, with_sheet_figure
 from syncline_design.machine.records import Record
 from syncline_design.model.quantity import format_like
 from syncline_design.spec.case import Case
@@ -69,21 +71,24 @@ def tolerance_verdict(
 ) -> ToleranceVerdict:
     """The verdict on one design under the tolerances of its own sensors' figures."""
     selected = selection_of(problem, design).roles
-    used = {(one.sensor, one.role) for one in selected}
-    sensors = {sensor for sensor, _ in used}
+    sensors = {one.sensor for one in selected}
     figures = [f for f in sigma_figures(case) if f.sensor in sensors and f.quantity.has_tolerance]
     names = tuple(figure.name for figure in figures)
-    word = _word(case, selected, design, figures, build)
+
+    def built(what_if: Case) -> Problem:
+        return problem if what_if is case else build(what_if)
+
+    word = _word(case, selected, design, figures, built)
     if word != "sometimes":
         return ToleranceVerdict(word, names, (), False)
     settles = []
     for figure in figures:
         rest = [other for other in figures if other != figure]
-        if _word(case, selected, design, rest, build) != "sometimes":
+        if _word(case, selected, design, rest, built) != "sometimes":
             settles.append(figure.name)
     if settles:
         return ToleranceVerdict(word, names, tuple(settles[:1]), True)
-    widest = sorted(figures, key=lambda f: (-_span(case, selected, f, build), f.name))
+    widest = sorted(figures, key=lambda f: (-_span(case, selected, f, built), f.name))
     return ToleranceVerdict(word, names, tuple(f.name for f in widest), False)
 
 
@@ -198,10 +203,11 @@ def measure_next(
     """
     figures = list(sigma_figures(case))
     given = [figure for figure in figures if figure.quantity.has_tolerance]
+    asked = _Asked.of(case, problem, design, build)
     found: list[Measurement] = []
-    for figure in given or figures:
+    for figure in asked.worth_trying([(f, _ends(f, assumed=not given)) for f in given or figures]):
         try:
-            found += _flips(case, problem, design, build, figure, assumed=not given)
+            found += _flips(asked, figure, assumed=not given)
         except OutOfTime:
             raise
         except NoVerdict:  # what cannot be proven is not claimed
@@ -209,39 +215,80 @@ def measure_next(
     return tuple(sorted(found, key=lambda m: (-_weight(m), m.figure, m.at)))
 
 
+Ends = tuple[float, float]
+
+
+def _ends(figure: SheetFigure, *, assumed: bool) -> Ends:
+    """The values that are tried."""
+    value = figure.quantity
+    if not assumed:
+        return value.low, value.high
+    spread = value.exact * ASSUMED_SPREAD
+    return float(value.exact - spread), float(value.exact + spread)
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A design whose figures may be other than written.
+
+    beside: None where a figure changes more than its sensor's columns (known effects, simulation);
+    then every problem is built anew.
+    """
+
+    case: Case
+    problem: Problem
+    design: Design
+    build: Build
+    beside: Beside | None
+
+    @classmethod
+    def of(cls, case: Case, problem: Problem, design: Design, build: Build) -> _Asked:
+        plain = not case.effects and problem.judge is None
+        return cls(case, problem, design, build, Beside(problem) if plain else None)
+
+    def worth_trying(self, figures: Sequence[tuple[SheetFigure, Ends]]) -> list[SheetFigure]:
+        """The figures without those that cannot change the choice."""
+        known = Known.of(self.problem, self.design)
+        if self.beside is None or known is None:
+            return [figure for figure, _ in figures]
+        shares: dict[str, float] = {}
+        for figure, (low, _) in figures:
+            share = low / float(figure.quantity) if figure.quantity > 0.0 else 0.0
+            shares[figure.sensor] = min(share, shares.get(figure.sensor, 1.0))
+        left = sensors_that_matter(self.case, self.problem, known, self.beside, shares)
+        return [figure for figure, _ in figures if figure.sensor in left]
+
+    def chosen(self, figure: SheetFigure, end: float) -> tuple[Problem, Design | None]:
+        """The problem with a figure changed, and the choice made anew."""
+        value = quantity(end, figure.dimension)
+        if self.beside is not None:
+            other = with_sheet_figure(self.case, self.problem, figure, value)
+            at_hand = same_design(self.problem, self.design, other)
+            return other, best_from(other, at_hand, self.beside)
+        other = self.build(with_figure(self.case, figure, value))
+        found = choose(other, "front")
+        return other, found.design if isinstance(found, Choice) else None
+
+
 def _weight(one: Measurement) -> float:
     return math.inf if one.objective_change is None else abs(one.objective_change)
 
 
-def _flips(
-    case: Case,
-    problem: Problem,
-    design: Design,
-    build: Build,
-    figure: SheetFigure,
-    *,
-    assumed: bool,
-) -> Iterator[Measurement]:
-    now = payload(problem, design)
-    value = figure.quantity
-    ends = (value.low, value.high)
-    if assumed:
-        spread = value.exact * ASSUMED_SPREAD
-        ends = (float(value.exact - spread), float(value.exact + spread))
-    for end in ends:
-        other = build(with_figure(case, figure, quantity(end, figure.dimension)))
-        outcome = choose(other, "front")
-        if not isinstance(outcome, Choice):
+def _flips(asked: _Asked, figure: SheetFigure, *, assumed: bool) -> Iterator[Measurement]:
+    now = payload(asked.problem, asked.design)
+    for end in _ends(figure, assumed=assumed):
+        other, design = asked.chosen(figure, end)
+        if design is None:
             yield _measurement(figure, end, assumed, "infeasible", None)
             continue
-        then = payload(other, outcome.design)
+        then = payload(other, design)
         if then != now:
             changes = [
                 f"{table.role} of {table.stage_name}: {sensor} stamped by {method}"
                 for table, (sensor, method), before in zip(other.roles, then, now, strict=True)
                 if (sensor, method) != before
             ]
-            change = _objective(other, outcome.design) - _objective(problem, design)
+            change = _objective(other, design) - _objective(asked.problem, asked.design)
             yield _measurement(figure, end, assumed, "; ".join(changes), change)
 
 

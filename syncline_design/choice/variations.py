@@ -125,15 +125,16 @@ def with_figure(case: Case, figure: SheetFigure, value: Quantity) -> Case:
         choice = case.spec.stages[stage].role(role)
         assert choice is not None
         assert isinstance(choice.sensor, SensorEntry)
-        sensor = _changed(choice.sensor, figure, value)
+        sensor = with_changed(choice.sensor, figure, value)
         return with_stage(case, stage, **{role: choice.model_copy(update={"sensor": sensor})})
     sensors = dict(case.catalog.sensors)
-    sensors[figure.sensor] = _changed(sensors[figure.sensor], figure, value)
+    sensors[figure.sensor] = with_changed(sensors[figure.sensor], figure, value)
     catalog = case.catalog.model_copy(update={"sensors": sensors})
     return replace(case, catalog=catalog)
 
 
-def _changed(entry: SensorEntry, figure: SheetFigure, value: Quantity) -> SensorEntry:
+def with_changed(entry: SensorEntry, figure: SheetFigure, value: Quantity) -> SensorEntry:
+    """A sensor with one of its figures changed."""
     new: Any = value
     if figure.axis is not None:
         axes = list(getattr(entry, figure.figure))

@@ -1,0 +1,209 @@
+"""The options that a design at least as good as a known one can be made of.
+
+Whatever is chosen in the other roles, a design costs and errs no less than an option and the front
+of cheapest amounts against least errors of the roles beside it, shared hardware and what timing
+adds between them left out.  An option that cannot come below the known design even so is dropped
+(reduced-cost fixing, as in integer programming); the known design itself always stays.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+
+from syncline_design.choice.evaluate import broken, evaluate, known_or_more
+from syncline_design.choice.narrowed import Narrowed, narrowed
+from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, Options, ResourceName
+from syncline_design.choice.partition import best_of
+from syncline_design.choice.table import Design, Problem
+from syncline_design.machine.deadline import in_force
+
+MOST_STEPS = 64  # points of a front of the roles beside; between them it takes its lower corners
+EXACT = 2**52  # sums of whole amounts below it are exact as floats
+TIED = 1e-11  # errors of one order: 12 figures
+
+
+@dataclass(frozen=True, slots=True)
+class Stairs:
+    """Least amounts, rising, for least errors [m], falling: what some roles take at least."""
+
+    amount: Floats
+    error: Floats
+
+    def least_within(self, error_m: Floats) -> Floats:
+        """Least amount at no more than these errors; infinite where there is none."""
+        place = np.searchsorted(-self.error, -error_m, side="left")
+        amounts = np.append(self.amount, math.inf)
+        return np.asarray(amounts[place])
+
+    def beside(self, other: Stairs) -> Stairs:
+        """Two groups of roles together."""
+        amounts = np.add.outer(self.amount, other.amount).ravel()
+        return stairs(amounts, np.add.outer(self.error, other.error).ravel())
+
+
+NO_ROLES = Stairs(np.zeros(1), np.zeros(1))
+
+
+def stairs(amount: Floats, error: Floats) -> Stairs:
+    """The lower left staircase of points, thinned out to its lower corners."""
+    order = np.lexsort((error, amount))
+    amount, error = amount[order], error[order]
+    lowest = np.minimum.accumulate(error)
+    steps = np.flatnonzero(np.append(True, error[1:] < lowest[:-1]))
+    amount, error = amount[steps], error[steps]
+    if len(steps) <= MOST_STEPS:
+        return Stairs(amount, error)
+    starts = np.linspace(0, len(steps), MOST_STEPS, endpoint=False).astype(np.intp)
+    return Stairs(amount[starts], error[np.append(starts[1:], len(steps)) - 1])
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A design that meets every sum: what others have to come below."""
+
+    design: Design
+    amount: Fraction | float  # of the objective's resource; infinite where it does not say
+    total_m: float
+
+    @classmethod
+    def of(cls, problem: Problem, design: Design) -> Known | None:
+        """None where the design breaks a requirement."""
+        found = evaluate(problem, design)
+        if broken(problem, found):
+            return None
+        amount = known_or_more(found.amount(resource_of(problem)))
+        return cls(design, amount, found.error_m)
+
+
+def resource_of(problem: Problem) -> ResourceName:
+    """The resource that a front sets against error when a design is chosen."""
+    return "cost" if problem.objective == "error" else problem.objective
+
+
+class Beside:
+    """What a problem's roles take at least, kept for its what-ifs.
+
+    Options are known by their identity: what a what-if leaves alone keeps its staircase.  Amounts
+    are whole multiples of 1/unit, so that their sums are exact as floats where they fit.
+    """
+
+    def __init__(self, problem: Problem) -> None:
+        name = resource_of(problem)
+        self.problem = problem
+        self.own = {id(table.options) for table in problem.roles}
+        spent = [table.pool().spent(name) for table in problem.roles]
+        clocks = [[c.resources.of(name) for c in v.clocks] for v in problem.vehicles]
+        known = [a for amounts in clocks for a in amounts if a is not None]
+        self.unit = math.lcm(*(s.denominator for s in spent), *(a.denominator for a in known))
+        largest = sum(s.largest * (self.unit // s.denominator) for s in spent)
+        largest += sum(abs(int(a * self.unit)) for a in known)
+        self.exact = largest < EXACT
+        self.clocks = math.fsum(
+            float(min(known_or_more(a) for a in amounts) * self.unit) for amounts in clocks
+        )
+        self.kept: dict[tuple[int, ...], Stairs] = {}
+
+    def amounts(self, options: Options) -> Floats:
+        """Amounts of options in that unit."""
+        spent = options.spent(resource_of(self.problem))
+        return spent.whole.astype(np.float64) * (self.unit // spent.denominator)
+
+    def of(self, problem: Problem, roles: Sequence[int], rows: Mapping[int, Indices]) -> Stairs:
+        """The staircase of some roles; rows: what is left of those already looked at."""
+        own = tuple(r for r in roles if self.has(problem, r))
+        made = self._kept(problem, own)
+        for r in roles:
+            if r not in own:
+                made = made.beside(self._of_role(problem, r, rows.get(r)))
+        return made
+
+    def has(self, problem: Problem, r: int) -> bool:
+        """Whether a what-if leaves a role alone."""
+        return id(problem.roles[r].options) in self.own
+
+    def _kept(self, problem: Problem, roles: tuple[int, ...]) -> Stairs:
+        if not roles:
+            return NO_ROLES
+        if roles not in self.kept:
+            last = self._of_role(problem, roles[-1], None)
+            self.kept[roles] = self._kept(problem, roles[:-1]).beside(last)
+        return self.kept[roles]
+
+    def _of_role(self, problem: Problem, r: int, rows: Indices | None) -> Stairs:
+        options = problem.roles[r].options
+        amount, error = self.amounts(options), added_least(problem, r, options)
+        return stairs(amount, error) if rows is None else stairs(amount[rows], error[rows])
+
+
+def added_least(problem: Problem, r: int, options: Options) -> Floats:
+    """What options of a role add to the total at least, whatever stands beside it [m].
+
+    Its error, and with the per_sensor model rate * tau of its pairs, whose bounds are sums.
+    """
+    if problem.sync_model == "syncline":
+        return options.added
+    rates = [pair.rate_mps for pair in problem.pairs if r in (pair.role, pair.reference)]
+    return np.asarray(options.added + math.fsum(rates) * options.tau)
+
+
+def total_least(problem: Problem, r: int, options: Options) -> Floats:
+    """The same with what every design has and, with one roof over all pairs, rate * tau [m]."""
+    error = added_least(problem, r, options) + problem.fixed_error_m
+    pairs = any(r in (pair.role, pair.reference) for pair in problem.pairs)
+    if problem.sync_model == "syncline" and pairs:
+        error = error + problem.sync_rate_mps * options.tau
+    return np.asarray(error)
+
+
+def may_improve(
+    problem: Problem, known: Known, amount: Floats, total: Floats, others: Stairs, beside: Beside
+) -> Bools:
+    """Whether options of these least figures can be part of a design no worse than a known one."""
+    limit = problem.limits.accuracy_m
+    room = np.abs(total) * MARGIN
+    most = math.inf if limit is None else limit * (1.0 + MARGIN)
+    tied = known.total_m * (1.0 + TIED)
+    if problem.objective == "error":
+        return np.asarray(others.least_within(tied - total + room) < math.inf)
+    have = float(known.amount * beside.unit)
+    as_much = have if beside.exact else have * (1.0 + MARGIN)
+    least = beside.clocks + amount
+    within, no_worse = (others.least_within(error - total + room) for error in (most, tied))
+    cheaper = least + within < have if beside.exact else least + within <= as_much
+    return np.asarray(cheaper | (least + no_worse <= as_much))
+
+
+def core(problem: Problem, known: Known, beside: Beside) -> Narrowed:
+    """The problem without the options that no design as good as a known one can have."""
+    every = range(len(problem.roles))
+    rows: dict[int, Indices] = {}
+    for r in sorted(every, key=lambda r: beside.has(problem, r)):  # what is new first
+        others = beside.of(problem, [q for q in every if q != r], rows)
+        options = problem.roles[r].options
+        amount, total = beside.amounts(options), total_least(problem, r, options)
+        keeps = may_improve(problem, known, amount, total, others, beside)
+        keeps[known.design.options[r]] = True
+        rows[r] = np.flatnonzero(keeps)
+    return narrowed(problem, [rows[r] for r in every], _every_clock(problem))
+
+
+def best_from(problem: Problem, design: Design | None, beside: Beside) -> Design | None:
+    """The best design in the documented order, starting from one that is at hand."""
+    in_force().check()
+    known = None if design is None else Known.of(problem, design)
+    if known is None:
+        whole = [np.arange(len(table.options)) for table in problem.roles]
+        return best_of(narrowed(problem, whole, _every_clock(problem)), in_force())
+    left = core(problem, known, beside)
+    if left.problem.combinations == 1:
+        return known.design
+    return best_of(left, in_force())
+
+
+def _every_clock(problem: Problem) -> list[range]:
+    return [range(len(vehicle.clocks)) for vehicle in problem.vehicles]
