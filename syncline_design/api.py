@@ -92,8 +92,8 @@ def optimize(
     best: how many designs that differ in a sensor; every: in anything.  pareto: the exact front of
     `resource` against the error too.
     """
+    from syncline_design.choice.options import RESOURCES
     from syncline_design.choice.outcome import METHODS
-    from syncline_design.choice.table import RESOURCES
     from syncline_design.verdict import optimise
 
     arguments.whole("best", best, 1)
