@@ -95,6 +95,54 @@ def test_sound_logs_pass(platform: str, effect: Hidden | None, kind: str, tmp_pa
     assert not [c for c in found if c.severity == "contradiction"]
 
 
+@pytest.mark.parametrize("seed", [3, 8])
+@pytest.mark.parametrize("effect", [
+    hidden("noise_understated", "ranging", stage="vessel", factor=8.0),
+    hidden("latency", "attitude", stage="vessel", latency_s=0.12),
+    hidden("latency", "ranging", stage="vessel", latency_s=0.3),
+])  # fmt: skip
+def test_a_chain_that_measures_coarsely_does_not_contradict_itself(
+    seed: int, effect: Hidden, tmp_path: Path
+) -> None:
+    """The places of a later stage are as good as the chain before it: no motion of their own."""
+    log = make_log(scenario("survey_chain", seed, 100.0, 5.0), (effect,))
+    found = checked(written(log, tmp_path))
+    assert not [c for c in found if c.code.endswith("columns")]
+
+
+def test_columns_of_a_chain_that_contradict_it_are_said(tmp_path: Path) -> None:
+    log = make_log(scenario("survey_chain", 3, 100.0, 5.0))
+    found = checked(written(log, tmp_path, times("auv_velocity_", 1.3)))
+    (check,) = [c for c in found if c.code == "velocity_columns"]
+    assert (check.stage, check.value) == ("auv", pytest.approx(1.3, rel=0.02))
+
+
+def late(stem: str, by_s: float) -> Change:
+    def change(columns: dict[str, Array]) -> None:
+        stamps = columns["time_s"]
+        for name in [n for n in columns if n.startswith(stem)]:
+            columns[name] = np.interp(stamps - by_s, stamps, columns[name])
+
+    return change
+
+
+@pytest.mark.parametrize(("platform", "by_s"), [("multirotor_lines", 0.35),
+                                                ("multirotor_lines", 0.8),
+                                                ("fixed_wing_circuits", 0.9)])  # fmt: skip
+@pytest.mark.parametrize(("stem", "code"), [("velocity_", "velocity_columns"),
+                                            ("rate_", "rate_columns")])  # fmt: skip
+def test_columns_that_come_late_are_said(
+    platform: str, stem: str, code: str, by_s: float, tmp_path: Path
+) -> None:
+    """Positions and attitudes are not late; nothing else in the log would show it."""
+    found = checked(written(run_of(platform), tmp_path, late(stem, by_s)))
+    (check,) = [c for c in found if c.code == code]
+    assert check.severity == "contradiction"
+    said = check.message.split("they come about ")[1]
+    figure, unit = said.split()[:2]
+    assert float(figure) * {"ms": 1e-3, "s": 1.0}[unit] == pytest.approx(by_s, abs=0.051)
+
+
 COLUMNS = (
     ("velocity_columns", times("velocity_", 1.2), 1.2),
     ("velocity_columns", times("velocity_", 0.9), 0.9),

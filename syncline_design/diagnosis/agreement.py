@@ -3,9 +3,9 @@
 Over windows the integral D of a column (velocity, body rate) and the change P of the pose (place,
 attitude) must be the same vector.  The column's principal directions v_k are mapped by P to
 w_k = P' u_k / s_k (D = U S V'), with a standard error from what is left; v_k itself is wanted.
-A delay between the two is allowed for, it is an effect of its own.  What a regression of P on D
-cannot see is asked for on its own: motion of the pose in which the column has no part (a column of
-zeros), and a constant part of a velocity that the places do not follow.
+A pose that comes late is allowed for, it is an effect of its own; a column that does is not.  What
+a regression of P on D cannot see is asked for on its own: motion of the pose in which the column
+has no part (a column of zeros), and a constant part of a velocity that the places do not follow.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ LEAST_WINDOWS = 8
 CLEAR = 20.0  # times the noise of a displacement: windows need not be longer
 MOST_TURN_RAD = 0.7  # in one window: longer ones say no more
 LAGS_S = np.linspace(-1.0, 1.0, 41)
+LATE_S = 0.15  # by which a column may come late
 MOVES = 10.0  # times its own noise: a direction that moves less is nothing but that noise
 ERRORS = 4.0  # standard errors that a disagreement must have on top of the tolerance
 LEAST_PART = 0.5  # of a clear motion of the pose that a column must show
@@ -131,6 +132,7 @@ def disagreement(
             spans, moved, own, _allowed(spans, moved, sigma, places, tolerance)
         ):
             words = _offset_words(spans, moved, own, places)
+        words = words or _late_words(spans, moved, column, float(lag), tolerance)
         return Disagreement(_ratio(moved, own), words) if words else None
     if _is_offset(spans, moved, own):
         return Disagreement(_ratio(moved, own), _offset_words(spans, moved, own, places))
@@ -181,6 +183,21 @@ def _likeness(moved: Array, own: Array) -> float:
     """Share of the pose's motion that the column explains, up to one factor."""
     size = float(np.sum(own**2))
     return float(np.sum(moved * own)) ** 2 / size if size > 0.0 else 0.0
+
+
+def _late_words(spans: Spans, moved: Array, column: Array, lag_s: float, tolerance: float) -> str:
+    """Says that a column comes late, if only late it shows the pose's motion.
+
+    A pose that is late has a name, so that a column which is ahead says nothing.
+    """
+    if lag_s < LATE_S:
+        return ""
+    whole = float(np.sum(moved**2))
+    left, now = (whole - _likeness(moved, spans.integral(column, at)) for at in (lag_s, 0.0))
+    if now < max(2.0 * left, tolerance**2 * whole):
+        return ""
+    more = " or more" if lag_s >= LAGS_S[-2] else ""
+    return f"they come about {format_estimate(lag_s, None, 's')}{more} late"
 
 
 def _differs(moved: Array, own: Array, noise: float, tolerance: float) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 from syncline_design.diagnosis.agreement import WORDS, disagreement, windows_of
 from syncline_design.diagnosis.result import Check, Severity
 from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import StageLog
 from syncline_design.model.quantity import format_estimate
@@ -25,6 +26,7 @@ NEAR = {"speed": 1.1, "turn_rate": 1.1, "range": 1.5}  # times the limit: a caut
 MEAN_S = {"speed": 2.0, "turn_rate": 1.0}  # motion is averaged over this long
 NOISE = 2.0 * np.sqrt(2.0)  # standard deviations of the difference of two readings
 TOLERANCE = {"velocity": 0.05, "rate": 0.08}
+LATE_S = (0.03, -0.03, 0.06, -0.06, 0.12, -0.12, 0.24, -0.24)  # attitudes, that places may rest on
 NAMES = {"speed": ("speed", "v_max"), "turn_rate": ("turn rate", "omega_max"),
          "range": ("range", "distance")}  # fmt: skip
 
@@ -87,12 +89,19 @@ def _columns(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterato
     place = rows.position_m
     if view.log.kind == "position" and bool(np.all(np.isfinite(view.log.truth_m))):
         place = view.log.truth_m  # the velocity is that of the better system
-    sigma_m = 0.0 if stage.position is None else float(np.max(stage.position.sigma))
+    sigma_m = _place_sigma_m(view, index)
     angle_rad = 0.0 if stage.attitude is None else float(np.max(stage.attitude.sigma))
     time_s = view.log.time_s
-    moved = disagreement(
-        time_s, place, logged.velocity_mps, rows.rotation, sigma_m, TOLERANCE["velocity"]
-    )
+    moved = None
+    for arm_m in _arms(view, index):
+        other = disagreement(
+            time_s, place - arm_m, logged.velocity_mps, rows.rotation, sigma_m,
+            TOLERANCE["velocity"],
+        )  # fmt: skip
+        if other is None:
+            moved = None
+            break
+        moved = moved or other
     turned = disagreement(
         time_s, None, logged.rate_radps, rows.rotation, angle_rad, TOLERANCE["rate"]
     )
@@ -101,3 +110,34 @@ def _columns(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterato
             subject, own = WORDS[code]
             message = f"{subject} of {stage.name} contradict {own}: {found.words}"
             yield Check(code, stage.name, "contradiction", message, found.factor, 1.0, "", 1.0)
+
+
+def _place_sigma_m(view: Scene, index: int) -> float:
+    """Noise of the stage's places [m]: a later stage's are what the chain before it measures."""
+    stages = view.system.stages
+    first = stages[0].position
+    total = 0.0 if first is None else float(np.max(first.sigma)) ** 2
+    for stage, logged in zip(stages[:index], view.log.stages, strict=False):
+        range_m = 0.0 if logged.range_m is None else float(np.median(logged.range_m))
+        if stage.ranging is not None:
+            along, *across = stage.ranging.sigma
+            total += along**2 + (max(across) * range_m) ** 2
+        if stage.attitude is not None:
+            total += (max(stage.attitude.sigma) * range_m) ** 2
+    return float(np.sqrt(total))
+
+
+def _arms(view: Scene, index: int) -> Iterator[Array]:
+    """By how much the reference points may be off [m], NED, as the attitudes are late or early.
+
+    An attitude that is late by s leaves s R (w x l) of the antenna's arm in every place: an effect
+    of its own, and no velocity column's fault.
+    """
+    rows = view.rows[index]
+    yield np.zeros((len(rows), 3))
+    if view.log.kind == "position" or not np.any(rows.antenna_m):
+        return
+    arm = np.broadcast_to(rows.antenna_m, rows.rate_radps.shape)
+    swept = rotate(rows.rotation, np.cross(rows.rate_radps, arm))
+    for late_s in LATE_S:
+        yield late_s * swept
