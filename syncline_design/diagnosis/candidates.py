@@ -60,9 +60,18 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
                     continue
                 if view.log.kind == "position" and sensor not in ("position", "target"):
                     continue  # attitude and rates are the better system's
+                if _has_tails(view, effect, sensor, k):
+                    continue
                 if effect.applies(stage, sensor) and not _is_noise_of_heading(view, effect, k):
                     found.append(Candidate(effect, sensor, k))
     return tuple(found)
+
+
+def _has_tails(view: Scene, effect: Effect, sensor: str, index: int) -> bool:
+    """Whether the spec says already that this noise has tails: shape is not told twice."""
+    return effect.opens == "tails" and any(
+        (one.effect.opens, one.sensor, one.stage) == ("tails", sensor, index) for one in view.known
+    )
 
 
 def noise_of_heading(view: Scene, exclude: Sequence[str] = ()) -> tuple[str, ...]:

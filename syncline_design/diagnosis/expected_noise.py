@@ -9,18 +9,23 @@ import numpy as np
 from syncline_design.diagnosis.noise import Directed, Slow, Structure, White
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import antenna_to_object, bearing, rotate, shift_slope
-from syncline_design.effects.record import Array, StageRows
+from syncline_design.effects.record import OUTLIER_FACTOR, Array, StageRows
 from syncline_design.model.system import Sensor
 from syncline_design.model.timing import Constant, Distribution, Empirical, Normal, Uniform
 
 UNKNOWN_VARIANCE_M2 = 1e8  # of a component whose truth the log does not hold
 FLOOR_M = 1e-6  # keeps a row's covariance positive definite where a sensor is claimed perfect
 NEGLIGIBLE = 1e-6  # share of every row's variance below which it matters not whose noise it is
+LEAST_FREEDOM = 2.05  # of Student's t, for its deviation to be a figure
+DOWN = np.array([0.0, 0.0, 1.0])
 MATTERS = 0.01  # share of the row's variance below which slow attitude noise is not modelled
 
 
 def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
-    """White and slow noise of every sensor, and the scatter of the spec's own timing errors."""
+    """White and slow noise of every sensor, and the scatter of the spec's own timing errors.
+
+    Noise that the spec lists among its effects is the spec's noise.
+    """
     white: list[White] = []
     slow: list[Slow] = []
     fixed = FLOOR_M**2 * np.eye(3) + _unknown(view)
@@ -36,18 +41,49 @@ def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
         for role, (sensor, slopes) in parts.items():
             if sensor is None or (role != "position" and view.log.kind == "position"):
                 continue
-            loading = slopes * np.array(sensor.sigma)
+            usual, wandering = _sizes(view, index, role, sensor)
+            loading = slopes * usual
             own = role == "ranging" and index == last  # each target is a reading of its own
             covariance = loading @ np.swapaxes(loading, 1, 2)
             white.append(White((stage.name, role), covariance, None if own else loading))
             stamped += _timing_scatter(rows, role, sensor)
             if role != "ranging":
-                slow.append(Slow((stage.name, role), loading, True))
+                slow.append(Slow((stage.name, role), slopes * wandering, True))
+    stamped += _known_scatter(view)
     kept = tuple(s for s in slow if _matters(s, white))
     common, negligible = _split_small(stamped, white)
     fixed = fixed + negligible
     once = one_reading(view)
     return Structure(view.log.time_s, tuple(white), kept, fixed, directed, common, once)
+
+
+def _sizes(view: Scene, index: int, role: str, sensor: Sensor) -> tuple[Array, Array]:
+    """Deviations of a sensor's white and slow noise (3,), with what the spec's own effects add."""
+    usual = np.array(sensor.sigma)
+    wandering = np.zeros(3)
+    for one in view.known:
+        if (one.stage, one.sensor) != (index, role):
+            continue
+        figures = [one.values[p.name] for p in one.effect.parameters]
+        if one.effect.opens == "factor":
+            usual = usual * figures[0]
+        elif one.effect.opens == "tails":
+            freedom, outliers = max(figures[0], LEAST_FREEDOM), figures[1]
+            tails = (1.0 - outliers) * freedom / (freedom - 2.0)
+            usual = usual * np.sqrt(tails + outliers * OUTLIER_FACTOR**2)
+        elif one.effect.wanders:
+            axes = DOWN if one.effect.opens == "down" else np.ones(3)
+            wandering = wandering + (figures[0] * axes) ** 2
+    return usual, np.sqrt(usual**2 + wandering)
+
+
+def _known_scatter(view: Scene) -> list[Array]:
+    """What the spec's own effects scatter along the motion [m], (n, 3, k) each."""
+    return [
+        one.effect.spread(view.rows[one.stage], one.values, one.sensor)
+        for one in view.known
+        if one.effect.spread is not None
+    ]
 
 
 def _split_small(stamped: list[Array], white: list[White]) -> tuple[Array | None, Array]:
