@@ -10,7 +10,7 @@ import numpy as np
 from syncline_design.model.horizon import Horizon
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import Distribution, TimingError, Uniform
-from syncline_design.simulation.chain import Noise
+from syncline_design.simulation.chain import ChainNoise
 
 DEG = math.pi / 180.0
 DEFAULT_ERROR = Uniform(-2e-4, 2e-4)
@@ -85,7 +85,7 @@ def altered(system: System, **platform: float) -> System:
     return dataclasses.replace(system, stages=(changed, *system.stages[1:]))
 
 
-def no_noise(rows: int) -> Noise:
+def no_noise(rows: int) -> ChainNoise:
     """A draw without noise and without timestamp errors."""
     vector, scalar = np.zeros((rows, 3)), np.zeros(rows)
-    return Noise(vector, vector, scalar, scalar, scalar, scalar, scalar, scalar)
+    return ChainNoise(vector, vector, scalar, scalar, scalar, scalar, scalar, scalar)

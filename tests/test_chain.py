@@ -13,8 +13,8 @@ from syncline_design.effects.kinematics import rotation_to_euler
 from syncline_design.effects.record import NOTHING, Departures, StageRows
 from syncline_design.simulation import kernel
 from syncline_design.simulation.chain import (
+    ChainNoise,
     ConstantTwist,
-    Noise,
     rotation_exp,
     screw_displacement,
     stage_error,
@@ -48,9 +48,9 @@ def random_rows(rng: np.random.Generator, count: int, euler: np.ndarray) -> Stag
     )
 
 
-def random_noise(rng: np.random.Generator, count: int, shift_s: float) -> Noise:
+def random_noise(rng: np.random.Generator, count: int, shift_s: float) -> ChainNoise:
     shift = [rng.normal(size=count) * shift_s for _ in range(3)]
-    return Noise(
+    return ChainNoise(
         rng.normal(size=(count, 3)),
         rng.normal(size=(count, 3)) * 0.05,
         rng.normal(size=count),
@@ -85,7 +85,7 @@ def random_departures(rng: np.random.Generator, count: int) -> Departures:
     )
 
 
-def slow_error(rows: StageRows, noise: Noise, world: Departures, k: int) -> np.ndarray:
+def slow_error(rows: StageRows, noise: ChainNoise, world: Departures, k: int) -> np.ndarray:
     """One sample, the words of model.md with SciPy's rotations and numerical integration."""
 
     def row(values: np.ndarray) -> np.ndarray:
@@ -172,8 +172,8 @@ def test_kernel_agrees_with_chain_at_gimbal_lock() -> None:
     np.testing.assert_allclose(kernel.stage_error(draw), expected, atol=1e-9, rtol=0)
     # noiseless, lock or not: the measured rotation is the turned one
     quiet = no_noise(400)
-    quiet = Noise(
-        *(getattr(quiet, f) for f in Noise.__slots__[:5]),
+    quiet = ChainNoise(
+        *(getattr(quiet, f) for f in ChainNoise.__slots__[:5]),
         noise.mu_position_s,
         noise.mu_attitude_s,
         noise.mu_ranging_s,
@@ -227,8 +227,8 @@ def plain_rows(**changes) -> StageRows:
 
 def error_of(rows: StageRows, position_s: float = 0.0, attitude_s: float = 0.0) -> np.ndarray:
     quiet = no_noise(1)
-    noise = Noise(
-        *(getattr(quiet, f) for f in Noise.__slots__[:5]),
+    noise = ChainNoise(
+        *(getattr(quiet, f) for f in ChainNoise.__slots__[:5]),
         np.array([position_s]),
         np.array([attitude_s]),
         np.zeros(1),
@@ -334,7 +334,7 @@ def test_remainder_of_the_linearised_equations_has_slope_two() -> None:
     remainders = []
     for tau in taus:
         s_p, s_a = np.full(count, tau), np.full(count, -0.7 * tau)
-        noise = Noise(
+        noise = ChainNoise(
             zero.position_m, zero.attitude_rad, zero.range_m, zero.range_m, zero.range_m,
             s_p, s_a, zero.range_m,
         )  # fmt: skip

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 
 from syncline_design.diagnosis.past import LoggedPast
 from syncline_design.effects.kinematics import euler_to_rotation
-from syncline_design.logs.log import Track
+from syncline_design.logs.log import LogTrack
 
 Array = NDArray[np.float64]
 SWAY, TURN = 0.9, 0.35  # rad/s
@@ -42,7 +42,7 @@ def turned(t: Array) -> tuple[Array, Array]:
 
 def past(t: Array, from_positions: bool = False) -> LoggedPast:
     rotation, rate = turned(t)
-    return LoggedPast(t, Track(t, speed(t)), t, rotation, rate, from_positions)
+    return LoggedPast(t, LogTrack(t, speed(t)), t, rotation, rate, from_positions)
 
 
 @pytest.mark.parametrize("lag_s", [0.02, 0.3, 1.5])
@@ -92,7 +92,7 @@ def test_lag_at_another_rate_of_the_velocity() -> None:
     velocity = np.zeros((stamps.shape[0], 3))
     velocity[:, 0] = np.interp(stamps, fine, slope)
     rotation, rate = turned(at)
-    place, _ = LoggedPast(at, Track(stamps, velocity), at, rotation, rate)(0.6)
+    place, _ = LoggedPast(at, LogTrack(stamps, velocity), at, rotation, rate)(0.6)
     wanted = np.interp(at, fine, smooth - path)
     np.testing.assert_allclose(place[8:, 0], wanted[8:], atol=2e-3)
     assert float(np.max(np.abs(wanted))) > 2.0

@@ -15,7 +15,7 @@ from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect
-from syncline_design.logs.log import GAP_FACTOR, Log, Track
+from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
 from syncline_design.logs.merging import hermite
 from syncline_design.logs.stamps import per_stamp
 from syncline_design.model.system import System
@@ -83,7 +83,7 @@ def unslipped(log: Log, seconds: float) -> Log:
     inside = (wanted >= times[0]) & (wanted <= times[-1]) & (step <= GAP_FACTOR * log.interval_s)
     if np.count_nonzero(inside) < LEAST_LEFT:
         return log
-    track = first.velocity_track or Track(*per_stamp(log.time_s, first.velocity_mps))
+    track = first.velocity_track or LogTrack(*per_stamp(log.time_s, first.velocity_mps))
     moved = [
         hermite(
             times,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.trajectory import SplinePieces, pieces
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
-from syncline_design.logs.log import Rows, Track
+from syncline_design.logs.log import LogTrack, Rows
 
 MEMORY_S = 60.0  # of the past that is looked at
 AHEAD = 12  # rows after a stamp that the spline up to it feels
@@ -33,7 +33,7 @@ class LoggedPast:
     """
 
     at_s: Array
-    velocity: Track
+    velocity: LogTrack
     stamps_s: Array
     rotation: Array
     rate_radps: Array

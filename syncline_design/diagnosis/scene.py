@@ -20,7 +20,7 @@ from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, Departures, StageRows, Target
-from syncline_design.logs.log import Log, Rows, StageLog, Track
+from syncline_design.logs.log import Log, LogTrack, Rows, StageLog
 from syncline_design.model import timing
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.chain import rotation_exp
@@ -108,8 +108,8 @@ def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
 
 
 def _motion(log: Log, stage: StageLog) -> LoggedMotion:
-    velocity = stage.velocity_track or Track(log.time_s, stage.velocity_mps)
-    rate = stage.rate_track or Track(log.time_s, stage.rate_radps)
+    velocity = stage.velocity_track or LogTrack(log.time_s, stage.velocity_mps)
+    rate = stage.rate_track or LogTrack(log.time_s, stage.rate_radps)
     return LoggedMotion(
         log.time_s,
         pieces(velocity.time_s, velocity.value),
@@ -166,7 +166,7 @@ def _stage_rows(
         target_m=position + rotate(rotation, ranging + vector),
         lagged=LoggedPast(
             log.time_s,
-            logged.velocity_track or Track(log.time_s, logged.velocity_mps),
+            logged.velocity_track or LogTrack(log.time_s, logged.velocity_mps),
             log.time_s,
             rotation,
             logged.rate_radps,

@@ -51,7 +51,7 @@ class Dialect:
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class RowBlock:
     """Some rows as clean text, and the line each came from."""
 
     text: bytes
@@ -212,7 +212,7 @@ def last_line(path: Path, start: int) -> tuple[int, str] | None:
     return first + at, tail[at:].decode("utf-8", errors="replace")
 
 
-def blocks(path: Path, how: Dialect, end: int) -> Iterator[Block]:
+def blocks(path: Path, how: Dialect, end: int) -> Iterator[RowBlock]:
     """All rows up to an offset, in order; refuses a row that has not the header's cells."""
     line, rest = how.body_line, b""
     with path.open("rb") as file:
@@ -246,7 +246,7 @@ def _plain(raw: bytes) -> bytes:
     return raw if raw.endswith(b"\n") else raw + b"\n"
 
 
-def _block(path: Path, how: Dialect, raw: bytes, line: int) -> tuple[Block | None, int]:
+def _block(path: Path, how: Dialect, raw: bytes, line: int) -> tuple[RowBlock | None, int]:
     """Rows of a block without comments and empty lines; and the line after it."""
     data = np.frombuffer(raw, dtype=np.uint8)
     starts, ends = _bounds(data)
@@ -270,7 +270,7 @@ def _block(path: Path, how: Dialect, raw: bytes, line: int) -> tuple[Block | Non
     wrong = np.flatnonzero(count != len(how.names))
     if wrong.shape[0]:
         _refuse_ragged(path, how, int(lines[wrong[0]]), int(count[wrong[0]]))
-    return Block(raw, lines), after
+    return RowBlock(raw, lines), after
 
 
 def _bounds(data: NDArray[np.uint8]) -> tuple[Index, Index]:
@@ -326,7 +326,7 @@ def _refuse_ragged(path: Path, how: Dialect, line: int, cells: int) -> NoReturn:
     )
 
 
-def parsed(block: Block, how: Dialect, wanted: Sequence[int], as_text: bool) -> pl.DataFrame:
+def parsed(block: RowBlock, how: Dialect, wanted: Sequence[int], as_text: bool) -> pl.DataFrame:
     """Some columns of a block, in the order of their places in the file."""
     import polars as pl
 

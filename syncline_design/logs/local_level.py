@@ -15,18 +15,18 @@ import numpy as np
 from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import ATTITUDE, TIME, VELOCITY
-from syncline_design.logs.log import Track
+from syncline_design.logs.log import LogTrack
 
 WORTH_SAYING_RAD = np.radians(0.001)
 
 
 def turned_to_origin(
     columns: dict[str, Array],
-    tracks: Mapping[str, Track],
+    tracks: Mapping[str, LogTrack],
     prefixes: Sequence[str],
     path: Array,
     origin: Array,
-) -> tuple[dict[str, Track], list[str]]:
+) -> tuple[dict[str, LogTrack], list[str]]:
     """Turn every stage's attitude and velocity columns in place; its tracks, and what was done.
 
     path (n, 2): latitude and longitude [rad] of the first stage, whose level all stages share;
@@ -46,7 +46,7 @@ def turned_to_origin(
         if track is not None:
             there = level_turn(_at(track.time_s, stamps[known], path[known]), origin)
             value = np.einsum("nij,nj->ni", there, track.value)
-            result[prefix + "velocity"] = Track(track.time_s, value)
+            result[prefix + "velocity"] = LogTrack(track.time_s, value)
     return result, _said(turn[known])
 
 

@@ -18,7 +18,7 @@ Rows = NDArray[np.signedinteger[Any]] | NDArray[np.bool_] | slice
 
 
 @dataclass(frozen=True, slots=True)
-class Track:
+class LogTrack:
     """Motion at its own, often higher rate: stamps (m,) [s] and vectors (m, 3)."""
 
     time_s: Array
@@ -43,8 +43,8 @@ class StageLog:
     range_m: Array | None = None
     azimuth_rad: Array | None = None
     elevation_rad: Array | None = None
-    velocity_track: Track | None = None
-    rate_track: Track | None = None
+    velocity_track: LogTrack | None = None
+    rate_track: LogTrack | None = None
     follows_position: bool = False
 
     def rows(self, index: Rows) -> StageLog:

@@ -23,9 +23,9 @@ from syncline_design.logs.columns import (
     shown,
 )
 from syncline_design.logs.derivatives import derived_velocity
-from syncline_design.logs.log import Track
+from syncline_design.logs.log import LogTrack
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.tables import Table
+from syncline_design.logs.tables import LogTable
 from syncline_design.logs.twins import one_a_stamp, without_twins
 
 Index = NDArray[np.intp]
@@ -37,12 +37,12 @@ REACH = 2.5  # intervals of the other file across which its values are still int
 class Merged:
     """Columns at common stamps, and the motion at the rate it was logged at."""
 
-    table: Table  # the file that sets the rows, with the columns of all
-    tracks: Mapping[str, Track]  # "PREFIXvelocity" or "PREFIXrate"
+    table: LogTable  # the file that sets the rows, with the columns of all
+    tracks: Mapping[str, LogTrack]  # "PREFIXvelocity" or "PREFIXrate"
     follows_position: bool = False
 
 
-def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
+def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
     """Interpolate every other file to the stamps of the file that sets the rows."""
     at = _base(tables, prefixes)
     tables = [without_twins(t) if k == at else one_a_stamp(t) for k, t in enumerate(tables)]
@@ -51,7 +51,7 @@ def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
         tables = [_with_velocity(t, prefixes[0]) if t is follows else t for t in tables]
     base = tables[at]
     columns: dict[str, Array] = dict(base.columns)
-    tracks: dict[str, Track] = {}
+    tracks: dict[str, LogTrack] = {}
     notes = [note for t in tables for note in t.notes]
     notes += [note for t in tables if t is not base for note in _left_out(t)]
     stamps = base.columns[TIME]
@@ -82,7 +82,7 @@ def merged(tables: Sequence[Table], prefixes: Sequence[str]) -> Merged:
     return Merged(table, tracks, follows is not None)
 
 
-def _needs_velocity(tables: Sequence[Table], prefix: str) -> Table | None:
+def _needs_velocity(tables: Sequence[LogTable], prefix: str) -> LogTable | None:
     """The file of antenna positions, if nothing else can tell the velocity at a high rate."""
     if any(prefix + VELOCITY[0] in t.columns for t in tables):
         return None
@@ -93,7 +93,7 @@ def _needs_velocity(tables: Sequence[Table], prefix: str) -> Table | None:
     return holds[0]
 
 
-def _with_velocity(table: Table, prefix: str) -> Table:
+def _with_velocity(table: LogTable, prefix: str) -> LogTable:
     place = np.stack([table.columns[prefix + n] for n in POSITION], axis=1)
     kept = np.all(np.isfinite(place), axis=1)
     columns = {name: values[kept] for name, values in table.columns.items()}
@@ -103,12 +103,12 @@ def _with_velocity(table: Table, prefix: str) -> Table:
     return replace(table, columns=columns, notes=(*table.notes, note))
 
 
-def _left_out(table: Table) -> list[str]:
+def _left_out(table: LogTable) -> list[str]:
     """What a file that does not set the rows lost."""
     return [f"{table.path.name}: {n} rows left out ({why})" for why, n in table.rejected.items()]
 
 
-def _base(tables: Sequence[Table], prefixes: Sequence[str]) -> int:
+def _base(tables: Sequence[LogTable], prefixes: Sequence[str]) -> int:
     """The last stage's ranging sensor; in a position log the sparser of antenna and reference."""
     for k, table in enumerate(tables):
         if f"{prefixes[-1]}{RANGING[0]}" in table.columns:
@@ -119,7 +119,7 @@ def _base(tables: Sequence[Table], prefixes: Sequence[str]) -> int:
 
 
 def interpolated(
-    table: Table, taken: Mapping[str, Array], stamps: Array, prefixes: Sequence[str]
+    table: LogTable, taken: Mapping[str, Array], stamps: Array, prefixes: Sequence[str]
 ) -> tuple[dict[str, Array], Array]:
     """Columns of a file at other stamps; NaN where the file has a gap.  Also which are covered."""
     own = table.columns[TIME]
@@ -189,12 +189,14 @@ def _slerp(own: Array, euler: Array, stamps: Array, right: Index) -> Array:
     return rotation_to_euler((before * Rotation.from_rotvec(turn)).as_matrix())
 
 
-def _tracks(table: Table, taken: Mapping[str, Array], prefixes: Sequence[str]) -> dict[str, Track]:
+def _tracks(
+    table: LogTable, taken: Mapping[str, Array], prefixes: Sequence[str]
+) -> dict[str, LogTrack]:
     tracks = {}
     for prefix in dict.fromkeys(("", *prefixes)):
         for word, names in (("velocity", VELOCITY), ("rate", RATE)):
             if all(prefix + n in taken for n in names):
                 value = np.stack([taken[prefix + n] for n in names], axis=1)
                 kept = np.all(np.isfinite(value), axis=1)
-                tracks[prefix + word] = Track(table.columns[TIME][kept], value[kept])
+                tracks[prefix + word] = LogTrack(table.columns[TIME][kept], value[kept])
     return tracks

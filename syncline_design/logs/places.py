@@ -10,7 +10,7 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import GEODETIC, POSITION, REFERENCE, TARGET, shown
 from syncline_design.logs.local_level import turned_to_origin
-from syncline_design.logs.log import Track
+from syncline_design.logs.log import LogTrack
 from syncline_design.logs.refusals import refuse
 
 Origin = tuple[float, float, float]  # latitude, longitude [rad], height above the ellipsoid [m]
@@ -21,10 +21,10 @@ HIGHEST_RAD = 0.5 * np.pi + 1e-12
 def made_local(
     path: Path,
     columns: dict[str, Array],
-    tracks: Mapping[str, Track],
+    tracks: Mapping[str, LogTrack],
     prefixes: Sequence[str],
     origin: Origin | None,
-) -> tuple[dict[str, Track], list[str]]:
+) -> tuple[dict[str, LogTrack], list[str]]:
     """Add local columns for all places in WGS 84 and turn the attitudes and velocities with them.
 
     Gives the tracks, turned alike, and what was done, for people.  Without a stated origin it is

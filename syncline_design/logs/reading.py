@@ -24,11 +24,11 @@ from syncline_design.logs.columns import (
     shown,
 )
 from syncline_design.logs.derivatives import derived_rate, derived_velocity
-from syncline_design.logs.log import Kind, Log, StageLog, Track
+from syncline_design.logs.log import Kind, Log, LogTrack, StageLog
 from syncline_design.logs.magnitudes import demand_possible
 from syncline_design.logs.merging import merged
 from syncline_design.logs.refusals import refuse
-from syncline_design.logs.tables import Table, read_tables
+from syncline_design.logs.tables import LogTable, read_tables
 from syncline_design.logs.twins import without_twins
 
 LEAST_ROWS = 10
@@ -38,9 +38,9 @@ LEAST_ROWS = 10
 class _Draft:
     """A log under construction: columns at common stamps, and what has been noted."""
 
-    table: Table
+    table: LogTable
     columns: dict[str, Array]
-    tracks: Mapping[str, Track]
+    tracks: Mapping[str, LogTrack]
     notes: list[str] = field(default_factory=list)
     follows_position: bool = False
 
@@ -97,7 +97,7 @@ def read_log(
     return _log(draft, stages, prefixes, kind, rejected)
 
 
-def _draft(tables: Sequence[Table], prefixes: Sequence[str]) -> _Draft:
+def _draft(tables: Sequence[LogTable], prefixes: Sequence[str]) -> _Draft:
     if len(tables) == 1:
         only = without_twins(tables[0])
         return _Draft(only, dict(only.columns), {}, list(only.notes))

@@ -62,7 +62,7 @@ class Clock:
     spans: bool = False
 
 
-class Source(Protocol):
+class RowSource(Protocol):
     """A file whose columns can be read one pass at a time.
 
     cut: the line in which the file is cut off, 0 if it is whole.
@@ -85,7 +85,7 @@ class Source(Protocol):
         ...
 
 
-def opened(path: Path) -> Source:
+def opened(path: Path) -> RowSource:
     """The file as a source; refuses what is no log."""
     demand_plain_file(path)
     if path.suffix.lower() in (".parquet", ".pq"):
@@ -196,7 +196,7 @@ class TextSource:
             if np.any(kept):
                 yield self._text(block, place).filter(pl.Series(kept))
 
-    def _fast(self, block: delimited.Block, places: Sequence[int]) -> list[Array] | None:
+    def _fast(self, block: delimited.RowBlock, places: Sequence[int]) -> list[Array] | None:
         """Columns that are plain figures throughout; None where one is not."""
         import polars as pl
 
@@ -208,7 +208,7 @@ class TextSource:
             _finite(frame.get_column(f"column_{k + 1}").to_numpy().astype(float)) for k in places
         ]
 
-    def _text(self, block: delimited.Block, place: int) -> pl.Series:
+    def _text(self, block: delimited.RowBlock, place: int) -> pl.Series:
         import polars as pl
 
         try:
@@ -220,7 +220,7 @@ class TextSource:
             found = (str(error).splitlines() or [type(error).__name__])[0][:160]
             raise refuse(self.path, "no readable CSV file", found=found) from None
 
-    def _figures(self, block: delimited.Block, place: int, text: pl.Series) -> Array:
+    def _figures(self, block: delimited.RowBlock, place: int, text: pl.Series) -> Array:
         try:
             values, mark = numbers(text, self.how.comma_is_decimal)
             if mark and self._mark and mark != self._mark:
@@ -232,7 +232,7 @@ class TextSource:
         return values
 
     def _dates(
-        self, block: delimited.Block, place: int, text: pl.Series, zoned: bool | None
+        self, block: delimited.RowBlock, place: int, text: pl.Series, zoned: bool | None
     ) -> tuple[Stamps, bool | None]:
         try:
             stamps, zone = iso_times(text)
@@ -242,7 +242,7 @@ class TextSource:
             raise self._bad(block, place, bad) from None
         return stamps, zone
 
-    def _bad(self, block: delimited.Block, place: int, bad: BadCellError) -> BadInput:
+    def _bad(self, block: delimited.RowBlock, place: int, bad: BadCellError) -> BadInput:
         return refuse(
             self.path,
             "text among numbers",

@@ -22,7 +22,7 @@ from syncline_design.logs.columns import (
 )
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_choice import Arranged, arranged, thinned
-from syncline_design.logs.sources import NANOSECONDS, Clock, Source, opened
+from syncline_design.logs.sources import NANOSECONDS, Clock, RowSource, opened
 from syncline_design.model.quantity import si_name
 from syncline_design.spec.fields import did_you_mean
 
@@ -31,7 +31,7 @@ Slip = tuple[Sequence[str], float]  # files with one of these columns have stamp
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class LogTable:
     """One file: SI name -> values (n,) by rising stamp, with NaN where a value is missing.
 
     rows: of the file; rejected: left out of these, by reason; thinned: left out as too many.
@@ -56,7 +56,7 @@ class _Open:
     day: nanoseconds since 1970 of the midnight (UTC) that its seconds count from; None for numbers.
     """
 
-    source: Source
+    source: RowSource
     found: Mapping[str, tuple[str, float]]
     seconds: Array
     day: int | None
@@ -68,7 +68,7 @@ def read_tables(
     mapping: Mapping[str, str],
     stages: tuple[str, ...],
     slip: Slip = ((), 0.0),
-) -> list[Table]:
+) -> list[LogTable]:
     """Read CSV or Parquet files that belong together; raises BadInput."""
     files = [_opened(path, mapping, stages) for path in paths]
     files = _on_one_scale(_with_absent(files, mapping))
@@ -174,7 +174,7 @@ def _on_one_scale(files: list[_Open]) -> list[_Open]:
     return [replace(moved[0], notes=(*moved[0].notes, note)), *moved[1:]]
 
 
-def _table(file: _Open, rows: Arranged) -> Table:
+def _table(file: _Open, rows: Arranged) -> LogTable:
     """The columns of the rows that are worked on."""
     keep = np.zeros(rows.rows, dtype=bool)
     keep[rows.order] = True
@@ -191,7 +191,7 @@ def _table(file: _Open, rows: Arranged) -> Table:
         count += 1
         line = f"{file.source.path.name} is cut off in line {file.source.cut}"
         notes.append(f"{line}; the rows before it are used")
-    return Table(
+    return LogTable(
         file.source.path,
         columns,
         file.source.header,

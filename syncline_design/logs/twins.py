@@ -12,14 +12,14 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.columns import GEODETIC, TARGET, TARGET_ID, TIME
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.stamps import Index, starts
-from syncline_design.logs.tables import Table
+from syncline_design.logs.tables import LogTable
 
 MOST_TWINS = 0.5  # share of the rows
 GIVEN_TWICE, SAME_STAMP = "row given twice", "duplicate stamp"
 SAME_TARGET = "second row of a target at one stamp"
 
 
-def without_twins(table: Table) -> Table:
+def without_twins(table: LogTable) -> LogTable:
     """One row for every stamp and target; what is left out is counted with its reason.
 
     The target is told by its id, else by its place; a log without targets has one row a stamp.
@@ -51,7 +51,7 @@ def target_names(columns: Mapping[str, Array]) -> tuple[str, ...]:
     return tuple(n for n in (*TARGET, *(f"target_{g}" for g in GEODETIC)) if n in columns)
 
 
-def one_a_stamp(table: Table) -> Table:
+def one_a_stamp(table: LogTable) -> LogTable:
     """The first row of every stamp, of a file that is interpolated."""
     first = starts(table.columns[TIME])
     left = len(table) - first.shape[0]
@@ -61,7 +61,7 @@ def one_a_stamp(table: Table) -> Table:
     return replace(table, columns=columns, rejected={**table.rejected, SAME_STAMP: left})
 
 
-def _demand_progress(table: Table, left: int) -> None:
+def _demand_progress(table: LogTable, left: int) -> None:
     if left > MOST_TWINS * len(table):
         raise refuse(
             table.path,
@@ -72,7 +72,7 @@ def _demand_progress(table: Table, left: int) -> None:
         )
 
 
-def _firsts(table: Table, rows: Index, names: Sequence[str]) -> NDArray[np.bool_]:
+def _firsts(table: LogTable, rows: Index, names: Sequence[str]) -> NDArray[np.bool_]:
     """Which of the rows are the first with their values in these columns (NaN equals NaN)."""
     order = np.lexsort([table.columns[name][rows] for name in reversed(names)])
     new = np.zeros(rows.shape[0], dtype=bool)

@@ -259,7 +259,7 @@ def _tau_row(axes: Axes, row: int, bar: TauBar, low: float, high: float) -> None
 
 
 @dataclass(frozen=True, slots=True)
-class LedgerTerm:
+class LedgerBar:
     """One additive term of the total error."""
 
     label: str
@@ -271,7 +271,7 @@ _HATCH = {"sensor": "", "sync": "///", "systematic": "xxx"}
 
 
 def ledger(
-    terms: Sequence[LedgerTerm], target_m: float | None, name: str = "fig-ledger"
+    terms: Sequence[LedgerBar], target_m: float | None, name: str = "fig-ledger"
 ) -> InlineFigure:
     """The terms as a waterfall that adds up to the total, with the target."""
     total = math.fsum(t.value_m for t in terms)
@@ -297,7 +297,7 @@ def ledger(
     return draw(name, "Terms that add up to the total error", spoken, size, build)
 
 
-def _waterfall(axes: Axes, terms: Sequence[LedgerTerm]) -> None:
+def _waterfall(axes: Axes, terms: Sequence[LedgerBar]) -> None:
     """Each term's bar starts where the one before ends; the last bar is their sum."""
     start = 0.0
     for row, term in enumerate(terms):

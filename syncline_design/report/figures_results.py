@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Histogram:
+class DensityBars:
     """Density of the simulated error over bins, with marks on the error axis."""
 
     edges_m: tuple[float, ...]
@@ -28,7 +28,7 @@ class Histogram:
     syncline_m: float | None
 
 
-def error_histogram(data: Histogram, name: str = "fig-mc") -> InlineFigure:
+def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineFigure:
     """Distribution of the simulated error, target, Syncline and quantiles marked."""
 
     def build(figure: Figure) -> None:
@@ -156,7 +156,7 @@ def _accuracies(axes: Axes, shown: Sequence[GridPoint]) -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class FrontPoint:
+class FrontMark:
     """One Pareto-optimal design."""
 
     cost: float
@@ -165,7 +165,7 @@ class FrontPoint:
 
 
 def pareto_front(
-    points: Sequence[FrontPoint],
+    points: Sequence[FrontMark],
     currency: str,
     target_m: float | None,
     cost_limit: float | None,
@@ -190,7 +190,7 @@ def pareto_front(
     return draw(name, title, _front_words(points, currency), (WIDTH, 290.0), build)
 
 
-def _staircase(axes: Axes, points: Sequence[FrontPoint], cost_limit: float | None) -> None:
+def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None) -> None:
     costs = [p.cost for p in points]
     errors = [p.error_m for p in points]
     span = max(costs) - min(costs) or max(costs) or 1.0
@@ -207,7 +207,7 @@ def _staircase(axes: Axes, points: Sequence[FrontPoint], cost_limit: float | Non
     axes.set_xlim(max(0.0, min(costs) - 0.12 * span), right)
 
 
-def _front_words(points: Sequence[FrontPoint], currency: str) -> str:
+def _front_words(points: Sequence[FrontMark], currency: str) -> str:
     spoken = (
         f"{len(points)} designs from {numbers.money(points[0].cost, currency)} with an error of "
         f"{numbers.length(points[0].error_m)} to {numbers.money(points[-1].cost, currency)} with "

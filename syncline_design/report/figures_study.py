@@ -16,7 +16,7 @@ from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.svg import InlineFigure, add_axes, draw
 from syncline_design.report.text import shortened
-from syncline_design.studies.record import FrontPoint
+from syncline_design.studies.record import CasePoint
 from syncline_design.studies.scatter import Scatter, ScatterAxis
 from syncline_design.studies.summary import HeatMap
 
@@ -97,7 +97,7 @@ class NamedFront:
     """One exact front with the words that tell it from the others."""
 
     label: str
-    points: tuple[FrontPoint, ...]
+    points: tuple[CasePoint, ...]
 
 
 def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts") -> InlineFigure:

@@ -35,7 +35,7 @@ from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.scatter import Scatter, scatter
-from syncline_design.studies.summary import Brief, Front, Summary, heat_map, summarise, varied
+from syncline_design.studies.summary import Brief, Front, StudySummary, heat_map, summarise, varied
 from syncline_design.studies.table import reason
 
 MOST_CASES = 500  # rows of the case table; CSV and Parquet have them all
@@ -67,7 +67,7 @@ def on_study(result: StudyResult) -> Document:
     )  # fmt: skip
 
 
-def _heat(summary: Summary) -> list[Node]:
+def _heat(summary: StudySummary) -> list[Node]:
     """Least cost over two factors; on a terminal only where its table is short."""
     heat = heat_map(summary)
     if heat is None:
@@ -88,7 +88,7 @@ def _heat(summary: Summary) -> list[Node]:
     ]
 
 
-def _sampled(summary: Summary) -> list[Node]:
+def _sampled(summary: StudySummary) -> list[Node]:
     """Cases drawn over two factors, where these are no grid."""
     currency, *others = summary.currencies
     if others or heat_map(summary) is not None:
@@ -100,14 +100,14 @@ def _sampled(summary: Summary) -> list[Node]:
     return [Chart("sampled", draw, _sampled_caption(found))]
 
 
-def _ends(summary: Summary) -> list[Node]:
+def _ends(summary: StudySummary) -> list[Node]:
     return [
         *show(boundary_table(summary), silent=True, reach="page"),
         *show(boundary_table(summary, MOST_DOWN), silent=True, reach="text"),
     ]
 
 
-def _fronts(summary: Summary) -> list[Node]:
+def _fronts(summary: StudySummary) -> list[Node]:
     chosen = _distinct_fronts(summary)
     nodes: list[Node] = []
     if len({front.currency for front in chosen}) == 1:
@@ -126,7 +126,7 @@ def _facts(result: StudyResult) -> list[tuple[str, str]]:
     return facts + [(names[word], numbers.count(n)) for word, n in counts.items() if n]
 
 
-def _distinct_fronts(summary: Summary) -> list[Front]:
+def _distinct_fronts(summary: StudySummary) -> list[Front]:
     """At most eight fronts, spread evenly over all that differ."""
     found = list(summary.fronts)
     if len(found) <= MOST_FRONTS:
@@ -135,7 +135,7 @@ def _distinct_fronts(summary: Summary) -> list[Front]:
     return [found[round(place * step)] for place in range(MOST_FRONTS)]
 
 
-def _common(summary: Summary, front: Front) -> str:
+def _common(summary: StudySummary, front: Front) -> str:
     """What the cases that share a front have in common: that is what tells it from others."""
     chosen = [summary.briefs[number - 1] for number in front.cases]
     parts = []
@@ -148,7 +148,7 @@ def _common(summary: Summary, front: Front) -> str:
     return visible(", ".join(parts)) or "every case"
 
 
-def _fronts_table(summary: Summary) -> Table:
+def _fronts_table(summary: StudySummary) -> Table:
     rows = []
     for front in summary.fronts:
         cheapest, finest = front.points[0], front.points[-1]
@@ -184,7 +184,7 @@ def _sampled_caption(data: Scatter) -> str:
     return text + (f" Vary besides: {sentence_list(list(data.others))}." if data.others else "")
 
 
-def _case_table(summary: Summary) -> Table:
+def _case_table(summary: StudySummary) -> Table:
     result = summary.result
     several = varied(summary)
     many = len(result.study.bases) > 1

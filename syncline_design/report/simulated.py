@@ -90,9 +90,9 @@ def histogram_chart(found: MonteCarlo, syncline_m: float | None) -> list[Node]:
     )
 
     def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import Histogram, error_histogram
+        from syncline_design.report.figures_results import DensityBars, error_histogram
 
-        return error_histogram(Histogram(bins.edges_m, bins.density, marks, target, syncline_m))
+        return error_histogram(DensityBars(bins.edges_m, bins.density, marks, target, syncline_m))
 
     caption = (
         "Density of the error of the simulated samples, with quantiles, target and Syncline where "

@@ -10,7 +10,7 @@ from syncline_design.report.words import OUTCOMES, VERBS
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.summary import (
     HeatMap,
-    Summary,
+    StudySummary,
     boundaries,
     varied,
     winners,
@@ -63,7 +63,7 @@ def stored_text(result: StudyResult) -> str:
     )
 
 
-def currency_sentence(summary: Summary) -> str:
+def currency_sentence(summary: StudySummary) -> str:
     """Why there is no least cost; empty where all prices are in one currency."""
     if len(summary.currencies) < 2:
         return ""
@@ -116,7 +116,7 @@ def _cost_cell(cost: float | None, currency: str) -> Cell:
     return Cell(numbers.money(cost, currency), cost)
 
 
-def winners_table(summary: Summary) -> Table:
+def winners_table(summary: StudySummary) -> Table:
     """Which sensor and method is chosen where."""
     several = [factor.key for _, factor in varied(summary)]
     rows = [
@@ -139,7 +139,7 @@ def _where_cells(keys: list[str], where: tuple[str, ...]) -> list[Cell]:
     return [Cell("; ".join(told) or "everywhere")]
 
 
-def boundary_table(summary: Summary, most: int = MOST_ROWS) -> Table:
+def boundary_table(summary: StudySummary, most: int = MOST_ROWS) -> Table:
     """Where feasibility ends along each factor; equal ends are one row."""
     ends: dict[tuple[str, str, str, str], list[str]] = {}
     for b in boundaries(summary):

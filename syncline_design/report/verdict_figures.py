@@ -113,7 +113,7 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
         for entry in entries:
             stage = f"{shortened(entry.stage, 14)}: " if many and entry.stage else ""
             label = stage + shortened(verdict_words.term_text(entry))
-            terms.append(figures.LedgerTerm(label, entry.value_m, entry.kind))
+            terms.append(figures.LedgerBar(label, entry.value_m, entry.kind))
         return figures.ledger(terms, lowest_limit(verdict, "accuracy"))
 
     caption = (
@@ -133,10 +133,10 @@ def choice_chart(verdict: Verdict) -> list[Node]:
     ]
 
     def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import FrontPoint, pareto_front
+        from syncline_design.report.figures_results import FrontMark, pareto_front
 
         target, price = (lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
-        drawn = [FrontPoint(*point) for point in sorted(points, key=lambda point: point[0])]
+        drawn = [FrontMark(*point) for point in sorted(points, key=lambda point: point[0])]
         return pareto_front(drawn, verdict_tables.currency_of(verdict), target, price)
 
     caption = (

@@ -15,7 +15,7 @@ from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotat
 from syncline_design.effects.record import NOTHING, Array, Departures, StageRows
 
 
-class Motion(Protocol):
+class ChainMotion(Protocol):
     """Where the vehicle is a while before or after each row's stamp."""
 
     def displacement(self, shift_s: Array) -> Array:
@@ -84,7 +84,7 @@ class ConstantTwist:
 
 
 @dataclass(frozen=True, slots=True)
-class Noise:
+class ChainNoise:
     """One draw of a stage's sensor noise and timestamp errors; zeros mean none.
 
     position_m (n, 3) NED; attitude_rad (n, 3) roll, pitch, yaw; range_m, azimuth_rad,
@@ -104,8 +104,8 @@ class Noise:
 
 def stage_error(
     rows: StageRows,
-    motion: Motion,
-    noise: Noise,
+    motion: ChainMotion,
+    noise: ChainNoise,
     departures: Departures = NOTHING,
     carried_m: Array | None = None,
 ) -> Array:
@@ -135,7 +135,7 @@ def stage_error(
     return error
 
 
-def _measured_rotation(rotation: Array, noise: Noise, departures: Departures) -> Array:
+def _measured_rotation(rotation: Array, noise: ChainNoise, departures: Departures) -> Array:
     """R_hat: the turned attitude sensor's Euler angles plus their noise."""
     if np.any(departures.attitude_rotation_rad):
         rotation = rotation @ rotation_exp(departures.attitude_rotation_rad)
@@ -146,7 +146,7 @@ def _measured_rotation(rotation: Array, noise: Noise, departures: Departures) ->
     return euler_to_rotation(rotation_to_euler(rotation) + offset)
 
 
-def _measured_vector(rows: StageRows, noise: Noise, departures: Departures) -> Array:
+def _measured_vector(rows: StageRows, noise: ChainNoise, departures: Departures) -> Array:
     """r_hat n_hat [m] in the axes the spec believes, (n, 3)."""
     azimuth, elevation = rows.azimuth_rad, rows.elevation_rad
     if np.any(departures.bearing_rotation_rad):

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from syncline_design.effects.record import Array
-from syncline_design.simulation.chain import Noise
+from syncline_design.simulation.chain import ChainNoise
 
 _SERIES_LIMIT = 1.0  # squared angle up to which the series is used
 _SERIES_ERROR = 1e-15  # relative size of the first term left out
@@ -260,9 +260,9 @@ def turn_columns(vector: Array, axis: int, sine: Array, cosine: Array) -> None:
     vector[i] = first
 
 
-def noise_rows(draw: Draw) -> Noise:
+def noise_rows(draw: Draw) -> ChainNoise:
     """The noise and timestamp errors of a draw, for the row-wise chain."""
-    return Noise(
+    return ChainNoise(
         position_m=draw.position_noise_m.T,
         attitude_rad=draw.angle_noise_rad[:3].T,
         range_m=draw.range_noise_m,

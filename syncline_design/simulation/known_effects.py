@@ -9,7 +9,7 @@ import numpy as np
 from syncline_design.effects.acting import Acting, departures
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.simulation import kernel
-from syncline_design.simulation.chain import Motion, Noise, stage_error
+from syncline_design.simulation.chain import ChainMotion, ChainNoise, stage_error
 from syncline_design.simulation.surroundings import Moment, placed_rows
 
 
@@ -43,7 +43,7 @@ def placed_error(
 
 
 def moved_error(
-    rows: tuple[StageRows, Motion, Noise],
+    rows: tuple[StageRows, ChainMotion, ChainNoise],
     acting: tuple[Acting, ...],
     generator: np.random.Generator | None,
     before: Carried | None,

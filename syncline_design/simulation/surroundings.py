@@ -15,7 +15,7 @@ import numpy as np
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.model.horizon import Horizon
-from syncline_design.simulation.chain import ConstantTwist, Noise
+from syncline_design.simulation.chain import ChainNoise, ConstantTwist
 from syncline_design.simulation.draws import RandomSource, angle
 from syncline_design.simulation.kernel import Draw, noise_rows
 
@@ -60,7 +60,7 @@ def lean(sine: Array, cosine: Array, along: Array, across: Array) -> Array:
 
 def placed_rows(
     draw: Draw, moment: Moment, lean_rad: Array
-) -> tuple[StageRows, ConstantTwist, Noise]:
+) -> tuple[StageRows, ConstantTwist, ChainNoise]:
     """A draw for the row-wise chain, at its moment and with roll and pitch (2, n)."""
     count = draw.bearing.shape[1]
     roll, pitch = lean_rad

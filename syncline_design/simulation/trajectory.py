@@ -28,7 +28,7 @@ from syncline_design.effects.record import Array, StageRows
 from syncline_design.machine.input_files import FileContent, UnsuitableError, read_plain
 from syncline_design.model.system import Platform, SimulationError, Stage, System
 from syncline_design.simulation import known_effects
-from syncline_design.simulation.chain import Noise
+from syncline_design.simulation.chain import ChainNoise
 from syncline_design.simulation.draws import (
     RandomSource,
     Shifts,
@@ -150,10 +150,10 @@ def _rows(
     )
 
 
-def _noise(system: System, index: int, shifts: Shifts, source: RandomSource) -> Noise:
+def _noise(system: System, index: int, shifts: Shifts, source: RandomSource) -> ChainNoise:
     drawn = noise_draw(system.stages[index], source)
     angles = drawn["angle_noise_rad"]
-    return Noise(
+    return ChainNoise(
         position_m=drawn["position_noise_m"].T,
         attitude_rad=angles[:3].T,
         range_m=drawn["range_noise_m"],

@@ -35,7 +35,7 @@ Kind = Literal["ball", "sphere"]
 
 
 @dataclass(frozen=True, slots=True)
-class Block:
+class FreeVector:
     """A vector to choose: of length at most 1 (ball) or exactly 1 (sphere)."""
 
     stage: int
@@ -53,9 +53,9 @@ def _is_placed(system: System) -> bool:
     return bool(system.effects) or (aimed and system.horizon.tilt_rad > 0.0)
 
 
-def blocks(system: System) -> tuple[Block, ...]:
+def blocks(system: System) -> tuple[FreeVector, ...]:
     """What may be chosen: once for the system when and where, then stage by stage."""
-    found: list[Block] = []
+    found: list[FreeVector] = []
     start = 0
     kinds: list[tuple[int, str, Kind, int]] = []
     if system.effects:
@@ -63,7 +63,7 @@ def blocks(system: System) -> tuple[Block, ...]:
     for index, stage in enumerate(system.stages):
         kinds += [(index, *one) for one in _stage_blocks(stage, index, _is_placed(system))]
     for index, name, kind, size in kinds:
-        found.append(Block(index, name, kind, slice(start, start + size)))
+        found.append(FreeVector(index, name, kind, slice(start, start + size)))
         start += size
     return tuple(found)
 

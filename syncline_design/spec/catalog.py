@@ -26,6 +26,7 @@ from syncline_design.spec.fields import (
     AngularRate,
     AtLeastOne,
     Count,
+    FileRecord,
     Mass,
     Money,
     NonNegativeLength,
@@ -35,7 +36,6 @@ from syncline_design.spec.fields import (
     Power,
     Ratio,
     Reader,
-    Record,
     SigmaLength,
     Speed,
     Text,
@@ -89,7 +89,7 @@ Basis = Annotated[
 ]
 
 
-class Entry(Record):
+class Entry(FileRecord):
     """What every catalog entry may say about itself."""
 
     name: str = ""
@@ -309,7 +309,7 @@ class ClockEntry(Product):
         return self
 
 
-class Catalog(Record):
+class Catalog(FileRecord):
     """All entries of one file, or of several merged."""
 
     platforms: dict[Text, PlatformEntry] = Field(default_factory=dict)

@@ -16,8 +16,8 @@ from syncline_design.model.quantity import (
     suffix_unit,
 )
 from syncline_design.spec.fields import (
+    FileRecord,
     Reader,
-    Record,
     Text,
     kind_of,
     read_number,
@@ -83,7 +83,7 @@ def _read_uncertainties(value: Any) -> dict[str, float]:
 _ParameterSchema = {"type": "object", "additionalProperties": {"type": ["number", "string"]}}
 
 
-class EffectChoice(Record):
+class EffectChoice(FileRecord):
     """A known systematic effect, as `diagnose` writes it; parameter names carry their unit.
 
     Stored in SI under the name with the SI suffix: `latency_ms: 87` reads as latency_s = 0.087.

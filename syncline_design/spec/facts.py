@@ -19,10 +19,10 @@ from pydantic_core import PydanticCustomError
 from syncline_design.model.conversion import conversion_of, kinds
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.fields import (
+    FileRecord,
     NonNegativeLength,
     PositiveLength,
     Reader,
-    Record,
     Text,
     did_you_mean,
     figure_of,
@@ -88,7 +88,7 @@ _TABLE = {"type": "object", "additionalProperties": _LENGTH}
 FarEnd = Annotated[float | dict[str, float], Reader(_read_far_end, {"anyOf": [_LENGTH, _TABLE]})]
 
 
-class Reach(Record):
+class Reach(FileRecord):
     """Between which distances a ranging sensor measures; `at` names the condition."""
 
     min: NonNegativeLength | None = None
@@ -130,7 +130,7 @@ def _text(value: float) -> str:
     return str(getattr(value, "text", value))
 
 
-class FieldOfView(Record):
+class FieldOfView(FileRecord):
     """Where a sensor looks, about its own axes; left out: a full turn, or not known."""
 
     azimuth: AngleInterval | None = None
@@ -161,7 +161,7 @@ def _read_date(value: Any) -> str:
 Day = Annotated[str, Reader(_read_date, {"type": "string", "format": "date"})]
 
 
-class Lifecycle(Record):
+class Lifecycle(FileRecord):
     """Whether a product can be had, as read on a day."""
 
     status: Literal["active", "discontinued", "announced"]
@@ -178,7 +178,7 @@ def _read_kind(value: Any) -> str:
     raise refusal("no such kind of figure", " or ".join(kinds()), kind_of(value), hint)
 
 
-class PrintedFigure(Record):
+class PrintedFigure(FileRecord):
     """One figure as its source prints it.
 
     over: the length that a share of a length refers to (a baseline, a slant range); at: under

@@ -34,7 +34,7 @@ from syncline_design.model.quantity import (
 from syncline_design.spec.yaml_text import KeyPath
 
 T = TypeVar("T")
-R = TypeVar("R", bound="Record")
+R = TypeVar("R", bound="FileRecord")
 MAX_SUGGESTIONS = 50  # of one record or list: more errors than that are no typing slips
 
 
@@ -79,7 +79,7 @@ def kind_of(value: object) -> str:
     return "a mapping" if isinstance(value, Mapping) else "a list"
 
 
-class Record(BaseModel):
+class FileRecord(BaseModel):
     """Base of everything read from a file: frozen, strict, no unknown keys."""
 
     # Built on first use: a run that meets no inline sensor pays nothing for that model.

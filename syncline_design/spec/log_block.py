@@ -10,8 +10,8 @@ from pydantic_core import PydanticCustomError
 
 from syncline_design.model.quantity import UNITS, Dimension, Quantity, suffix_unit
 from syncline_design.spec.fields import (
+    FileRecord,
     Reader,
-    Record,
     Text,
     did_you_mean,
     kind_of,
@@ -74,7 +74,7 @@ Place = Annotated[
 ]
 
 
-class LogChoice(Record):
+class LogChoice(FileRecord):
     """How a measured log names its columns: canonical name to `their.name [unit]`.
 
     origin: latitude, longitude, height above the ellipsoid of the log's local frame.

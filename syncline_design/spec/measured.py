@@ -12,10 +12,10 @@ from pydantic import Field, model_validator
 
 from syncline_design.spec.fields import (
     Count,
+    FileRecord,
     NonNegativeTime,
     PositiveTime,
     Reader,
-    Record,
     Text,
     kind_of,
     refusal,
@@ -35,7 +35,7 @@ Sha256 = Annotated[str, Reader(_read_sha256, {"type": "string", "pattern": "^[0-
 Share = Annotated[float, Field(gt=0.0, lt=1.0)]
 
 
-class MeasuredClaim(Record):
+class MeasuredClaim(FileRecord):
     """With `confidence`, a `session_share` of sessions of this length keep the error within
     `bound` for a share `coverage` of their time.
 
@@ -63,14 +63,14 @@ class MeasuredClaim(Record):
         return 3600.0 * float(self.hours) / self.sessions
 
 
-class EvidenceFile(Record):
+class EvidenceFile(FileRecord):
     """A log that the figures rest on."""
 
     file: Text
     sha256: Sha256
 
 
-class MeasuredEvent(Record):
+class MeasuredEvent(FileRecord):
     """What was no steady state: how often and how large, or one event with its time."""
 
     kind: Text
@@ -82,7 +82,7 @@ class MeasuredEvent(Record):
     to: str | float | None = None
 
 
-class MeasuredKeys(Record):
+class MeasuredKeys(FileRecord):
     """Keys of an error that was measured; `bound` replaces the distribution's own as tau."""
 
     bound: NonNegativeTime | None = None

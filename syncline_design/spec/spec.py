@@ -19,6 +19,7 @@ from syncline_design.spec.effects_listed import EffectChoice as EffectChoice
 from syncline_design.spec.fields import (
     AngularRate,
     AtLeastOne,
+    FileRecord,
     Money,
     NonNegativeAngle,
     NonNegativeLength,
@@ -26,7 +27,6 @@ from syncline_design.spec.fields import (
     PositiveLength,
     PositiveMoney,
     PositiveNumber,
-    Record,
     Speed,
     Text,
     Vector,
@@ -57,7 +57,7 @@ LIMIT_DIMENSIONS: dict[str, Dimension] = {
 }
 
 
-class Waiver(Record):
+class Waiver(FileRecord):
     """Why a requirement may be missed, and until when."""
 
     reason: Text
@@ -77,7 +77,7 @@ class Waiver(Record):
         return day <= date.fromisoformat(self.expires)
 
 
-class Requirement(Record):
+class Requirement(FileRecord):
     """One requirement; limit is a Quantity of the kind's dimension (a bare number for sync)."""
 
     id: Text
@@ -118,7 +118,7 @@ class Requirement(Record):
         return self
 
 
-class PlatformChoice(Record):
+class PlatformChoice(FileRecord):
     """A catalog id (`use`) with keys overridden, or all keys given."""
 
     use: Text | None = None
@@ -140,7 +140,7 @@ class PlatformChoice(Record):
         return self
 
 
-class Query(Record):
+class Query(FileRecord):
     """A catalog query: every key given must match."""
 
     modality: RoleName | None = None
@@ -157,7 +157,7 @@ def _read_candidates(value: Any) -> tuple[str, ...] | Query:
     return read_ids(value, "sensor")
 
 
-class MethodChoice(Record):
+class MethodChoice(FileRecord):
     """Timestamping methods to choose from."""
 
     candidates: Annotated[
@@ -165,14 +165,14 @@ class MethodChoice(Record):
     ]
 
 
-class InlineTimestamping(Record):
+class InlineTimestamping(FileRecord):
     """A role's timestamp error given in place, without method or hardware."""
 
     error: ErrorEntry
     timeline: Literal["host", "utc"] = "host"
 
 
-class ClockChoice(Record):
+class ClockChoice(FileRecord):
     """Clock disciplines of a vehicle's host to choose from."""
 
     candidates: Annotated[tuple[str, ...], BeforeValidator(lambda value: read_ids(value, "clock"))]
@@ -189,13 +189,13 @@ def _read_role_timestamping(value: Any) -> str | MethodChoice | InlineTimestampi
     raise refusal("not a timestamping choice", wanted, kind_of(value))
 
 
-def _one_or_candidates(what: str, model: type[Record]) -> BeforeValidator:
+def _one_or_candidates(what: str, model: type[FileRecord]) -> BeforeValidator:
     """A bare id stands for a list of one candidate."""
 
     def widen(value: Any) -> Any:
         if isinstance(value, str) and value:
             return {"candidates": (value,)}
-        if not isinstance(value, dict | Record):
+        if not isinstance(value, dict | FileRecord):
             raise refusal(
                 f"not a {what} choice", f"a {what} id, or {{candidates: [...]}}", kind_of(value)
             )
@@ -214,7 +214,7 @@ def _read_sensor(value: Any) -> str | SensorEntry:
     raise refusal("not a sensor", wanted, kind_of(value), hint)
 
 
-class RoleChoice(Record):
+class RoleChoice(FileRecord):
     """One role: pinned by `sensor`, or open with `candidates` (ids or a query).
 
     A later stage's position has neither: the chain before it is its position.
@@ -263,7 +263,7 @@ def _widen_platform(value: Any) -> Any:
     return value
 
 
-class StageChoice(Record):
+class StageChoice(FileRecord):
     """One vehicle that georeferences something."""
 
     name: Text
@@ -294,7 +294,7 @@ class StageChoice(Record):
         return self.vehicle or self.name
 
 
-class Trajectory(Record):
+class Trajectory(FileRecord):
     """What the vehicles do in a Monte Carlo run: a named manoeuvre, or a recorded track."""
 
     manoeuvre: Text | None = None
@@ -308,7 +308,7 @@ class Trajectory(Record):
         return self
 
 
-class MonteCarloChoice(Record):
+class MonteCarloChoice(FileRecord):
     """Size and envelope of the Monte Carlo run."""
 
     samples: Annotated[int, Field(ge=1, le=100_000_000)] = 50_000
@@ -330,7 +330,7 @@ class MonteCarloChoice(Record):
 MOST_TILT_RAD = math.radians(80.0)  # beyond it a level vehicle's roll, pitch and yaw lose meaning
 
 
-class HorizonChoice(Record):
+class HorizonChoice(FileRecord):
     """How long, how wide and how steep a mission is; what is not given is 1 h, 1 km, 10 deg."""
 
     duration: NonNegativeTime = DEFAULT_HORIZON.duration_s
@@ -349,7 +349,7 @@ class HorizonChoice(Record):
         return Horizon(float(self.duration), float(self.extent), float(self.tilt))
 
 
-class Spec(Record):
+class Spec(FileRecord):
     """One system: its requirements, stages, and how the choice is made."""
 
     syncline: Literal[1]

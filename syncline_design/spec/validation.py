@@ -8,10 +8,10 @@ from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
-from syncline_design.spec.fields import Record, did_you_mean, kind_of
+from syncline_design.spec.fields import FileRecord, did_you_mean, kind_of
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile, printable, show_path
 
-M = TypeVar("M", bound=Record)
+M = TypeVar("M", bound=FileRecord)
 
 _LIMITS = {
     "greater_than": ("gt", "more than"),

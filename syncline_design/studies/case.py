@@ -20,7 +20,7 @@ from syncline_design.spec.load import BadInput, without_simulated
 from syncline_design.spec.yaml_text import Flaw
 from syncline_design.studies.inputs import canonical, inputs_of
 from syncline_design.studies.loading import Base, Study
-from syncline_design.studies.record import SCHEMA, CaseFigures, CaseRecord, FrontPoint, lost
+from syncline_design.studies.record import SCHEMA, CaseFigures, CasePoint, CaseRecord, lost
 from syncline_design.verdict.tree import ChoiceResult, FileProblem, SynclineFigures, Verdict
 
 # Layers that a check cannot import: they show its results.
@@ -173,9 +173,7 @@ def _record(verdict: Verdict, left_out: tuple[str, ...]) -> CaseRecord:
         requirements=verdict.requirements,
         design=verdict.design,
         syncline=None if verdict.syncline is None else _figures(verdict.syncline),
-        front=tuple(
-            FrontPoint(p.cost, p.error_m) for p in choice.front or () if p.cost is not None
-        ),
+        front=tuple(CasePoint(p.cost, p.error_m) for p in choice.front or () if p.cost is not None),
         infeasibility=verdict.infeasibility,
         not_simulated=left_out,
         provisional=choice.proof is not None and not choice.proof.optimal,

@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from syncline_design.model.quantity import UNITS, Dimension, UnitError, parse_number
-from syncline_design.spec.fields import AtLeastOne, PositiveTime, Record, Text, kind_of, refusal
+from syncline_design.spec.fields import AtLeastOne, FileRecord, PositiveTime, Text, kind_of, refusal
 from syncline_design.spec.keys import label
 from syncline_design.spec.yaml_text import plain_scalar
 
@@ -80,7 +80,7 @@ Over = Annotated[
 ]
 
 
-class SampleChoice(Record):
+class SampleChoice(FileRecord):
     """A Latin hypercube: every range is cut into `count` equal parts, each part used once."""
 
     method: Literal["latin_hypercube"] = "latin_hypercube"
@@ -89,7 +89,7 @@ class SampleChoice(Record):
     over: Over
 
 
-class CheckChoice(Record):
+class CheckChoice(FileRecord):
     """How each case is checked.
 
     monte_carlo: true, false, or left out: only specs with a monte_carlo requirement simulate.
@@ -100,14 +100,14 @@ class CheckChoice(Record):
     time_limit: PositiveTime | None = None
 
 
-class HeatMapChoice(Record):
+class HeatMapChoice(FileRecord):
     """The two key paths of the heat map."""
 
     x: Text
     y: Text
 
 
-class StudyFile(Record):
+class StudyFile(FileRecord):
     """A study as its file says it; meets_when: which cases have to meet their requirements."""
 
     study: Literal[1]
@@ -145,7 +145,7 @@ class Factor:
 
 
 @dataclass(frozen=True, slots=True)
-class Span:
+class ValueSpan:
     """A range of a figure in one unit ("" for bare numbers)."""
 
     low: Fraction
@@ -194,7 +194,7 @@ def _split(value: Any) -> tuple[Fraction, str]:
         raise FactorError("not a figure", "one such as 40 m", repr(text)) from None
 
 
-def span_of(value: Any) -> Span | None:
+def span_of(value: Any) -> ValueSpan | None:
     """The range that a value of the file means; None when it is none."""
     if isinstance(value, str) and " .. " in value:
         low, _, high = value.partition(" .. ")
@@ -216,7 +216,7 @@ def _bound(text: str) -> Any:
     return plain_scalar(text.strip())
 
 
-def _span(low: Any, high: Any, scale: Scale = "linear") -> Span:
+def _span(low: Any, high: Any, scale: Scale = "linear") -> ValueSpan:
     (first, unit), (last, other) = _split(low), _split(high)
     if (unit and UNITS[unit][0]) != (other and UNITS[other][0]):
         raise FactorError("a range from one kind of figure to another", unit, other)
@@ -228,7 +228,7 @@ def _span(low: Any, high: Any, scale: Scale = "linear") -> Span:
         raise FactorError("an empty range", "low < high", f"{label(low)} .. {label(high)}")
     if scale == "log" and first <= 0:
         raise FactorError("a logarithmic range from 0 or below", "low > 0", label(low), ("low",))
-    return Span(first, last, unit, scale)
+    return ValueSpan(first, last, unit, scale)
 
 
 def grid_values(value: Any) -> tuple[tuple[Any, ...], bool]:

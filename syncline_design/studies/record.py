@@ -35,7 +35,7 @@ class CaseFigures(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class FrontPoint(Record):
+class CasePoint(Record):
     """One point of an exact front."""
 
     cost: float
@@ -43,7 +43,7 @@ class FrontPoint(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Pick(Record):
+class RolePick(Record):
     """One role of a design: stage.role, sensor, and how it is stamped."""
 
     role: str
@@ -64,7 +64,7 @@ class CaseRecord(Record):
     requirements: tuple[RequirementResult, ...] = ()
     design: NamedDesign | None = None
     syncline: CaseFigures | None = None
-    front: tuple[FrontPoint, ...] = ()
+    front: tuple[CasePoint, ...] = ()
     infeasibility: Explanation | None = None
     not_simulated: tuple[str, ...] = ()
     problems: tuple[FileProblem, ...] = ()
@@ -95,12 +95,12 @@ class CaseRecord(Record):
         return None if self.syncline is None else self.syncline.total_m
 
     @property
-    def picks(self) -> Iterator[Pick]:
+    def picks(self) -> Iterator[RolePick]:
         """What fills the roles of the case's design."""
         for stage, role, taken in self.design.roles if self.design is not None else ():
             stamping = f"{taken.timestamping} ({taken.primitive})"
             name = taken.name or taken.sensor
-            yield Pick(f"{stage.name}.{role}", taken.sensor, name, stamping)
+            yield RolePick(f"{stage.name}.{role}", taken.sensor, name, stamping)
 
 
 def lost(reason: str) -> CaseRecord:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
-from syncline_design.studies.summary import Summary, axis_values, varied
+from syncline_design.studies.summary import StudySummary, axis_values, varied
 
 LOG_SPAN = 30.0  # an axis whose ends differ by more than this factor is logarithmic
 
@@ -41,7 +41,7 @@ class Scatter:
     others: tuple[str, ...]
 
 
-def scatter(summary: Summary) -> Scatter | None:
+def scatter(summary: StudySummary) -> Scatter | None:
     """The cases over the two factors that the study names, else over its first two of figures.
 
     None where fewer than two factors vary.
@@ -64,7 +64,7 @@ def scatter(summary: Summary) -> Scatter | None:
     return Scatter(x, y, points, others)
 
 
-def _axes(summary: Summary) -> tuple[tuple[int, Factor], tuple[int, Factor]] | None:
+def _axes(summary: StudySummary) -> tuple[tuple[int, Factor], tuple[int, Factor]] | None:
     several = varied(summary)
     named = summary.result.study.heat_map
     if named is not None:

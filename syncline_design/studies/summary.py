@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import Factor, figure_of
-from syncline_design.studies.record import CaseWord, FrontPoint, Pick
+from syncline_design.studies.record import CasePoint, CaseWord, RolePick
 
 if TYPE_CHECKING:
     from syncline_design.studies.result import CaseResult, StudyResult
@@ -30,7 +30,7 @@ class Brief:
     cost: float | None
     currency: str
     error_m: float | None
-    picks: tuple[Pick, ...]
+    picks: tuple[RolePick, ...]
 
     @property
     def meets(self) -> bool:
@@ -44,11 +44,11 @@ class Front(Record):
 
     cases: tuple[int, ...]
     currency: str
-    points: tuple[FrontPoint, ...]
+    points: tuple[CasePoint, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
+class StudySummary:
     """Every case in a line, and the fronts that differ."""
 
     result: StudyResult
@@ -80,7 +80,7 @@ class HeatMap(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class Winner(Pick):
+class Winner(RolePick):
     """One option of a role: in how many of how many meeting cases it was chosen.
 
     where: per factor that varies, the values between which it wins.
@@ -105,10 +105,10 @@ class Boundary(Record):
     why: CaseWord
 
 
-def summarise(result: StudyResult) -> Summary:
+def summarise(result: StudyResult) -> StudySummary:
     """One pass over all cases."""
     briefs: list[Brief] = []
-    fronts: dict[tuple[tuple[FrontPoint, ...], str], list[int]] = {}
+    fronts: dict[tuple[tuple[CasePoint, ...], str], list[int]] = {}
     for case in result.cases():
         briefs.append(_brief(case))
         points = case.record.front
@@ -116,7 +116,7 @@ def summarise(result: StudyResult) -> Summary:
         if points and (key in fronts or len(fronts) < MOST_FRONTS):
             fronts.setdefault(key, []).append(case.number)
     found = (Front(tuple(cases), currency, points) for (points, currency), cases in fronts.items())
-    return Summary(result, tuple(briefs), tuple(found))
+    return StudySummary(result, tuple(briefs), tuple(found))
 
 
 def _brief(case: CaseResult) -> Brief:
@@ -127,7 +127,7 @@ def _brief(case: CaseResult) -> Brief:
     )  # fmt: skip
 
 
-def varied(summary: Summary) -> list[tuple[int, Factor]]:
+def varied(summary: StudySummary) -> list[tuple[int, Factor]]:
     """Factors with more than one value, and their place among all factors."""
     factors = summary.result.study.factors
     return [(i, f) for i, f in enumerate(factors) if len(set(map(label, f.values))) > 1]
@@ -142,7 +142,7 @@ def axis_values(factor: Factor) -> tuple[str, ...]:
     return tuple(text for text, _ in values)
 
 
-def heat_map(summary: Summary) -> HeatMap | None:
+def heat_map(summary: StudySummary) -> HeatMap | None:
     """The study's heat map: the factors it names, else its first two, those of the grid first.
 
     None where a cell of it was never computed, as between the points of a sample: an empty cell
@@ -164,7 +164,7 @@ def heat_map(summary: Summary) -> HeatMap | None:
     return _filled(summary, x, y) if _covered(summary, x, y) else None
 
 
-def _covered(summary: Summary, x: Factor, y: Factor) -> bool:
+def _covered(summary: StudySummary, x: Factor, y: Factor) -> bool:
     """Whether every combination of the two factors' values was computed."""
     factors = summary.result.study.factors
     across, up = factors.index(x), factors.index(y)
@@ -172,7 +172,7 @@ def _covered(summary: Summary, x: Factor, y: Factor) -> bool:
     return len(computed) == len(axis_values(x)) * len(axis_values(y))
 
 
-def _filled(summary: Summary, x: Factor, y: Factor) -> HeatMap:
+def _filled(summary: StudySummary, x: Factor, y: Factor) -> HeatMap:
     factors = summary.result.study.factors
     across, up = factors.index(x), factors.index(y)
     best: dict[tuple[str, str], Brief] = {}
@@ -202,10 +202,10 @@ def payload(brief: Brief) -> str:
     return ", ".join(pick.name for pick in brief.picks)
 
 
-def winners(summary: Summary) -> list[Winner]:
+def winners(summary: StudySummary) -> list[Winner]:
     """Options that a meeting case chose, most frequent first within each role."""
     meeting = [brief for brief in summary.briefs if brief.meets]
-    held: dict[Pick, list[Brief]] = {}
+    held: dict[RolePick, list[Brief]] = {}
     for brief in meeting:
         for pick in brief.picks:
             held.setdefault(pick, []).append(brief)
@@ -216,7 +216,7 @@ def winners(summary: Summary) -> list[Winner]:
 
 
 def _winner(
-    pick: Pick, choosing: list[Brief], meeting: list[Brief], several: list[tuple[int, Factor]]
+    pick: RolePick, choosing: list[Brief], meeting: list[Brief], several: list[tuple[int, Factor]]
 ) -> Winner:
     """choosing: the meeting cases that chose it."""
     having = sum(any(p.role == pick.role for p in brief.picks) for brief in meeting)
@@ -236,7 +236,7 @@ def _extent(factor: Factor, present: set[str]) -> str:
     return ", ".join(ordered[:6]) + (", ..." if len(ordered) > 6 else "")
 
 
-def boundaries(summary: Summary) -> list[Boundary]:
+def boundaries(summary: StudySummary) -> list[Boundary]:
     """Where feasibility ends: along every grid factor of figures, with all the others fixed."""
     study = summary.result.study
     found: list[Boundary] = []
@@ -255,7 +255,7 @@ def boundaries(summary: Summary) -> list[Boundary]:
 
 
 def _flips(
-    summary: Summary, factor: Factor, line: Sequence[Brief], base: int, others: tuple[str, ...]
+    summary: StudySummary, factor: Factor, line: Sequence[Brief], base: int, others: tuple[str, ...]
 ) -> Iterator[Boundary]:
     result = summary.result
     keys = [f.key for f in result.study.factors if f.key != factor.key]

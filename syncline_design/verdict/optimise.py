@@ -33,6 +33,7 @@ from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.records import Named, Record, optional
+from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.references import names_candidates
@@ -77,14 +78,6 @@ class OptimizeSettings:
     seed: int = 0
     every: bool = False
     report: bool = False  # the whole verdict too, for a page
-
-
-@dataclass(frozen=True, slots=True)
-class SpecName(Record):
-    """Which spec."""
-
-    name: str
-    file: str
 
 
 @dataclass(frozen=True, slots=True)
