@@ -7,10 +7,13 @@ import resource
 import stat
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from syncline_design.machine.deadline import Deadline, a_command, limit_command, of_command
+from syncline_design.machine.result_files import write_file
 from syncline_design.report.write import (
     OutputError,
     Target,
@@ -189,3 +192,47 @@ def test_unwritable_folder_is_a_clear_error(tmp_path: Path) -> None:
 def test_a_folder_that_cannot_be_made_is_a_clear_error() -> None:
     with pytest.raises(OutputError, match="cannot write"):
         write_outputs([(Target("json", "/proc/no/such/a.json"), "{}")])
+
+
+def test_a_pipe_that_nobody_reads_ends_with_the_time_limit(tmp_path: Path) -> None:
+    """Opening such a pipe waits for a reader: it waited for ever, whatever limit was set."""
+    os.mkfifo(tmp_path / "pipe")
+    start = time.monotonic()
+    with a_command():
+        limit_command(Deadline(0.2))
+        with pytest.raises(OutputError, match=r"nobody reads it, and the time limit of 0\.2 s"):
+            write_file(tmp_path / "pipe", b"all")
+    assert time.monotonic() - start < 3.0
+    assert of_command().limit_s is None
+
+
+@pytest.mark.parametrize("limit_s", [0.2, None])
+def test_a_slow_reader_of_a_pipe_gets_everything(tmp_path: Path, limit_s: float | None) -> None:
+    """Long after the limit, as long as it goes on reading."""
+    os.mkfifo(tmp_path / "pipe")
+    content = bytes(range(256)) * 800  # three times what a pipe holds
+    slow = (
+        "import sys, time\ngot = b''\nwith open(sys.argv[1], 'rb', buffering=0) as pipe:\n"
+        "    while piece := pipe.read(40_000):\n        got += piece\n        time.sleep(0.3)\n"
+        "sys.stdout.buffer.write(got)"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", slow, str(tmp_path / "pipe")], stdout=subprocess.PIPE
+    ) as reader:
+        with (tmp_path / "pipe").open("wb"), a_command():  # the reader is there
+            limit_command(Deadline(limit_s))
+            write_file(tmp_path / "pipe", content)
+        assert reader.stdout is not None
+        assert reader.stdout.read() == content
+
+
+def test_a_reader_that_stops_reading_does_not_hold_a_command(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        with a_command():
+            limit_command(Deadline(0.1))
+            with pytest.raises(OutputError, match="nobody reads it"):
+                write_file(tmp_path / "pipe", bytes(300_000))
+    finally:
+        os.close(reader)

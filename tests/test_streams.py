@@ -219,6 +219,37 @@ def test_an_interrupted_cluster_ends_with_one_line(folder: Path, seconds: float)
     assert said.decode().splitlines()[-1] == "syncline-design: interrupted"
 
 
+def started_workers(parent: int) -> list[str]:
+    """Command lines of the processes that multiprocessing has started below one."""
+    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
+    lines = [Path(f"/proc/{pid}/cmdline").read_bytes().decode() for pid in children]
+    return [line for line in lines if "spawn_main" in line]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+@pytest.mark.parametrize("seconds", [0.05, 0.3])
+def test_workers_that_are_still_starting_hear_of_no_interrupt(folder: Path, seconds: float) -> None:
+    """Interrupted while they imported, each wrote a traceback ("Fatal Python error") of its own."""
+    (folder / "study.yaml").write_text(
+        "study: 1\nname: s\nbase: good.yaml\n"
+        'grid: {"requirements[ACC-1].limit": {low: 1 cm, high: 9 cm, count: 500}}\n'
+    )
+    process = subprocess.Popen(
+        [str(COMMAND), "study", "study.yaml", "--workers", "3"], cwd=folder,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True,
+    )  # fmt: skip
+    end = time.monotonic() + 60
+    while len(started_workers(process.pid)) < 3 and time.monotonic() < end:
+        time.sleep(0.01)
+    time.sleep(seconds)
+    os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to every process
+    _, said = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert b"Error" not in said, said.decode()
+    assert b"Traceback" not in said, said.decode()
+    assert said.decode().splitlines()[-1] == "syncline-design: interrupted"
+
+
 def test_a_panic_in_a_library_is_no_verdict(capsys: pytest.CaptureFixture[str]) -> None:
     """Panics in Rust are no `Exception`: one ended with a traceback and code 1, a verdict."""
     panic = type("PanicException", (BaseException,), {})

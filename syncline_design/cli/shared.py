@@ -71,12 +71,13 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
 
     @functools.wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
+        from syncline_design.machine.deadline import a_command
         from syncline_design.machine.input_files import ReplacedInputError, noting
         from syncline_design.machine.result_files import OutputError
         from syncline_design.spec.load import BadInput
 
         try:
-            with noting():
+            with noting(), a_command():
                 code = command(*args, **kwargs)
         except typer.Exit:
             raise
@@ -183,9 +184,9 @@ def emit(
 
 def deadline_of(time_limit_s: float | None) -> Deadline:
     """The command's time limit, which begins now: before anything slow is imported."""
-    from syncline_design.machine.deadline import Deadline
+    from syncline_design.machine.deadline import Deadline, limit_command
 
-    return Deadline(time_limit_s, doing="reading")
+    return limit_command(Deadline(time_limit_s, doing="reading"))
 
 
 @contextmanager

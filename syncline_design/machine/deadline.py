@@ -107,6 +107,30 @@ def within_s(limit_s: float | None) -> AbstractContextManager[Deadline]:
     return within(in_force().inner(limit_s))
 
 
+_COMMAND: ContextVar[Deadline | None] = ContextVar("deadline of the command", default=None)
+
+
+@contextmanager
+def a_command() -> Iterator[None]:
+    """One command from its start to its end; the limit that it sets ends with it."""
+    token = _COMMAND.set(None)
+    try:
+        yield
+    finally:
+        _COMMAND.reset(token)
+
+
+def limit_command(deadline: Deadline) -> Deadline:
+    """Set the limit of the whole command, which counts where its work is done too."""
+    _COMMAND.set(deadline)
+    return deadline
+
+
+def of_command() -> Deadline:
+    """The limit of the whole command; one without an end where there is none."""
+    return _COMMAND.get() or Deadline()
+
+
 OVERDUE_S = 0.8  # how long work may go on without asking, after the time is over
 AGAIN_S = 5.0  # until it is ended once more: tidying up takes less
 

@@ -20,12 +20,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Final
 
+from syncline_design.machine.deadline import OutOfTime, of_command, overdue
+
 fcntl: ModuleType | None
 try:
     import fcntl
 except ImportError:  # no locks here: nothing is cleared away
     fcntl = None
 
+_PIECE: Final = 4096  # what a pipe takes at once or not at all
 _TEMPORARY: Final = re.compile(r"\.syncline-design-[0-9a-f]{32}\.part")
 _DESCRIPTOR: Final = re.compile(r"/(?:dev/fd|proc/(?:self|thread-self)/fd)/([0-9]{1,6})")
 _STANDARD: Final = {"/dev/stdin": 0, "/dev/stdout": 1, "/dev/stderr": 2}
@@ -151,6 +154,16 @@ def _temporary_in(folder: Path) -> tuple[Path, int]:
         os.close(descriptor)
 
 
+def _feed(descriptor: int, content: bytes) -> None:
+    """Write to a device or a pipe; OutOfTime where the command's time is over and nobody reads.
+
+    As long as there is a reader, however slow, it gets everything.
+    """
+    for start in range(0, max(len(content), 1), _PIECE):
+        with overdue(of_command()):
+            _write_all(descriptor, content[start : start + _PIECE])
+
+
 def _write_all(descriptor: int, content: bytes) -> None:
     left = memoryview(content)
     while left:
@@ -215,13 +228,17 @@ def _write_through(path: Path, content: bytes) -> None:
         if number in (1, 2):
             with contextlib.suppress(AttributeError, ValueError):
                 (sys.stdout if number == 1 else sys.stderr).flush()
-        opened = os.open(path, os.O_WRONLY) if number is None else os.dup(number)
+        with overdue(of_command()):  # a pipe opens once somebody reads it
+            opened = os.open(path, os.O_WRONLY) if number is None else os.dup(number)
         try:
-            _write_all(opened, content)
+            _feed(opened, content)
         finally:
             os.close(opened)
     except OSError as error:
         raise explained(path, error) from None
+    except OutOfTime:
+        limit = f"the time limit of {of_command().limit_s:g} s is over"
+        raise OutputError(f"{path}: cannot write: nobody reads it, and {limit}") from None
 
 
 def explained(final: Path, error: OSError) -> OutputError:

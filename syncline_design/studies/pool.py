@@ -21,7 +21,12 @@ from multiprocessing.process import BaseProcess
 from typing import Any
 
 from syncline_design.machine.deadline import in_force
-from syncline_design.machine.processes import end_with_parent, ended_by_signals, starting_safely
+from syncline_design.machine.processes import (
+    end_with_parent,
+    ended_by_signals,
+    interrupts_held_back,
+    starting_safely,
+)
 from syncline_design.studies.case import CaseSettings, check_case
 from syncline_design.studies.inputs import canonical
 from syncline_design.studies.loading import Study
@@ -92,7 +97,7 @@ class Pool:
         # starts would leave the parent writing to nobody for ever.
         process = self._context.Process(target=_work, args=(theirs,), daemon=True)
         try:
-            with starting_safely():
+            with starting_safely(), interrupts_held_back():  # also while it imports what it needs
                 process.start()
         except OSError as error:
             reason = error.strerror or error
