@@ -146,8 +146,8 @@ def test_cofactors_invert() -> None:
     assert determinant == pytest.approx(np.linalg.det(white), rel=1e-9)
 
 
-def structure(n: int) -> Structure:
-    time_s = np.arange(n) * 0.2
+def structure(n: int, step_s: float = 0.2) -> Structure:
+    time_s = np.arange(n) * step_s
     eye = np.broadcast_to(np.eye(3), (n, 3, 3))
     return Structure(
         time_s,
@@ -181,6 +181,22 @@ def test_white_noise_stays_white() -> None:
     assert level.factor[0] == pytest.approx(1.0, rel=0.06)
     assert max(level.slow[0]) < 0.05
     assert nll == pytest.approx(precision(parts, level).negative_log_likelihood(error))
+
+
+@pytest.mark.parametrize("step_s", [0.5, 1.0, 5.0])
+def test_slow_noise_does_not_pass_for_white_noise_in_rows_far_apart(step_s: float) -> None:
+    """Noise that is forgotten from row to row is white: of twice the spec's size, all of it.
+
+    800 rows tell the factor to 1.5 %, four standard errors are allowed.
+    """
+    rng, n = np.random.default_rng(6), 800
+    parts = structure(n, step_s)
+    error = 2e-2 * rng.standard_normal((n, 3))
+    bounds = spec_bounds(parts).opened(parts, ("uav", "position"), "factor")
+    level, _ = fit_noise(parts, error, bounds, first_guess(parts))
+    assert level.factor[0] == pytest.approx(2.0, rel=0.06)
+    kept, _ = fit_noise(parts, error, spec_bounds(parts), first_guess(parts))
+    assert kept.time_constant_s[0][0] >= 1.99 * step_s
 
 
 def test_the_threshold_is_what_clean_scores_reach() -> None:

@@ -27,6 +27,7 @@ SLOW_LEAST = 1e-4
 OPEN = 1e6
 RELATIVE_FLOOR = 1e-12  # of a row's variances: keeps them invertible whatever sizes meet in a row
 TIME_LEAST_S = 0.2
+TIME_LEAST_STAMPS = 2.0  # between stamps: noise that is quicker is white in the log
 TIME_MOST_S = 120.0
 TIME_USUAL_S = 25.0  # centre of the weak prior on time constants: minutes or fractions of one
 FACTOR_SPREAD = 0.15  # of the prior on log factor, below the limit
@@ -267,6 +268,9 @@ class _Packing:
         self.structure = structure
         self.bounds = bounds
         self.free_sizes = free_sizes
+        between = np.diff(np.unique(structure.time_s))
+        usual_s = float(np.median(between)) if between.size else 0.0
+        self.least_s = float(np.clip(TIME_LEAST_STAMPS * usual_s, TIME_LEAST_S, TIME_USUAL_S))
 
     def pack(self, level: NoiseLevel) -> Array:
         values = [*level.factor]
@@ -286,7 +290,7 @@ class _Packing:
             limits += [(np.log(SLOW_LEAST), np.log(b)) for b in slow]
         for part in self.structure.slow:
             count = 1 if part.shared_time else part.columns
-            limits += [(np.log(TIME_LEAST_S), np.log(TIME_MOST_S))] * count
+            limits += [(np.log(self.least_s), np.log(TIME_MOST_S))] * count
         limits += [(np.log(1e-7), np.log(10.0))] * len(self.free_sizes)
         return limits
 
