@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterable, Iterator, Sequence
 from fractions import Fraction
+from typing import Any
 
 from syncline_design.choice.evaluate import chosen_clocks, chosen_options, evaluate
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem
+from syncline_design.report.csv_out import plain_csv
 from syncline_design.verdict.optimise import Optimised
-
-FORMULA_STARTS = ("=", "+", "-", "@", "\t", "\r")
 
 
 def optimisation_csv(found: Optimised) -> str:
@@ -27,28 +25,29 @@ def front_csv(problem: Problem, points: Sequence[FrontPoint], resource: Resource
     """The front as CSV: amount, error in m, then sensor, primitive, method of every role."""
     headers = [resource, "error_m", *_design_headers(problem)]
     rows = [
-        [_plain(point.amount), repr(point.error_m), *_design_cells(problem, point.design)]
+        [_plain(point.amount), point.error_m, *_design_cells(problem, point.design)]
         for point in points
     ]
-    return _csv(headers, rows)
+    return plain_csv(headers, rows)
 
 
 def designs_csv(problem: Problem, designs: Iterable[Design]) -> str:
     """Designs as CSV: cost, mass, power, error in m, then their choices."""
     headers = ["cost", "mass_kg", "power_w", "error_m", *_design_headers(problem)]
-    rows = []
+    rows: list[list[Any]] = []
     for design in designs:
         found = evaluate(problem, design)
         sums = [_plain(found.cost), _plain(found.mass), _plain(found.power)]
-        rows.append([*sums, repr(found.error_m), *_design_cells(problem, design)])
-    return _csv(headers, rows)
+        rows.append([*sums, found.error_m, *_design_cells(problem, design)])
+    return plain_csv(headers, rows)
 
 
-def _plain(amount: Fraction | float | None) -> str:
+def _plain(amount: Fraction | float | None) -> int | float | None:
+    """Without a point where it is whole."""
     if amount is None:
-        return ""
+        return None
     exact = Fraction(amount)
-    return str(exact.numerator) if exact.denominator == 1 else repr(float(exact))
+    return exact.numerator if exact.denominator == 1 else float(exact)
 
 
 def _design_headers(problem: Problem) -> Iterator[str]:
@@ -65,22 +64,3 @@ def _design_cells(problem: Problem, design: Design) -> Iterator[str]:
         yield from option.names
     for clock in chosen_clocks(problem, design):
         yield clock.id or ""
-
-
-def _csv(headers: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Rows as CSV; text that a spreadsheet would run as a formula is quoted by an apostrophe."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([_inert(cell) for cell in headers])
-    writer.writerows([_inert(cell) for cell in row] for row in rows)
-    return out.getvalue()
-
-
-def _inert(cell: str) -> str:
-    if not cell.startswith(FORMULA_STARTS):
-        return cell
-    try:
-        float(cell)
-    except ValueError:
-        return "'" + cell
-    return cell

@@ -17,12 +17,23 @@ _COLUMNS = ("spec", "file", "verdict", "requirement", "kind", "status", "value",
 
 
 def csv_text(columns: Sequence[str], rows: Iterable[Mapping[str, Any]]) -> str:
-    """Rows under a header; figures in full precision, missing ones empty."""
+    """Rows under a header; figures in full precision, missing ones empty, texts quoted."""
     stream = io.StringIO(newline="")
     writer = csv.writer(stream, quoting=csv.QUOTE_NONNUMERIC, lineterminator="\r\n")
+    return _written(stream, writer, columns, ([row.get(name) for name in columns] for row in rows))
+
+
+def plain_csv(columns: Sequence[str], rows: Iterable[Iterable[Any]]) -> str:
+    """The same for rows of cells, quoted only where they must be, with Unix line ends."""
+    stream = io.StringIO(newline="")
+    return _written(stream, csv.writer(stream, lineterminator="\n"), columns, rows)
+
+
+def _written(
+    stream: io.StringIO, writer: Any, columns: Sequence[str], rows: Iterable[Iterable[Any]]
+) -> str:
     writer.writerow([spreadsheet_safe(column) for column in columns])
-    for row in rows:
-        writer.writerow([_cell(row.get(column)) for column in columns])
+    writer.writerows([_cell(value) for value in row] for row in rows)
     return stream.getvalue()
 
 
