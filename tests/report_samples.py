@@ -14,7 +14,8 @@ from syncline_design.report.on_simulation import on_simulation
 from syncline_design.simulation import Simulation, SimulationSettings, simulate
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.load import load_text
-from syncline_design.verdict.tree import FileProblem, NamedDesign, Refused, Verdict
+from syncline_design.verdict.named import NamedDesign
+from syncline_design.verdict.tree import FileProblem, Refused, Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 from tests.simulation_systems import fixed_wing as fixed_wing_system
 

@@ -25,7 +25,8 @@ from syncline_design.diagnosis.result import Fit, Gap, HeldOut
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.report.diagnoses import render_diagnose
-from syncline_design.report.on_diagnosis import closed_text, on_diagnosis
+from syncline_design.report.on_diagnosis import on_diagnosis
+from syncline_design.report.on_gap import closed_text
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import BadInput, load
 from tests.world import Hidden, WorldLog, hidden, make_log, scenario

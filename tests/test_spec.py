@@ -13,14 +13,9 @@ from pydantic import ValidationError
 
 from syncline_design.model.quantity import UNITS, Dimension, Quantity
 from syncline_design.spec.case import IN_PLACE, Case
+from syncline_design.spec.choices import InlineTimestamping, RoleChoice
 from syncline_design.spec.load import BadInput, load, load_text
-from syncline_design.spec.spec import (
-    EffectChoice,
-    InlineTimestamping,
-    RoleChoice,
-    Waiver,
-    split_column,
-)
+from syncline_design.spec.spec import EffectChoice, Waiver, split_column
 
 SPECS = Path(__file__).parent.parent / "specs"
 SHIPPED = sorted(SPECS.glob("*.yaml"))

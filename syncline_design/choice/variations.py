@@ -13,7 +13,7 @@ from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import IN_PLACE, Case
 from syncline_design.spec.catalog import SensorEntry
-from syncline_design.spec.spec import MethodChoice
+from syncline_design.spec.choices import MethodChoice
 
 Build = Callable[[Case], Problem]
 PlatformFigure = Literal["v_max", "distance", "omega_max"]

@@ -11,8 +11,9 @@ from syncline_design.comparison.meaning import as_measured
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry
-from syncline_design.spec.spec import ClockChoice
-from syncline_design.verdict.tree import NamedRole, Verdict, Word
+from syncline_design.spec.choices import ClockChoice
+from syncline_design.verdict.named import NamedRole
+from syncline_design.verdict.tree import Verdict, Word
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 

@@ -16,15 +16,9 @@ from syncline_design.simulation.results import QuantileEstimate
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice
+from syncline_design.verdict.named import NamedDesign
 from syncline_design.verdict.optimise import pinned_case
-from syncline_design.verdict.tree import (
-    MissionHorizon,
-    NamedDesign,
-    RequirementResult,
-    Verdict,
-    Word,
-    finite,
-)
+from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
 from syncline_design.verdict.verified import frame
 from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
 

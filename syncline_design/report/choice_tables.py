@@ -13,13 +13,8 @@ from syncline_design.report.words import PRIMITIVES
 
 if TYPE_CHECKING:
     from syncline_design.choice.outcome import PriceStep
-    from syncline_design.verdict.tree import (
-        Exclusion,
-        FrontDesign,
-        NamedDesign,
-        RankedDesign,
-        Verdict,
-    )
+    from syncline_design.verdict.named import Exclusion, FrontDesign, NamedDesign, RankedDesign
+    from syncline_design.verdict.tree import Verdict
 
 
 def choice_tables(verdict: Verdict) -> list[Table]:

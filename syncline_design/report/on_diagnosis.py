@@ -10,18 +10,14 @@ from typing import Final
 from syncline_design.comparison.meaning import DesignMeaning, DiagnosisAndDesign
 from syncline_design.diagnosis.identify import SAME
 from syncline_design.diagnosis.result import (
-    Coverage,
     Diagnosis,
     Estimate,
     Finding,
-    Fit,
     Gap,
-    HeldOut,
     LogRead,
     Plots,
     Regime,
     Rival,
-    WholeGap,
 )
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
@@ -43,6 +39,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.on_gap import closed_text, gap_nodes, rms_length
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 
@@ -77,7 +74,7 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
         facts=tuple(_facts(found)),
         sections=(
             *section("findings", "What is missing", _findings(found), "Findings"),
-            *section("gap", "How much of the gap is closed", _gap(found), "Gap"),
+            *section("gap", "How much of the gap is closed", gap_nodes(found), "Gap"),
             *section("residuals", "Residuals", _residuals(found.plots)),
             *section("where", "Where they disagree", _where(found), "Where"),
             *section("unseen", "What this log cannot show", _items(found.unseen), "Not shown"),
@@ -132,22 +129,15 @@ def _facts(found: Diagnosis) -> list[tuple[str, str]]:
     gap, log, facts = found.gap, found.log, []
     if gap.held_out is not None:
         scores = gap.held_out
-        facts.append(("RMS before", _length(scores.before.rms_m)))
-        facts.append(("RMS after", _length(scores.after.rms_m)))
-        facts.append(("RMS at best", _length(scores.fitted.rms_m)))
+        facts.append(("RMS before", rms_length(scores.before.rms_m)))
+        facts.append(("RMS after", rms_length(scores.after.rms_m)))
+        facts.append(("RMS at best", rms_length(scores.fitted.rms_m)))
         if closed := closed_text(gap, scores):
             facts.insert(0, ("Gap closed on held-out data", closed))
     if gap.expected_rms_m is not None:
-        facts.append(("The spec's noise expects", _length(gap.expected_rms_m)))
+        facts.append(("The spec's noise expects", rms_length(gap.expected_rms_m)))
     rows = f"{numbers.count(log.used)} of {numbers.count(log.rows)}"
     return [*facts, ("Rows used", rows)]
-
-
-def closed_text(gap: Gap, scores: HeldOut) -> str:
-    """Which share of the gap is closed; in words where there is none to speak of."""
-    if gap.closed_fraction is not None:
-        return numbers.percent(gap.closed_fraction) if gap.closed_fraction > 0.0 else "nothing"
-    return "less than 2 % of it could be, too little for a share" if scores.slight else ""
 
 
 def _findings(found: Diagnosis) -> list[Node]:
@@ -219,105 +209,6 @@ def _parameter_text(shown: Estimate) -> str:
     return numbers.with_uncertainty(shown.value, spread, shown.unit)
 
 
-def _length(value_m: float) -> str:
-    """Metres as the console prints them: 12.3 cm there is 12.3 cm here."""
-    return numbers.with_uncertainty(value_m, None, "m")
-
-
-def _gap(found: Diagnosis) -> list[Node]:
-    lead = (
-        "Judged on data that the fit did not see. At best is what the same effects reach when all "
-        "rows are fitted; RMS alone cannot show an effect on the noise itself, the likelihood "
-        "(NLL) and the coverage do."
-    )
-    tables = [*show(gap_table(found.gap)), *show(_steps(found.steps), reach="page")]
-    coverage = _coverage(found.plots.coverage)
-    fold = show(coverage, silent=True)
-    placebo = _placebo_text(found.gap)
-    return [
-        *([Text(lead)] if tables else []),
-        *_gap_chart(found),
-        *tables,
-        *([Text(placebo)] if placebo else []),
-        *_coverage_chart(found.plots),
-        *([Group(tuple(fold), "fold", summary=coverage.caption, reach="page")] if coverage else []),
-    ]
-
-
-def _placebo_text(gap: WholeGap) -> str:
-    """What an effect saves that was not chosen: next to nothing, if the choice is right."""
-    saved, placebo = gap.nll_saved_per_sample, gap.placebo
-    if placebo.nll_saved_per_sample is None or saved is None:
-        return ""
-    change = numbers.typeset(f"{placebo.nll_saved_per_sample.value - saved.value:+.4f} nat")
-    return f"Adding {placebo.added} as well, which was not chosen: {change} per sample."
-
-
-def _gap_chart(found: Diagnosis) -> list[Node]:
-    held_out = found.gap.held_out
-    steps = [drawings.Step(label, scores.rms_m) for label, scores in gap_steps(found.steps)]
-    if not steps or held_out is None:
-        return []
-    draw = partial(drawings.gap_staircase, steps, held_out.floor.rms_m)
-    return [Chart("gap", draw, "RMS of the residual on held-out data as effects are added.")]
-
-
-def _coverage_chart(plots: Plots) -> list[Node]:
-    rows = [(one.nominal, one.before, one.after) for one in plots.coverage]
-    caption = (
-        "Share of residuals inside the expected interval; on the dashed line the noise is as "
-        "stated."
-    )
-    return [Chart("coverage", partial(drawings.coverage, rows), caption)] if rows else []
-
-
-def _score_cells(scores: Fit) -> list[Cell]:
-    return [
-        Cell(_length(scores.rms_m), scores.rms_m),
-        Cell(numbers.number(scores.reduced_chi2), scores.reduced_chi2),
-        Cell(numbers.number(scores.nll_per_sample), scores.nll_per_sample),
-        Cell(numbers.percent(scores.coverage_95), scores.coverage_95),
-    ]
-
-
-_SCORES: Final = ("RMS #", "Reduced \u03c7\u00b2 #", "NLL per sample #", "95 % coverage #")
-
-
-def gap_table(gap: WholeGap) -> Table | None:
-    """Before, after and floor on blocks and on a regime that the fit did not see; the placebo."""
-    rows = []
-    if gap.held_out is not None:
-        blocks = gap.held_out
-        rows += [
-            (Cell("held-out blocks, before"), *_score_cells(blocks.before)),
-            (Cell("held-out blocks, after"), *_score_cells(blocks.after)),
-            (Cell("held-out blocks, at best (fitted to all rows)"), *_score_cells(blocks.fitted)),
-        ]
-    if gap.regime.held_out is not None:
-        regime, part = gap.regime.held_out, f"held-out regime ({gap.regime.held_rows})"
-        rows += [
-            (Cell(f"{part}, before"), *_score_cells(regime.before)),
-            (Cell(f"{part}, after"), *_score_cells(regime.after)),
-        ]
-    if gap.placebo.held_out is not None:
-        label = f"after, plus a placebo: {gap.placebo.added}"
-        rows.append((Cell(label), *_score_cells(gap.placebo.held_out.after)))
-    return table("Gap on data not used for the fit", ("Model", *_SCORES), rows) if rows else None
-
-
-def gap_steps(steps: Sequence[Gap]) -> list[tuple[str, Fit]]:
-    """(label, scores on held-out data), the spec as it is first, then each addition."""
-    found = [(step.added, step.held_out) for step in steps if step.held_out is not None]
-    first = [("spec as it is", scores.before) for _, scores in found[:1]]
-    return [*first, *((f"+ {added}", scores.after) for added, scores in found)]
-
-
-def _steps(steps: Sequence[Gap]) -> Table | None:
-    rows = [(Cell(label), *_score_cells(scores)) for label, scores in gap_steps(steps)]
-    heads = ("Step", *_SCORES)
-    return table("Gap after each addition", heads, rows) if len(rows) > 2 else None
-
-
 def _residuals(plots: Plots) -> list[Node]:
     found = plots.residuals
     if len(found.time_s) < 2:
@@ -361,7 +252,7 @@ def _regime_text(one: Regime) -> str:
     """`along track at speed 6.3 m/s to 9 m/s: mean -652 mm, 508 standard errors`."""
     low, high = (numbers.si_quantity(end, one.unit, 3) for end in (one.low, one.high))
     place = f"{one.axis}, {_spaced(one.covariate)} {low} to {high}"
-    return f"{place}: mean {_length(one.mean_m)}, {abs(one.score):.3g} standard errors"
+    return f"{place}: mean {rms_length(one.mean_m)}, {abs(one.score):.3g} standard errors"
 
 
 def _design(design: DesignMeaning | None) -> list[Node]:
@@ -437,15 +328,6 @@ def _log_facts(found: Diagnosis) -> list[tuple[str, str]]:
 def _rejected(log: LogRead) -> Table | None:
     rows = [(reason, Cell(numbers.count(n), n)) for reason, n in log.rejected.items()]
     return table("Rows left out", ("Reason", "Rows #"), rows) if rows else None
-
-
-def _coverage(found: Sequence[Coverage]) -> Table | None:
-    rows = [
-        tuple(Cell(numbers.percent(share), share) for share in (one.nominal, one.before, one.after))
-        for one in found
-    ]
-    caption = "Share of residuals inside the spec's own intervals"
-    return table(caption, ("Nominal #", "Before #", "After #"), rows) if rows else None
 
 
 def _provenance(found: Diagnosis) -> list[tuple[str, str]]:

@@ -19,12 +19,8 @@ from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, 
 from syncline_design.verdict.measured import claim_words
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.tree import (
-        NamedDesign,
-        RequirementResult,
-        SynclineFigures,
-        Verdict,
-    )
+    from syncline_design.verdict.named import NamedDesign
+    from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
 
 def requirements(verdict: Verdict) -> Table:

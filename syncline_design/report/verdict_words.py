@@ -22,12 +22,12 @@ from syncline_design.report.words import (
 from syncline_design.verdict.obstacle import obstacle_sentence
 
 if TYPE_CHECKING:
+    from syncline_design.verdict.named import NamedRole
     from syncline_design.verdict.optimise import Optimisation
     from syncline_design.verdict.tree import (
         Caution,
         Checked,
         LedgerRow,
-        NamedRole,
         RequirementResult,
         Status,
         Verdict,

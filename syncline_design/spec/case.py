@@ -29,15 +29,14 @@ from syncline_design.spec.catalog import (
     SensorEntry,
     TimestampingEntry,
 )
-from syncline_design.spec.spec import (
+from syncline_design.spec.choices import (
     InlineTimestamping,
     PlatformChoice,
     Query,
-    Requirement,
     RoleChoice,
-    Spec,
     StageChoice,
 )
+from syncline_design.spec.spec import Requirement, Spec
 from syncline_design.spec.yaml_text import KeyPath, TextPosition
 
 E = TypeVar("E", bound=Entry)

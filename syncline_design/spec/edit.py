@@ -18,8 +18,9 @@ from syncline_design.machine.result_files import write_file
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case
+from syncline_design.spec.choices import ClockChoice
 from syncline_design.spec.load import load_text
-from syncline_design.spec.spec import ClockChoice, EffectChoice
+from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import KeyPath, parse, plain_scalar
 
 MAX_WIDTH = 96

@@ -15,7 +15,8 @@ from typing import Literal
 
 from syncline_design.spec.case import Candidate, Case
 from syncline_design.spec.catalog import ClockEntry, SensorEntry, TimestampingEntry
-from syncline_design.spec.spec import Spec, StageChoice
+from syncline_design.spec.choices import StageChoice
+from syncline_design.spec.spec import Spec
 
 GENERIC = ("gnss", "gps", "satnav")  # inside a word too: dgps, GnssCompass
 ENDINGS = ("rtk", "ppk")  # nrtk, psrtk

@@ -9,9 +9,10 @@ from typing import Any
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import ROLES
 from syncline_design.spec.case import Case, RoleCase, usable_primitives
+from syncline_design.spec.choices import Query
 from syncline_design.spec.fields import MAX_SUGGESTIONS, did_you_mean
 from syncline_design.spec.files import Collection, problem_at
-from syncline_design.spec.spec import Query, Spec
+from syncline_design.spec.spec import Spec
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
 
 _WORDS = {

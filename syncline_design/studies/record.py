@@ -12,7 +12,8 @@ from typing import Literal
 from syncline_design.choice.outcome import Explanation
 from syncline_design.machine.records import Record
 from syncline_design.studies.inputs import Inputs
-from syncline_design.verdict.tree import FileProblem, NamedDesign, RequirementResult
+from syncline_design.verdict.named import NamedDesign
+from syncline_design.verdict.tree import FileProblem, RequirementResult
 
 SCHEMA = "syncline-design/study-case/v1"
 CaseWord = Literal["meets", "fails", "infeasible", "refused", "indeterminate"]

@@ -15,15 +15,15 @@ from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Case
 from syncline_design.spec.references import parts_in_use
 from syncline_design.verdict.design_data import named_design
-from syncline_design.verdict.tree import (
+from syncline_design.verdict.named import (
     ChoiceResult,
     Exclusion,
     Figure,
     FrontDesign,
     NamedDesign,
     RankedDesign,
-    finite,
 )
+from syncline_design.verdict.tree import finite
 
 if TYPE_CHECKING:
     from syncline_design.verdict.open_choice import Picked

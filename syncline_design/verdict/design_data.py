@@ -16,16 +16,14 @@ from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import Entry
 from syncline_design.spec.facts import AXES, split_figure
-from syncline_design.verdict.tree import (
-    Assumption,
+from syncline_design.verdict.named import (
     HostClock,
     NamedDesign,
     NamedRole,
     NamedStage,
     SharedHardware,
-    Source,
-    finite,
 )
+from syncline_design.verdict.tree import Assumption, Source, finite
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,16 +46,9 @@ from syncline_design.verdict.choice_data import (
     ranked_designs,
     ruled_out,
 )
+from syncline_design.verdict.named import Exclusion, FrontDesign, RankedDesign
 from syncline_design.verdict.open_choice import Picked, pick
-from syncline_design.verdict.tree import (
-    EXIT_CODES,
-    Caution,
-    Exclusion,
-    FrontDesign,
-    RankedDesign,
-    Verdict,
-    Word,
-)
+from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
 from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
 
 SCHEMA = "syncline-design/optimization/v1"

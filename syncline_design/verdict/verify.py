@@ -40,12 +40,12 @@ from syncline_design.verdict.design_data import (
     used_entries,
 )
 from syncline_design.verdict.measured import claim_cautions, measured
+from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.recheck import Recheck, recheck
 from syncline_design.verdict.tree import (
     UNITS,
     Caution,
     Checked,
-    ChoiceResult,
     Refused,
     RequirementResult,
     Status,
