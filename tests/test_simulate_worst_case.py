@@ -16,6 +16,7 @@ from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation import comparison, worst_cases
+from syncline_design.simulation.ascent import admissible
 from syncline_design.simulation.bounds import references
 from syncline_design.simulation.worst_case import _Search, blocks
 from tests.simulation_systems import DEG, altered, fixed_wing, position_only, survey, tilted
@@ -122,13 +123,13 @@ def test_random_choices_never_exceed_the_bound_nor_the_found(system: System) -> 
     found = worst_cases(system, taus)
     rng = np.random.default_rng(8)
     for tau, worst in zip(taus, found, strict=True):
-        search = _Search(system, np.full(200, tau), 200)
+        search = _Search(system, np.array([tau]))
         point = rng.normal(size=(search.size, 200))
         for block in blocks(system):
             length = np.linalg.norm(point[block.rows], axis=0)
             inside = rng.random(200) ** 0.1 if block.kind == "ball" else 1.0
             point[block.rows] *= inside / length
-        largest = search.error_m(point, search.tau_s).max()
+        largest = search.error_m(point, np.zeros(200, dtype=np.intp)).max()
         assert largest <= worst.value_m
         assert worst.value_m <= worst.bound_m * (1 + 1e-12)
 
@@ -138,14 +139,15 @@ def test_another_optimiser_finds_no_more(tau: float) -> None:
     """SciPy's SLSQP from eight random starts: at most 0.02 % above what the ascent found."""
     system = fixed_wing()
     (worst,) = worst_cases(system, np.array([tau]))
-    search = _Search(system, np.array([tau]), 1)
+    search = _Search(system, np.array([tau]))
     size = blocks(system)[-1].rows.stop
 
     def objective(x: np.ndarray) -> tuple[float, np.ndarray]:
         """Minus the error of the admissible point, and its central differences."""
         steps = np.concatenate([np.zeros((size, 1)), 1e-6 * np.eye(size), -1e-6 * np.eye(size)], 1)
-        points = search._admissible(x[:, None] + steps)
-        error = search.error_m(points, np.full(points.shape[1], tau)) / worst.value_m
+        points = admissible(search.blocks, x[:, None] + steps)
+        of = np.zeros(points.shape[1], dtype=np.intp)
+        error = search.error_m(points, of) / worst.value_m
         slope = (error[1 : size + 1] - error[size + 1 :]) / 2e-6
         return -float(error[0]), -slope
 

@@ -33,6 +33,7 @@ from syncline_design.report.document import (
     show,
     strong,
 )
+from syncline_design.report.error_figures import error_figures
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -70,6 +71,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
                      "Why not"),
             *section("requirements", "Requirements",
                      show(verdict_tables.requirements(verdict), silent=True)),
+            *section("figures", "Three figures", error_figures(verdict), "Figures"),
             *section("warnings", "Warnings", verdict_words.warning_nodes(verdict.warnings)),
             *section("payload", "Payload and timestamping", _payload(verdict), "Payload"),
             *section("timing", "Timestamp error of each sensor", _timing(verdict), "Timing"),
@@ -110,6 +112,12 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     if verdict.syncline is not None:
         of = f" of {numbers.length(target)}" if target else ""
         facts.append(("Syncline error", numbers.length(verdict.syncline.total_m) + of))
+    figures = verdict.figures
+    if figures is not None and figures.quantile95_3d_m is not None:
+        facts.append(("95 % of errors within", numbers.length(figures.quantile95_3d_m)))
+    if figures is not None and figures.worst_case_m is not None:
+        at = f"Worst case at {figures.worst_case_k:g} \u03c3"
+        facts.append((at, numbers.length(figures.worst_case_m)))
     row = verdict_words.tightest(verdict.requirements)
     if row is not None:
         facts.append(("Tightest margin", f"{row.id}: {verdict_words.margin_text(row)}"))

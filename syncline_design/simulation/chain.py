@@ -13,6 +13,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import NOTHING, Array, Departures, StageRows
+from syncline_design.model.syncline import Sigma
 
 
 class ChainMotion(Protocol):
@@ -102,6 +103,19 @@ class ChainNoise:
     mu_ranging_s: Array
 
 
+@dataclass(frozen=True, slots=True)
+class SensorSigma:
+    """One-sigma figures of a stage's sensors, zeros for one it does not have.
+
+    position_m: north, east, down; attitude_rad: roll, pitch, yaw; ranging: range [m], azimuth
+    [rad], elevation [rad].
+    """
+
+    position_m: Sigma = (0.0, 0.0, 0.0)
+    attitude_rad: Sigma = (0.0, 0.0, 0.0)
+    ranging: Sigma = (0.0, 0.0, 0.0)
+
+
 def stage_error(
     rows: StageRows,
     motion: ChainMotion,
@@ -146,8 +160,74 @@ def _measured_rotation(rotation: Array, noise: ChainNoise, departures: Departure
     return euler_to_rotation(rotation_to_euler(rotation) + offset)
 
 
+def noise_slopes(
+    rows: StageRows,
+    motion: ChainMotion,
+    noise: ChainNoise,
+    departures: Departures,
+    sigma: SensorSigma,
+) -> Array:
+    """How each noise, at one standard deviation, moves the error [m], NED: (n, 3, 9).
+
+    de/dz where `noise` holds timestamp errors alone; columns: position north, east, down; roll,
+    pitch, yaw; range, azimuth, elevation.  With the measured rotation R of Euler angles
+    (phi, theta, psi) and its lever q = l_L - l_G + r n:
+    de/dphi = R (x cross q), de/dtheta = (Rz(psi) y) cross R q, de/dpsi = z cross R q,
+    de/dr = R n, de/daz = r R dn/daz, de/del = r R dn/del; times sigma (1 + noise departure).
+    """
+    mu_ranging = noise.mu_ranging_s + departures.ranging_shift_s
+    shift_a = noise.mu_attitude_s + departures.attitude_shift_s - mu_ranging
+    r_hat = _measured_rotation(motion.rotation(shift_a), noise, departures)
+    slopes = np.zeros((len(rows), 3, 9))
+    slopes[:, :, :3] = np.diag(sigma.position_m)
+    slopes[:, :, :3] *= _column(1 + departures.position_noise)
+    lever = rows.ranging_m - rows.antenna_m + _measured_vector(rows, noise, departures)
+    slopes[:, :, 3:6] = _euler_slopes(r_hat, lever) * np.asarray(sigma.attitude_rad)
+    slopes[:, :, 3:6] *= _column(1 + departures.attitude_noise)
+    slopes[:, :, 6:] = r_hat @ _polar_slopes(rows, noise, departures) * np.asarray(sigma.ranging)
+    slopes[:, :, 6:] *= _column(1 + departures.ranging_noise)
+    return slopes
+
+
+def _column(values: Array) -> Array:
+    return values[:, None, None]
+
+
+def _euler_slopes(rotation: Array, lever: Array) -> Array:
+    """d(R q) by roll, pitch, yaw of R, (n, 3, 3): axes in NED times R q."""
+    turned = rotate(rotation, lever)
+    yaw = rotation_to_euler(rotation)[:, 2]
+    zero, one = np.zeros_like(yaw), np.ones_like(yaw)
+    pitch_axis = np.stack([-np.sin(yaw), np.cos(yaw), zero], axis=-1)
+    yaw_axis = np.stack([zero, zero, one], axis=-1)
+    axes = (rotation[:, :, 0], pitch_axis, yaw_axis)
+    return np.stack([np.cross(axis, turned) for axis in axes], axis=-1)
+
+
+def _polar_slopes(rows: StageRows, noise: ChainNoise, departures: Departures) -> Array:
+    """d(r n) by range, azimuth, elevation as measured, body axes, (n, 3, 3)."""
+    distance, azimuth, elevation = _measured_polar(rows, noise, departures)
+    cos_el = np.cos(elevation)
+    zero = np.zeros_like(azimuth)
+    east = np.stack([-np.sin(azimuth) * cos_el, np.cos(azimuth) * cos_el, zero], axis=-1)
+    up = np.stack(
+        [-np.cos(azimuth) * np.sin(elevation), -np.sin(azimuth) * np.sin(elevation), -cos_el],
+        axis=-1,
+    )
+    far = distance[:, None]
+    return np.stack([bearing(azimuth, elevation), far * east, far * up], axis=-1)
+
+
 def _measured_vector(rows: StageRows, noise: ChainNoise, departures: Departures) -> Array:
     """r_hat n_hat [m] in the axes the spec believes, (n, 3)."""
+    distance, azimuth, elevation = _measured_polar(rows, noise, departures)
+    return distance[:, None] * bearing(azimuth, elevation)
+
+
+def _measured_polar(
+    rows: StageRows, noise: ChainNoise, departures: Departures
+) -> tuple[Array, Array, Array]:
+    """Range [m], azimuth and elevation [rad] as measured, (n,) each."""
     azimuth, elevation = rows.azimuth_rad, rows.elevation_rad
     if np.any(departures.bearing_rotation_rad):
         turned = rotate(
@@ -160,7 +240,8 @@ def _measured_vector(rows: StageRows, noise: ChainNoise, departures: Departures)
     distance = (
         rows.range_m * (1 + departures.range_scale) + departures.range_m + noise.range_m * scatter
     )
-    return distance[:, None] * bearing(
+    return (
+        distance,
         azimuth + noise.azimuth_rad * scatter + departures.azimuth_rad,
         elevation + noise.elevation_rad * scatter + departures.elevation_rad,
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from syncline_design.effects.acting import Acting, departures
-from syncline_design.effects.record import Array, StageRows
+from syncline_design.effects.record import Array, Departures, StageRows
 from syncline_design.simulation import kernel
 from syncline_design.simulation.chain import ChainMotion, ChainNoise, stage_error
 from syncline_design.simulation.surroundings import Moment, placed_rows
@@ -49,12 +49,19 @@ def moved_error(
     before: Carried | None,
 ) -> Carried:
     """Error of one stage, row by row; without a generator stochastic effects do not act."""
+    world = departures(acting, rows[0], generator, systematic_only=generator is None)
+    return departed_error(rows, world, before)
+
+
+def departed_error(
+    rows: tuple[StageRows, ChainMotion, ChainNoise], world: Departures, before: Carried | None
+) -> Carried:
+    """Error of one stage in a world that departs from the spec by `world`."""
     state, motion, noise = rows
     carried = None
     if before is not None:
         carried = before.error_m.T
         noise = replace(noise, mu_position_s=noise.mu_position_s + before.ranging_shift_s)
-    world = departures(acting, state, generator, systematic_only=generator is None)
     error = np.ascontiguousarray(stage_error(state, motion, noise, world, carried).T)
     return Carried(error, world.ranging_shift_s)
 

@@ -8,6 +8,7 @@ for each vehicle a down axis uniform in the cone of half-angle `tilt` about the 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +38,22 @@ def moment_draw(horizon: Horizon, source: RandomSource) -> Moment:
     cosine, sine = angle(turn)
     radius = horizon.extent_m * np.sqrt(area)
     return Moment(horizon.duration_s * time, np.stack([radius * cosine, radius * sine]))
+
+
+def moment_at(horizon: Horizon, point: Mapping[str, Array], count: int) -> Moment:
+    """When and where: unit interval `time` and disc `place` stretched to the horizon, or origin."""
+    time, place = point.get("time"), point.get("place")
+    if time is None or place is None:
+        return Moment(np.zeros(count), np.zeros((2, count)))
+    return Moment(horizon.duration_s * 0.5 * (1.0 + time[0]), horizon.extent_m * place)
+
+
+def leaning(horizon: Horizon, disc: Array) -> Array:
+    """(roll, pitch) [rad] (2, n) of points of the unit disc: as far out, as steep."""
+    length = np.sqrt(disc[0] ** 2 + disc[1] ** 2)
+    along, across = disc / np.where(length > 0.0, length, 1.0)
+    tilt = horizon.tilt_rad * np.minimum(length, 1.0)
+    return lean(np.sin(tilt), np.cos(tilt), along, across)
 
 
 def tilt_draw(horizon: Horizon, source: RandomSource) -> Array:

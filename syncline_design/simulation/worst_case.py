@@ -9,40 +9,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 
 from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.record import Array
-from syncline_design.machine.deadline import in_force
-from syncline_design.model.horizon import Horizon
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation import kernel, known_effects
+from syncline_design.simulation.ascent import (
+    Ascent,
+    FreeVector,
+    Index,
+    Kind,
+    at_length_one,
+    chosen,
+    stacked,
+)
 from syncline_design.simulation.bounds import references
 from syncline_design.simulation.draws import generator, lever_arms
 from syncline_design.simulation.results import WorstCase, worst_case
-from syncline_design.simulation.surroundings import Moment, lean
+from syncline_design.simulation.surroundings import leaning, moment_at
 
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
-_STEP = 1e-6  # of the forward differences, in units of each block
-_MOVES = (1.0, 0.5, 0.2, 0.05, 0.01, 0.002)  # fractions of the way to the ascent direction
-_STRIDES = (1.0, 3.0, 10.0, 30.0)  # multiples of the last step to go on by: climbs along ridges
 _SETTLED = 0.01  # an ascent has arrived when an iteration gains less than this part of the gap
-Kind = Literal["ball", "sphere"]
-
-
-@dataclass(frozen=True, slots=True)
-class FreeVector:
-    """A vector to choose: of length at most 1 (ball) or exactly 1 (sphere)."""
-
-    stage: int
-    name: str
-    kind: Kind
-    rows: slice
-
 
 _SYSTEM = -1  # the stage number of blocks that all stages share
 
@@ -55,17 +45,12 @@ def _is_placed(system: System) -> bool:
 
 def blocks(system: System) -> tuple[FreeVector, ...]:
     """What may be chosen: once for the system when and where, then stage by stage."""
-    found: list[FreeVector] = []
-    start = 0
     kinds: list[tuple[int, str, Kind, int]] = []
     if system.effects:
         kinds = [(_SYSTEM, "time", "ball", 1), (_SYSTEM, "place", "ball", 2)]
     for index, stage in enumerate(system.stages):
         kinds += [(index, *one) for one in _stage_blocks(stage, index, _is_placed(system))]
-    for index, name, kind, size in kinds:
-        found.append(FreeVector(index, name, kind, slice(start, start + size)))
-        start += size
-    return tuple(found)
+    return stacked(kinds)
 
 
 def _stage_blocks(stage: Stage, index: int, placed: bool) -> list[tuple[str, Kind, int]]:
@@ -109,10 +94,12 @@ def worst_cases(
     """
     taus = np.asarray(taus_s, dtype=np.float64)
     figures = [references(system, float(tau)) for tau in taus]
-    search = _Search(system, np.repeat(taus, starts), starts)
+    search = _Search(system, taus)
     enough = np.array([bound * (1.0 - enough_gap) for bound, _, _ in figures])
-    settled = _SETTLED * enough_gap
-    value = search.ascend(search.starting_points(seed), enough, settled, iterations)
+    of = np.repeat(np.arange(taus.shape[0]), starts)
+    point = search.starting_points(seed, starts)
+    ascent = Ascent(search.blocks, search.error_m)
+    value = ascent.ascend(point, of, enough, _SETTLED * enough_gap, iterations)
     best = value.reshape(-1, starts).max(axis=1)
     return tuple(
         worst_case(float(tau), float(found), *reference, system.horizon.tilt_rad)
@@ -121,53 +108,52 @@ def worst_cases(
 
 
 class _Search:
-    """Ascents from many points at once; column k of a point belongs to tau_s[k]."""
+    """The error of points, each at one of several taus."""
 
-    def __init__(self, system: System, tau_s: Array, starts: int) -> None:
+    def __init__(self, system: System, taus_s: Array) -> None:
         self.system = system
-        self.tau_s = tau_s
-        self.starts = starts
+        self.taus_s = taus_s
         self.blocks = blocks(system)
         self.acting = acting_effects.by_stage(system)
         self.placed = _is_placed(system)
         self.size = self.blocks[-1].rows.stop
 
-    def error_m(self, point: Array, tau_s: Array) -> Array:
-        """|e| [m] of points (p, n) at tau (n,)."""
+    def error_m(self, point: Array, of: Index) -> Array:
+        """|e| [m] of points (p, n), each at tau number `of` (n,)."""
+        tau_s = self.taus_s[of]
         carried: known_effects.Carried | None = None
         moment = None
         if self.placed:
-            moment = _moment(self.system.horizon, self._chosen(point, _SYSTEM), tau_s.shape[0])
+            about = chosen(self.blocks, point, _SYSTEM)
+            moment = moment_at(self.system.horizon, about, tau_s.shape[0])
         for index, stage in enumerate(self.system.stages):
-            chosen = self._chosen(point, index)
-            draw = _bounded_draw(stage, index == 0, chosen, tau_s)
+            picked = chosen(self.blocks, point, index)
+            draw = _bounded_draw(stage, index == 0, picked, tau_s)
             if moment is None:
                 carried = known_effects.level_error(draw, carried)
                 continue
-            where = (moment, _leaning(self.system.horizon, chosen["lean"]))
+            where = (moment, leaning(self.system.horizon, picked["lean"]))
             acting = self.acting.get(stage.name, ())
             carried = known_effects.placed_error(draw, where, acting, None, carried)
         assert carried is not None
         return kernel.norm(carried.error_m)
 
-    def _chosen(self, point: Array, stage: int) -> dict[str, Array]:
-        return {b.name: point[b.rows] for b in self.blocks if b.stage == stage}
-
-    def starting_points(self, seed: int) -> Array:
-        """(p, n): directions at random, every second start with its terms lined up.
+    def starting_points(self, seed: int, starts: int) -> Array:
+        """(p, taus * starts): directions at random, every second start with its terms lined up.
 
         Half of the starts turn by less than half a turn, where more would only lead back.
         """
         stream = generator(seed, WORST_CASE_STREAM)
-        point = stream.standard_normal((self.size, self.starts))
-        for start in range(0, self.starts, 2):
+        point = stream.standard_normal((self.size, starts))
+        for start in range(0, starts, 2):
             self._line_up(point[:, start], stream)
-        part = np.where(np.arange(self.starts) % 4 < 2, stream.random(self.starts), math.inf)
-        taus = self.tau_s.shape[0] // self.starts
-        point, part = self._feasible(np.tile(point, taus)), np.tile(part, taus)
+        part = np.where(np.arange(starts) % 4 < 2, stream.random(starts), math.inf)
+        count = self.taus_s.shape[0]
+        point, part = at_length_one(self.blocks, np.tile(point, count)), np.tile(part, count)
+        tau_s = np.repeat(self.taus_s, starts)
         for block in self.blocks:
             if block.name == "rate":
-                turn = self.tau_s * self.system.stages[block.stage].platform.omega_max_radps
+                turn = tau_s * self.system.stages[block.stage].platform.omega_max_radps
                 point[block.rows] *= np.minimum(1.0, part * math.pi / np.maximum(turn, 1e-300))
         return point
 
@@ -186,102 +172,6 @@ class _Search:
         for block in self.blocks:
             if block.name in aligned:
                 column[block.rows] = aligned[block.name]
-
-    def _feasible(self, point: Array) -> Array:
-        """Every block at length 1."""
-        for block in self.blocks:
-            length = np.sqrt(np.sum(point[block.rows] ** 2, axis=0))
-            point[block.rows] /= np.where(length > 0.0, length, 1.0)
-        return point
-
-    def ascend(self, point: Array, enough_m: Array, settled: float, iterations: int) -> Array:
-        """Largest |e| [m] of each ascent, (n,); `point` ends where it was found.
-
-        enough_m (taus,): a tau is done when reached; settled: relative gain of an iteration below
-        which an ascent ends.
-        """
-        value = self.error_m(point, self.tau_s)
-        moving = np.ones(value.shape, dtype=bool)
-        before = point.copy()
-        for _ in range(iterations):
-            in_force().check()
-            reached = value.reshape(-1, self.starts).max(axis=1) >= enough_m
-            active = np.flatnonzero(moving & ~np.repeat(reached, self.starts))
-            if active.size == 0:
-                break
-            here = point[:, active]
-            stride = here - before[:, active]
-            better, gained = self._step(here, stride, value[active], self.tau_s[active])
-            moving[active] = gained - value[active] > settled * gained
-            before[:, active], point[:, active] = here, better
-            value[active] = gained
-        return value
-
-    def _step(self, point: Array, stride: Array, value: Array, tau_s: Array) -> tuple[Array, Array]:
-        """The best of several moves along the ascent direction or the last step, and its |e|."""
-        target = self._target(point, value, tau_s)
-        moves = [point + much * stride for much in _STRIDES]
-        moves += [point + part * (target - point) for part in _MOVES]
-        moves += [*self._single_moves(point, target), point]
-        count, columns = len(moves), point.shape[1]
-        flat = self._admissible(np.concatenate(moves, axis=1))
-        found = self.error_m(flat, np.tile(tau_s, count)).reshape(count, columns)
-        best = np.nanargmax(found, axis=0)
-        column = np.arange(columns)
-        return flat[:, best * columns + column], found[best, column]
-
-    def _single_moves(self, point: Array, target: Array) -> list[Array]:
-        """Each block alone all of the way to its target."""
-        moves = []
-        for block in self.blocks:
-            move = point.copy()
-            move[block.rows] = target[block.rows]
-            moves.append(move)
-        return moves
-
-    def _admissible(self, point: Array) -> Array:
-        """The point with spheres brought to length 1 and balls to at most 1, in place."""
-        for block in self.blocks:
-            length = np.sqrt(np.sum(point[block.rows] ** 2, axis=0))
-            if block.kind == "ball":
-                length = np.maximum(length, 1.0)
-            point[block.rows] /= np.where(length > 0.0, length, 1.0)
-        return point
-
-    def _target(self, point: Array, value: Array, tau_s: Array) -> Array:
-        """Each block's gradient at length 1 (where it vanishes: the block as it is).
-
-        For a convex |e| moving a block there never lowers it (Journee et al., J. Mach. Learn.
-        Res. 11 (2010) 517-553, the generalised power method).
-        """
-        size, columns = point.shape
-        shifted = np.repeat(point[:, None, :], size, axis=1)
-        shifted[np.arange(size), np.arange(size)] += _STEP
-        found = self.error_m(shifted.reshape(size, -1), np.tile(tau_s, size))
-        slope = found.reshape(size, columns) - value
-        target = point.copy()
-        for block in self.blocks:
-            length = np.sqrt(np.sum(slope[block.rows] ** 2, axis=0))
-            felt = length > 1e-13 * value
-            scaled = slope[block.rows] / np.where(felt, length, 1.0)
-            target[block.rows] = np.where(felt, scaled, point[block.rows])
-        return target
-
-
-def _moment(horizon: Horizon, chosen: Mapping[str, Array], count: int) -> Moment:
-    """When and where: the unit interval and disc stretched to the horizon."""
-    time, place = chosen.get("time"), chosen.get("place")
-    if time is None or place is None:
-        return Moment(np.zeros(count), np.zeros((2, count)))
-    return Moment(horizon.duration_s * 0.5 * (1.0 + time[0]), horizon.extent_m * place)
-
-
-def _leaning(horizon: Horizon, disc: Array) -> Array:
-    """(roll, pitch) [rad] (2, n) of points of the unit disc: as far out, as steep."""
-    length = np.sqrt(disc[0] ** 2 + disc[1] ** 2)
-    along, across = disc / np.where(length > 0.0, length, 1.0)
-    tilt = horizon.tilt_rad * np.minimum(length, 1.0)
-    return lean(np.sin(tilt), np.cos(tilt), along, across)
 
 
 def _bounded_draw(

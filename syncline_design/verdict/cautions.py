@@ -13,7 +13,7 @@ from syncline_design.model.timing import Normal
 from syncline_design.simulation.ensemble import outside_words
 from syncline_design.spec.case import Case
 from syncline_design.spec.gnss import has_gnss
-from syncline_design.verdict.tree import Assumption, Caution
+from syncline_design.verdict.tree import Assumption, Caution, ErrorFigures
 from syncline_design.verdict.verified import Verified
 
 LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed their bound
@@ -22,12 +22,13 @@ LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed
 def cautions(
     case: Case,
     verified: Verified,
+    figures: ErrorFigures,
     assumed: Sequence[Assumption],
     copied: Mapping[str, Sequence[str]],
 ) -> tuple[Caution, ...]:
     """The `warnings` of a verdict: a code to filter by, a sentence to read, what it is about."""
     return (
-        *design_cautions(case, verified),
+        *design_cautions(case, verified, figures),
         *_waivers(verified),
         *_simulation(verified),
         *_assumptions(assumed),
@@ -35,10 +36,11 @@ def cautions(
     )
 
 
-def design_cautions(case: Case, verified: Verified) -> tuple[Caution, ...]:
+def design_cautions(case: Case, verified: Verified, figures: ErrorFigures) -> tuple[Caution, ...]:
     """What a reader has to know of the design itself, whatever command speaks of it."""
     return (
         *_worst_case(verified),
+        *_quantile(verified, figures),
         *_lever_arm(verified),
         *_clocks(case, verified),
         *_coverage(verified),
@@ -70,6 +72,23 @@ def _worst_case(verified: Verified) -> Iterator[Caution]:
             f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet with every sensor "
             "at one sigma and every timestamp within its own bound the certified worst case is "
             f"{_length(worst)}: the Syncline leaves out what lever arms, tilt and scatter add",
+            requirement=tightest.id,
+        )
+
+
+def _quantile(verified: Verified, figures: ErrorFigures) -> Iterator[Caution]:
+    """A design that keeps an accuracy limit which 95 % of its errors do not, at its worst."""
+    kept = [r for r in verified.requirements if r.kind == "accuracy" and r.status == "pass"]
+    quantile = figures.quantile95_3d_m
+    if quantile is None or not kept:
+        return
+    tightest = min(kept, key=lambda row: row.limit)
+    if not quantile <= tightest.limit:
+        yield Caution(
+            "quantile-above-limit",
+            f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet in the worst "
+            f"situation only errors up to {_length(quantile)} make up 95 %: the Syncline adds "
+            "one-sigma figures, which normal noise exceeds",
             requirement=tightest.id,
         )
 

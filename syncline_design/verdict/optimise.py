@@ -49,6 +49,7 @@ from syncline_design.verdict.choice_data import (
 from syncline_design.verdict.named import Exclusion, FrontDesign, RankedDesign
 from syncline_design.verdict.open_choice import Picked, pick
 from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
+from syncline_design.verdict.verified import Verified, error_figures
 from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
 
 SCHEMA = "syncline-design/optimization/v1"
@@ -186,7 +187,7 @@ def _optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         verdict=_word(case, problem, picked),
         **_frame(case, problem, settings, picked.choice.proof),
         designs=ranked_designs(case, problem, designs),
-        warnings=design_cautions(case, picked.verified) if designs and picked.verified else (),
+        warnings=_cautions(case, picked.verified, settings) if designs else (),
         cut_short=tuple(pieces.cut_short),
         gave_up=tuple(pieces.gave_up),
         **_front(case, problem, settings, points),
@@ -197,6 +198,15 @@ def _optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         return found
     of_cost = points if settings.pareto and settings.resource == "cost" else None
     return replace(found, verdict=open_verdict(case, problem, picked, checking, points=of_cost))
+
+
+def _cautions(
+    case: Case, verified: Verified | None, settings: OptimizeSettings
+) -> tuple[Caution, ...]:
+    """What a reader has to know of the best design."""
+    if verified is None:
+        return ()
+    return design_cautions(case, verified, error_figures(verified, settings.seed, statistics=True))
 
 
 def _unfinished(

@@ -15,6 +15,7 @@ from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
+from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.verdict.named import ChoiceResult, NamedDesign
 
 SCHEMA = "syncline-design/verdict/v1"
@@ -239,10 +240,24 @@ class Provenance(Record):
 
 @dataclass(frozen=True, slots=True)
 class ErrorFigures(Record):
-    """The errors of a design, each named by its convention; only those that are computed."""
+    """The errors of a design, each named by its convention; only those that are computed.
+
+    syncline_m: the paper's sum of one-sigma terms; worst_case_m: certified, sensors at
+    `worst_case_k` standard deviations; worst_case_1sigma_m: at one.  The statistical figures are
+    over missions; `one_mission` holds what is constant in a mission at its worst value.
+    """
 
     syncline_m: float | None
     worst_case_1sigma_m: float | None = optional()
+    worst_case_m: float | None = optional()
+    worst_case_k: float | None = optional()
+    rmse_m: Mapping[str, float] | None = optional()
+    thu95_m: float | None = optional()
+    tvu95_m: float | None = optional()
+    quantile95_3d_m: float | None = optional()
+    ensemble: Literal["over_missions"] | None = optional()
+    one_mission: MissionFigures | None = optional()
+    worst_at: tuple[WorstSituation, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

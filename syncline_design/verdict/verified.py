@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.table import Design, Problem
+from syncline_design.machine.deadline import OutOfTime
 from syncline_design.model.budget import Budget, SyncModelName
 from syncline_design.model.system import System
 from syncline_design.simulation import MonteCarlo, SimulationError
 from syncline_design.simulation.certified import certified_worst_case_m
+from syncline_design.simulation.figures import error_statistics, worst_case_m
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.known_effects import describe
 from syncline_design.spec.load import BadInput, Flaw
@@ -100,10 +102,35 @@ def _lever_arm(budget: Budget, model: SyncModelName) -> LeverArmFigures:
     return LeverArmFigures(finite(arm.tau_crit_s), total, arm.sync_rate_mps, arm.differs)
 
 
-def error_figures(verified: Verified) -> ErrorFigures:
-    """The errors of a design by their conventions; an infinite worst case is not computed."""
-    worst = verified.worst_case_1sigma_m
-    return ErrorFigures(finite(float(verified.exact.total_m)), worst)
+def error_figures(verified: Verified, seed: int, statistics: bool) -> ErrorFigures:
+    """The errors of a design by their conventions; what is infinite or has no sense is left out.
+
+    statistics: whether the statistical budget is wanted, which takes a tenth of a second or more.
+    """
+    system = verified.system
+    plain = ErrorFigures(
+        syncline_m=finite(float(verified.exact.total_m)),
+        worst_case_1sigma_m=verified.worst_case_1sigma_m,
+    )
+    if not statistics or plain.worst_case_1sigma_m is None:
+        return plain
+    try:
+        found = error_statistics(system, seed)
+    except OutOfTime:
+        return plain
+    over = found.over_missions
+    return replace(
+        plain,
+        worst_case_m=finite(worst_case_m(system, system.coverage_factor)),
+        worst_case_k=system.coverage_factor,
+        rmse_m=over.rmse_m,
+        thu95_m=over.thu95_m,
+        tvu95_m=over.tvu95_m,
+        quantile95_3d_m=over.quantile95_3d_m,
+        ensemble="over_missions",
+        one_mission=found.one_mission,
+        worst_at=found.worst_at,
+    )
 
 
 def known_effects(system: System) -> tuple[KnownEffect, ...]:

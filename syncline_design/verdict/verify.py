@@ -416,6 +416,8 @@ def _verdict(
 ) -> Verdict:
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
+    in_force().doing("working out the statistical budget")
+    figures = error_figures(verified, settings.seed, settings.monte_carlo)
     return Verdict(
         verdict=verified.word,
         **frame(case, problem, settings.seed),
@@ -424,10 +426,10 @@ def _verdict(
         syncline=syncline_figures(verified, case.spec.sync_model),
         monte_carlo=verified.monte_carlo,
         warnings=(
-            *cautions(case, verified, assumed, transcripts(entries)),
+            *cautions(case, verified, figures, assumed, transcripts(entries)),
             *claim_cautions(case, entries),
         ),
-        figures=error_figures(verified),
+        figures=figures,
         assumptions=assumed,
         sources=sources(entries),
         effects=known_effects(verified.system),

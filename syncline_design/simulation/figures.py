@@ -1,0 +1,185 @@
+"""The figures of a design beside the Syncline: certified worst case and statistical budget."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from syncline_design.effects.record import Array
+from syncline_design.machine.records import Record, optional
+from syncline_design.model.system import Sensor, Stage, System
+from syncline_design.simulation.ascent import chosen
+from syncline_design.simulation.certified import certified_worst_case_m
+from syncline_design.simulation.situations import SYSTEM, Situations
+from syncline_design.simulation.statistical import (
+    AXES,
+    Wanted,
+    Worst,
+    columns_at,
+    statistical_figures,
+)
+from syncline_design.simulation.surroundings import leaning
+
+Vector = tuple[float, float, float]
+CONFIDENCE = 0.95
+WANTED: Mapping[str, Wanted] = {
+    "horizontal": Wanted("horizontal"),
+    "vertical": Wanted("vertical"),
+    "3d": Wanted("3d"),
+    "thu95_m": Wanted("horizontal", CONFIDENCE),
+    "tvu95_m": Wanted("vertical", CONFIDENCE),
+    "quantile95_3d_m": Wanted("3d", CONFIDENCE),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFigures(Record):
+    """Statistical figures [m], each at its own worst situation.
+
+    rmse_m: root mean square by axis (horizontal, vertical, 3d); thu95_m, tvu95_m: 95 % of the
+    horizontal and of the vertical errors lie within; quantile95_3d_m: of the whole.
+    """
+
+    rmse_m: Mapping[str, float]
+    thu95_m: float
+    tvu95_m: float
+    quantile95_3d_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class VarianceShare(Record):
+    """Part of the mean square error that a source makes, 0 to 1."""
+
+    source: str
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
+class StageSituation(Record):
+    """One vehicle in a situation; vectors in its body's axes, angles of its attitude."""
+
+    stage: str
+    velocity_mps: Vector
+    rate_radps: Vector
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    look: Vector | None = optional()
+    position_arm_m: Vector | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class WorstSituation(Record):
+    """Where a figure is largest, and what makes it; elapsed_s, place_m: when effects act."""
+
+    figure: str
+    stages: tuple[StageSituation, ...]
+    shares: tuple[VarianceShare, ...]
+    elapsed_s: float | None = optional()
+    place_m: tuple[float, float] | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """Over missions, for one mission (what is constant in it at its worst), and where."""
+
+    over_missions: MissionFigures
+    one_mission: MissionFigures
+    worst_at: tuple[WorstSituation, ...]
+
+
+@lru_cache(maxsize=4)
+def error_statistics(system: System, seed: int = 0) -> Statistics:
+    """The statistical figures of a design; raises SimulationError where it makes no sense."""
+    wanted = tuple(WANTED.values())
+    over = statistical_figures(system, wanted, seed=seed)
+    situations = Situations(system)
+    one = over
+    if any(variable.mission for variable in situations.timing.variables):
+        one = statistical_figures(system, wanted, one_mission=True, seed=seed)
+    worst_at = tuple(
+        _situation(situations, name, worst) for name, worst in zip(WANTED, over, strict=True)
+    )
+    return Statistics(_named(over), _named(one), worst_at)
+
+
+def worst_case_m(system: System, sensors: float) -> float:
+    """Certified worst case [m] with every sensor at so many standard deviations."""
+    stages = tuple(_scaled(stage, sensors) for stage in system.stages)
+    return certified_worst_case_m(replace(system, stages=stages))
+
+
+def _scaled(stage: Stage, factor: float) -> Stage:
+    def scaled(sensor: Sensor | None) -> Sensor | None:
+        if sensor is None:
+            return None
+        first, second, third = (factor * one for one in sensor.sigma)
+        return replace(sensor, sigma=(first, second, third))
+
+    return replace(
+        stage,
+        position=scaled(stage.position),
+        attitude=scaled(stage.attitude),
+        ranging=scaled(stage.ranging),
+    )
+
+
+def _named(found: tuple[Worst, ...]) -> MissionFigures:
+    by_name = {name: worst.value_m for name, worst in zip(WANTED, found, strict=True)}
+    rmse: Mapping[str, float] = {axis: by_name.pop(axis) for axis in AXES}
+    return MissionFigures(rmse, **by_name)
+
+
+def _situation(situations: Situations, name: str, worst: Worst) -> WorstSituation:
+    point = worst.point[:, None]
+    about = chosen(situations.blocks, point, SYSTEM)
+    acts = "time" in about
+    horizon = situations.system.horizon
+    time = 0.5 * horizon.duration_s * (1.0 + float(about["time"][0, 0])) if acts else None
+    north, east = (horizon.extent_m * about["place"][:, 0]).tolist() if acts else (0.0, 0.0)
+    return WorstSituation(
+        figure=f"rmse_m.{name}" if name in AXES else name,
+        stages=tuple(_stage(situations, k, point) for k in range(len(situations.system.stages))),
+        shares=_shares(situations, worst),
+        elapsed_s=time,
+        place_m=(north, east) if acts else None,
+    )
+
+
+def _stage(situations: Situations, index: int, point: Array) -> StageSituation:
+    system = situations.system
+    stage, picked = system.stages[index], chosen(situations.blocks, point, index)
+    roll, pitch = leaning(system.horizon, picked["lean"])[:, 0].tolist()
+    arm = picked.get("lever_arm")
+    return StageSituation(
+        stage=stage.name,
+        velocity_mps=_vector(stage.platform.v_max_mps * picked["velocity"]),
+        rate_radps=_vector(stage.platform.omega_max_radps * picked["rate"]),
+        roll_rad=roll,
+        pitch_rad=pitch,
+        yaw_rad=math.atan2(picked["yaw"][1, 0], picked["yaw"][0, 0]),
+        look=_vector(picked["bearing"]) if "bearing" in picked else None,
+        position_arm_m=None if arm is None else _vector(stage.platform.baseline_m * arm),
+    )
+
+
+def _vector(column: Array) -> Vector:
+    x, y, z = column[:, 0].tolist()
+    return x, y, z
+
+
+def _shares(situations: Situations, worst: Worst) -> tuple[VarianceShare, ...]:
+    """Each source's part of the mean square to first order, largest first; means are `bias`."""
+    mean, columns = columns_at(situations, worst.point[:, None])
+    axes = AXES[worst.wanted.axis]
+    parts = {"bias": float(np.sum(mean[0, axes] ** 2))}
+    for source, square in zip(situations.sources(), np.sum(columns[0, axes] ** 2, axis=0),
+                              strict=True):  # fmt: skip
+        parts[source] = parts.get(source, 0.0) + float(square)
+    total = math.fsum(parts.values()) or 1.0
+    ordered = sorted(parts.items(), key=lambda part: -part[1])
+    return tuple(VarianceShare(source, part / total) for source, part in ordered if part > 0.0)

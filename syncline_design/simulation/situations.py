@@ -1,0 +1,192 @@
+"""The situations that a specification is held against, and the error in each of them.
+
+A situation: how each vehicle moves (directions of velocity and rotation at their limits), leans
+and looks, when and where it is, and, where one mission is asked for, what is constant in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.effects.acting import by_stage, departures
+from syncline_design.effects.record import Array
+from syncline_design.model.lever_arms import position_lever_arm
+from syncline_design.model.system import Stage, System
+from syncline_design.simulation import kernel
+from syncline_design.simulation.ascent import FreeVector, Kind, at_length_one, chosen, stacked
+from syncline_design.simulation.chain import SensorSigma, noise_slopes
+from syncline_design.simulation.draws import Shifts, generator, lever_arms, stage_shifts
+from syncline_design.simulation.known_effects import Carried, departed_error
+from syncline_design.simulation.lattice import lattice
+from syncline_design.simulation.surroundings import leaning, moment_at, placed_rows
+from syncline_design.simulation.timing_variables import Timing, timing_of
+
+SITUATION_STREAM = 4  # first word of the stream key, see draws.generator
+SYSTEM = -1  # the stage number of blocks that all stages share
+_LINEAR_RAD = 0.05  # turns during a shift up to which propagation is right within 0.2 %
+
+
+@dataclass(frozen=True, slots=True)
+class Moments:
+    """The error at n situations and M nodes of the timing variables, to first order in noise.
+
+    mean_m (n, M, 3); slopes_m (n, M, 3, c): what each of c noises does at one sigma.
+    """
+
+    mean_m: Array
+    slopes_m: Array
+
+    def covariance(self) -> Array:
+        """J J' [m2], (n, M, 3, 3)."""
+        found: Array = self.slopes_m @ np.swapaxes(self.slopes_m, -1, -2)
+        return found
+
+
+class Situations:
+    """What may be chosen of a system, and its error there."""
+
+    def __init__(self, system: System, one_mission: bool = False) -> None:
+        self.system = system
+        self.timing: Timing = timing_of(system)
+        self.held = tuple(one_mission and v.mission for v in self.timing.variables)
+        self.free = tuple(k for k, held in enumerate(self.held) if not held)
+        self.acting = by_stage(system)
+        self.blocks = _blocks(system, self.held)
+        self.size = self.blocks[-1].rows.stop
+
+    @property
+    def linear(self) -> bool:
+        """Whether no effect acts and no shift turns a vehicle by more than propagation allows."""
+        if self.system.effects:
+            return False
+        k = self.system.coverage_factor
+        widest = 2.0 * sum(max(map(abs, v.ends_s(k))) for v in self.timing.variables)
+        means = (0.0, *self.timing.mean_s.values())
+        fastest = max(float(s.platform.omega_max_radps) for s in self.system.stages)
+        return (widest + max(means) - min(means)) * fastest < _LINEAR_RAD
+
+    def errors_m(self, point: Array, nodes: Array) -> Array:
+        """The error without noise at points (p, n), each at all nodes: (n, M, 3)."""
+        return self._run(point, nodes, None, None)
+
+    def moments(self, point: Array, nodes: Array, seed: int | None = None) -> Moments:
+        """The error at points (p, n), each at all nodes (free variables, M) [s].
+
+        seed: of what stochastic effects draw; None: they do not act.
+        """
+        slopes: list[Array] = []
+        mean = self._run(point, nodes, seed, slopes)
+        return Moments(mean, np.concatenate(slopes, axis=2).reshape(*mean.shape, -1))
+
+    def _run(
+        self, point: Array, nodes: Array, seed: int | None, slopes: list[Array] | None
+    ) -> Array:
+        """The chain at all nodes of all points; the slopes of its stages are added to `slopes`."""
+        count, each = point.shape[1], nodes.shape[1]
+        total = count * each
+        columns = np.repeat(point, each, axis=1)
+        shifts = self.timing.shifts(self._values(columns, np.tile(nodes, count)))
+        moment = moment_at(self.system.horizon, chosen(self.blocks, columns, SYSTEM), total)
+        stream = None if seed is None else generator(seed, SITUATION_STREAM)
+        carried: Carried | None = None
+        for index, stage in enumerate(self.system.stages):
+            picked = chosen(self.blocks, columns, index)
+            draw = _draw(self.system, index, picked, shifts, total)
+            rows = placed_rows(draw, moment, leaning(self.system.horizon, picked["lean"]))
+            state, motion, noise = rows
+            acting = self.acting.get(stage.name, ())
+            world = departures(acting, state, stream, systematic_only=stream is None)
+            carried = departed_error(rows, world, carried)
+            if slopes is not None:
+                slopes.append(noise_slopes(state, motion, noise, world, _sigma(stage)))
+        assert carried is not None
+        return carried.error_m.T.reshape(count, each, 3)
+
+    def _values(self, columns: Array, nodes: Array) -> Array:
+        """Values [s] of all variables (variables, n): nodes of the free, ends of the held."""
+        values = np.empty((len(self.held), columns.shape[1]))
+        values[list(self.free)] = nodes
+        k = self.system.coverage_factor
+        about = chosen(self.blocks, columns, SYSTEM)
+        for j, is_held in enumerate(self.held):
+            if is_held:
+                low, high = self.timing.variables[j].ends_s(k)
+                values[j] = 0.5 * (low + high) + 0.5 * (high - low) * about[f"held {j}"][0]
+        return values
+
+    def nodes(self, count: int) -> Array:
+        """(free variables, count): equally likely values of them together [s]."""
+        free = [self.timing.variables[k] for k in self.free]
+        shares = lattice(len(free), count)
+        found = [variable.at(share) for variable, share in zip(free, shares, strict=True)]
+        return np.array(found).reshape(len(free), count)
+
+    def steps(self) -> Array:
+        """(free variables, 1 + free variables): at their means, then each one deviation off."""
+        stds = [self.timing.variables[k].std_s for k in self.free]
+        return np.concatenate([np.zeros((len(stds), 1)), np.diag(stds)], axis=1)
+
+    def sources(self) -> tuple[str, ...]:
+        """What each column of `propagated` comes from: noises stage by stage, then timing."""
+        noises = tuple(
+            f"noise of {stage.name}.{sensor}"
+            for stage in self.system.stages
+            for sensor in (*["position"] * 3, *["attitude"] * 3, *["ranging"] * 3)
+        )
+        return (*noises, *(self.timing.variables[k].source for k in self.free))
+
+    def starting_points(self, seed: int, count: int) -> Array:
+        """(p, count) directions at random."""
+        point = generator(seed, SITUATION_STREAM).standard_normal((self.size, count))
+        return at_length_one(self.blocks, point)
+
+
+def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
+    kinds: list[tuple[int, str, Kind, int]] = [
+        (SYSTEM, f"held {k}", "ball", 1) for k, is_held in enumerate(held) if is_held
+    ]
+    if system.effects:
+        kinds += [(SYSTEM, "time", "ball", 1), (SYSTEM, "place", "ball", 2)]
+    for index, stage in enumerate(system.stages):
+        kinds += [(index, "velocity", "sphere", 3), (index, "rate", "sphere", 3)]
+        kinds += [(index, "yaw", "sphere", 2), (index, "lean", "ball", 2)]
+        if position_lever_arm(stage, index == 0) is None:
+            kinds.append((index, "lever_arm", "sphere", 3))
+        if stage.ranging is not None:
+            kinds.append((index, "bearing", "sphere", 3))
+    return stacked(kinds)
+
+
+def _draw(
+    system: System, index: int, picked: dict[str, Array], shifts: Shifts, count: int
+) -> kernel.Draw:
+    """A stage at its limits of speed and turn rate in the chosen directions, without noise."""
+    stage = system.stages[index]
+    none = np.zeros((3, count))
+    antenna, ranging = lever_arms(stage, index == 0, picked.get("lever_arm", none))
+    aimed = stage.ranging is not None
+    return kernel.Draw(
+        cos_yaw=picked["yaw"][0],
+        sin_yaw=picked["yaw"][1],
+        velocity_mps=picked["velocity"] * float(stage.platform.v_max_mps),
+        rate_radps=picked["rate"] * float(stage.platform.omega_max_radps),
+        range_m=np.full(count, float(stage.platform.distance_m) if aimed else 0.0),
+        bearing=picked.get("bearing", none),
+        antenna_m=antenna,
+        ranging_m=ranging,
+        position_noise_m=none,
+        angle_noise_rad=np.zeros((5, count)),
+        range_noise_m=np.zeros(count),
+        **stage_shifts(system, index, shifts, count),
+    )
+
+
+def _sigma(stage: Stage) -> SensorSigma:
+    """The noise that enters a stage's estimate."""
+    position = (0.0, 0.0, 0.0) if stage.position is None else stage.position.sigma
+    if stage.ranging is None or stage.attitude is None:
+        return SensorSigma(position)
+    return SensorSigma(position, stage.attitude.sigma, stage.ranging.sigma)

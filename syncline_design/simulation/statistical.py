@@ -1,0 +1,253 @@
+"""The statistical budget: quantiles and root mean squares at the worst situation.
+
+For a situation g (`situations`) and timestamp errors m the error is taken to first order in the
+sensor noise z only, e = mu(g, m) + J(g, m) z; m runs over its distribution, and the largest figure
+over all g counts (JCGM 100:2008 with exact shifts).  Units SI; errors north, east, down.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import in_force
+from syncline_design.model.system import System
+from syncline_design.simulation.ascent import Ascent, Index
+from syncline_design.simulation.lattice import POINTS, normal_quantile, sphere_lattice
+from syncline_design.simulation.settings import demand_simulable
+from syncline_design.simulation.situations import Moments, Situations
+
+Axis = Literal["horizontal", "vertical", "3d"]
+AXES: dict[Axis, slice] = {
+    "horizontal": slice(0, 2),
+    "vertical": slice(2, 3),
+    "3d": slice(0, 3),
+}
+_SEARCH_NODES = 31  # where shifts are long
+_POOL, _STARTS, _STARTS_EXACT, _ITERATIONS = 512, 6, 2, 60
+_ROUGH, _SETTLED = 1e-4, 1e-6  # gain of an iteration below which ascents end: all, the best
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A figure of |P e|: its p-quantile, or its root mean square where p is None."""
+
+    axis: Axis
+    p: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Worst:
+    """The largest value [m] of a figure, and the situation in which it stands (p,)."""
+
+    wanted: Wanted
+    value_m: float
+    point: Array
+
+
+def statistical_figures(
+    system: System, wanted: Sequence[Wanted], one_mission: bool = False, seed: int = 0
+) -> tuple[Worst, ...]:
+    """Each wanted figure at its own worst situation.
+
+    one_mission: what is constant in a mission is held at its worst value instead of drawn.
+    """
+    demand_simulable(system)
+    situations = Situations(system, one_mission)
+    found = _worst_points(situations, wanted, seed)
+    return tuple(
+        _evaluated(situations, one, point, seed) for one, point in zip(wanted, found.T, strict=True)
+    )
+
+
+def _worst_points(situations: Situations, wanted: Sequence[Wanted], seed: int) -> Array:
+    """For each figure the point that the best ascent of its approximation ends in, (p, figures).
+
+    First by propagation; where shifts are long or effects act, the best of these go on with the
+    shifts as they are.
+    """
+    count = len(wanted)
+
+    def linear(point: Array) -> tuple[Array, Array]:
+        return propagated(situations, point)
+
+    pool = situations.starting_points(seed, _POOL)
+    mean, covariance = linear(pool)
+    ranked = [np.argsort(-approximate(mean, covariance, one))[:_STARTS] for one in wanted]
+    point, of = pool[:, np.concatenate(ranked)], np.repeat(np.arange(count), _STARTS)
+    value = _ascent(situations, wanted, linear).ascend(
+        point, of, np.full(count, np.inf), _ROUGH, _ITERATIONS
+    )
+    summed, kept = linear, 1
+    if not situations.linear:
+        nodes, kept = situations.nodes(_SEARCH_NODES), _STARTS_EXACT
+
+        def summed(point: Array) -> tuple[Array, Array]:
+            return averaged(situations.moments(point, nodes))
+
+    best = np.argsort(-value.reshape(count, _STARTS), axis=1)[:, :kept]
+    point = point[:, (best + _STARTS * np.arange(count)[:, None]).ravel()]
+    of = np.repeat(np.arange(count), kept)
+    value = _ascent(situations, wanted, summed).ascend(
+        point, of, np.full(count, np.inf), _SETTLED if situations.linear else _ROUGH, _ITERATIONS
+    )
+    return point[:, value.reshape(count, kept).argmax(axis=1) + kept * np.arange(count)]
+
+
+def _ascent(
+    situations: Situations,
+    wanted: Sequence[Wanted],
+    summed: Callable[[Array], tuple[Array, Array]],
+) -> Ascent:
+    def objective(point: Array, of: Index) -> Array:
+        mean, covariance = summed(point)
+        value = np.empty(of.shape)
+        for k, one in enumerate(wanted):
+            mine = of == k
+            value[mine] = approximate(mean[mine], covariance[mine], one)
+        return value
+
+    return Ascent(situations.blocks, objective)
+
+
+def _evaluated(situations: Situations, wanted: Wanted, point: Array, seed: int) -> Worst:
+    in_force().check()
+    moments = situations.moments(point[:, None], situations.nodes(POINTS), seed)
+    skipped = len(situations.free)
+    return Worst(wanted, exact(moments, wanted, skipped), point)
+
+
+def propagated(situations: Situations, point: Array) -> tuple[Array, Array]:
+    """(mean (n, 3), covariance (n, 3, 3)) of points by the law of propagation.
+
+    C = J J' + sum_k c_k c_k', c_k what one standard deviation of variable k does
+    (JCGM 100:2008, eq. 13, independent inputs).
+    """
+    mean, columns = columns_at(situations, point)
+    return mean, columns @ np.swapaxes(columns, 1, 2)
+
+
+def columns_at(situations: Situations, point: Array) -> tuple[Array, Array]:
+    """(mean (n, 3), what one standard deviation of each noise and variable does (n, 3, c))."""
+    steps = situations.steps()
+    about = situations.moments(point, steps[:, :1])
+    mean = about.mean_m[:, 0]
+    stepped = situations.errors_m(point, steps[:, 1:])
+    by_timing = np.swapaxes(stepped - mean[:, None], 1, 2)
+    return mean, np.concatenate([about.slopes_m[:, 0], by_timing], axis=2)
+
+
+def averaged(moments: Moments) -> tuple[Array, Array]:
+    """(mean, covariance) over equally likely nodes."""
+    mean = moments.mean_m.mean(axis=1)
+    spread = moments.mean_m - mean[:, None]
+    within = np.mean(moments.covariance(), axis=1)
+    return mean, within + np.einsum("nmi,nmj->nij", spread, spread) / spread.shape[1]
+
+
+def approximate(mean: Array, covariance: Array, wanted: Wanted) -> Array:
+    """A figure by three moments, (n,): only to find where it is largest.
+
+    Q = sum of lambda chi2 is taken as a shifted, scaled chi2 of h = c2^3 / c3^2 degrees of freedom,
+    c_r = tr C^r + r m' C^(r-1) m (Imhof, Biometrika 48, 1961, after Pearson), its quantile by
+    Wilson and Hilferty (1931).
+    """
+    axes = AXES[wanted.axis]
+    m, c = mean[:, axes], covariance[:, axes, axes]
+    first = np.trace(c, axis1=1, axis2=2) + np.sum(m * m, axis=1)
+    if wanted.p is None:
+        root: Array = np.sqrt(first)
+        return root
+    c_m = np.einsum("nij,nj->ni", c, m)
+    squared = c @ c
+    second = np.trace(squared, axis1=1, axis2=2) + 2.0 * np.sum(m * c_m, axis=1)
+    third = np.einsum("nij,nji->n", squared, c) + 3.0 * np.sum(c_m * c_m, axis=1)
+    third_or_1 = np.where(third > 0.0, third, 1.0)
+    h = np.where(third > 0.0, second * (second / third_or_1) ** 2, 1.0)
+    z = float(normal_quantile(np.array([wanted.p]))[0])
+    chi2 = h * np.maximum(1.0 - 2.0 / (9.0 * h) + z * np.sqrt(2.0 / (9.0 * h)), 0.0) ** 3
+    found: Array = np.sqrt(np.maximum(first + (chi2 - h) * np.sqrt(second / h), 0.0))
+    return found
+
+
+def exact(moments: Moments, wanted: Wanted, skipped: int) -> float:
+    """A figure of one situation: of a mixture of M equally likely Gaussians.
+
+    Root mean square: mean of |P mu|^2 + tr P C P'.  Quantile: with z = rho u, u a direction and
+    rho of chi distribution, P(|mu + rho L u| < r) = F(rho2) - F(rho1), rho1 and rho2 >= 0 where
+    the ray enters and leaves the ball; the directions go over a lattice.
+    skipped: lattice dimensions that the nodes have used.
+    """
+    axes = AXES[wanted.axis]
+    m, c = moments.mean_m[0, :, axes], moments.covariance()[0, :, axes, axes]
+    mean_square = float(np.mean(np.sum(m * m, axis=1) + np.trace(c, axis1=1, axis2=2)))
+    if wanted.p is None or mean_square == 0.0:
+        return math.sqrt(mean_square)
+    size = m.shape[1]
+    values, vectors = np.linalg.eigh(c)
+    scale = np.sqrt(np.maximum(values, 0.0))
+    ray = np.einsum("mij,mj,jm->mi", vectors, scale, sphere_lattice(skipped, size, m.shape[0]))
+    length = np.maximum(np.sqrt(np.sum(ray * ray, axis=1)), 1e-12 * math.sqrt(mean_square))
+    foot = np.einsum("mi,mi->m", ray, m) / length
+    square = np.sum(m * m, axis=1)
+    return _Rays(size, foot, square - foot * foot, length).quantile(
+        wanted.p, math.sqrt(mean_square)
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Rays:
+    """Scatter of chi distribution along rays: P(rho) per ray is `axes`-dimensional.
+
+    foot: how far along its ray the start lies; across: its squared distance from the origin
+    besides; length: of one unit of rho.
+    """
+
+    axes: int
+    foot: Array
+    across: Array
+    length: Array
+
+    def within(self, radius: float) -> float:
+        """Share that lies within a radius."""
+        room = radius * radius - self.across
+        half = np.sqrt(np.maximum(room, 0.0))
+        upper, lower = (half - self.foot) / self.length, (-half - self.foot) / self.length
+        inside = chi_share(self.axes, upper) - chi_share(self.axes, lower)
+        return float(np.mean(np.where(room > 0.0, inside, 0.0)))
+
+    def quantile(self, p: float, about: float) -> float:
+        """The radius that a share p lies within, by bisection and secants (Illinois)."""
+        low, high = 0.0, about
+        at_low, at_high = -p, self.within(high) - p
+        while at_high < 0.0:
+            low, at_low = high, at_high
+            high *= 2.0
+            at_high = self.within(high) - p
+        for _ in range(60):
+            if high - low <= 1e-9 * high:
+                break
+            radius = high - at_high * (high - low) / (at_high - at_low)
+            value = self.within(radius) - p
+            if value < 0.0:
+                low, at_low, at_high = radius, value, 0.5 * at_high
+            else:
+                high, at_high, at_low = radius, value, 0.5 * at_low
+        return high
+
+
+def chi_share(axes: int, rho: Array) -> Array:
+    """P(chi <= rho) of 1, 2 or 3 degrees of freedom, 0 below 0; (n,)."""
+    rho = np.maximum(rho, 0.0)
+    if axes == 2:
+        found: Array = -np.expm1(-0.5 * rho * rho)
+        return found
+    one = np.array([math.erf(x) for x in (rho * math.sqrt(0.5)).tolist()])
+    if axes == 1:
+        return one
+    return one - math.sqrt(2.0 / math.pi) * rho * np.exp(-0.5 * np.minimum(rho, 1e3) ** 2)
