@@ -22,7 +22,7 @@ from syncline_design.simulation.draws import Shifts, generator, lever_arms, stag
 from syncline_design.simulation.known_effects import Carried, departed_error
 from syncline_design.simulation.lattice import lattice
 from syncline_design.simulation.surroundings import leaning, moment_at, placed_rows
-from syncline_design.simulation.timing_variables import Timing, timing_of
+from syncline_design.simulation.timing_variables import SystemTiming, timing_of
 
 SITUATION_STREAM = 4  # first word of the stream key, see draws.generator
 SYSTEM = -1  # the stage number of blocks that all stages share
@@ -50,7 +50,7 @@ class Situations:
 
     def __init__(self, system: System, one_mission: bool = False) -> None:
         self.system = system
-        self.timing: Timing = timing_of(system)
+        self.timing: SystemTiming = timing_of(system)
         self.held = tuple(one_mission and v.mission for v in self.timing.variables)
         self.free = tuple(k for k, held in enumerate(self.held) if not held)
         self.acting = by_stage(system)

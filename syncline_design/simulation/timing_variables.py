@@ -89,7 +89,7 @@ class TimingVariable:
 
 
 @dataclass(frozen=True, slots=True)
-class Timing:
+class SystemTiming:
     """A system's timestamp errors: mean of each sensor's mu [s], and what scatters about it."""
 
     mean_s: dict[Key, float]
@@ -104,7 +104,7 @@ class Timing:
         return found
 
 
-def timing_of(system: System) -> Timing:
+def timing_of(system: System) -> SystemTiming:
     """The timing variables of a system; clocks of different vehicles are independent."""
     means: dict[Key, float] = {}
     variables: list[TimingVariable] = []
@@ -124,7 +124,7 @@ def timing_of(system: System) -> Timing:
             means[key] -= expected(offset)
         name = f"clock {timeline.removeprefix('host:')}"
         variables += _variables(name, offset, -1.0, keys, mission=True)
-    return Timing(means, tuple(variables))
+    return SystemTiming(means, tuple(variables))
 
 
 def _variables(
