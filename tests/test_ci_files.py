@@ -121,6 +121,43 @@ def test_the_action_checks_every_line_and_ends_with_the_worst_code(
     assert not summary.exists() or "all is well" not in summary.read_text()
 
 
+@pytest.mark.parametrize("args", ["--help", "--seed 2 --help"])
+def test_arguments_that_give_no_verdict_do_not_pass(repository: Path, args: str) -> None:
+    """`--help` ended with 0, and so did the step: nothing had been checked."""
+    code, stdout, _ = run_action(repository, specs=MISSED, args=args)
+    assert code == 2
+    assert "::error::syncline-design: these arguments give no verdict" in stdout
+
+
+def test_the_reports_may_have_any_name(repository: Path) -> None:
+    code, _, summary = run_action(repository, specs=GOOD, reports="-n")
+    assert code == 0
+    assert summary.read_text() == (repository / "-n" / "summary.md").read_text()
+    (repository / "nowhere").symlink_to(repository / "absent" / "deep")
+    (repository / "taken").touch()
+    for name in ("nowhere", "taken"):
+        code, stdout, _ = run_action(repository, specs=GOOD, reports=name)
+        assert code == 2
+        assert "::error::syncline-design: the input `reports` is no folder" in stdout
+    assert not (repository / "absent").exists()
+
+
+def test_steps_import_nothing_that_the_environment_names(repository: Path) -> None:
+    """A PYTHONPATH with an empty entry (`:src`) is the repository under check."""
+    (repository / "sitecustomize.py").write_text("open('owned', 'w').close()\n")
+    action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+    steps = [step for step in action["runs"]["steps"] if "run" in step]
+    assert len(steps) == 2
+    for step in steps:
+        given = {"SPECS": GOOD, "ARGS": "", "REPORTS": "", "GITHUB_ACTION_PATH": "absent"}
+        environment = {"PYTHONPATH": ".:"} | {
+            name: given.get(name, text) for name, text in step["env"].items()
+        }
+        files = {name: str(repository / "log") for name in ("GITHUB_OUTPUT", "GITHUB_STEP_SUMMARY")}
+        run(["bash", "-e", "-c", step["run"]], repository, **given | environment | files)
+        assert not (repository / "owned").exists()
+
+
 def test_the_installation_runs_nothing_of_the_repository_under_check(repository: Path) -> None:
     action = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
     step = next(s for s in action["runs"]["steps"] if s.get("name") == "Install")

@@ -206,12 +206,11 @@ def test_what_does_not_say_is_not_on_that_front(
     assert verdict["choice"]["front"]
 
 
-def test_optimize_says_what_is_not_on_the_front(tmp_path: Path) -> None:
+@pytest.mark.parametrize("option", ["--resource", "--against"])
+def test_optimize_says_what_is_not_on_the_front(tmp_path: Path, option: str) -> None:
     own = catalog({"gnss_b": "mass", "rough": "mass"})
     path, target = written(tmp_path, spec_text(), own), tmp_path / "out.json"
-    code, text = run(
-        "optimize", str(path), "--pareto", "--resource", "mass", "-o", f"json:{target}"
-    )
+    code, text = run("optimize", str(path), "--pareto", option, "mass", "-o", f"json:{target}")
     assert code == 0, text
     labels = ["sensor gnss_b", "timestamping method rough"]
     assert json.loads(target.read_text("utf-8"))["front_left_out"] == labels

@@ -17,6 +17,7 @@ from syncline_design.machine.result_files import write_file
 from syncline_design.report.write import (
     OutputError,
     Target,
+    apart,
     check_targets,
     parse_target,
     write_outputs,
@@ -36,6 +37,26 @@ def test_parse_target() -> None:
 def test_bad_targets_say_what_is_expected(text: str) -> None:
     with pytest.raises(OutputError, match="expected"):
         parse_target(text, KNOWN)
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [("new/", "is a folder"), ("deep/new/", "is a folder"), ("q" * 300, "name is too long")],
+)
+def test_names_that_no_file_can_have_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, path: str, words: str
+) -> None:
+    """The first wrote a file `new`, the last was an internal error."""
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(OutputError, match=words):
+        check_targets([Target("json", path)])
+
+
+def test_a_spec_and_a_result_go_to_two_files(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to("fixed.yaml")
+    with pytest.raises(OutputError, match="two outputs go to"):
+        apart(tmp_path / "fixed.yaml", [Target("json", "-"), Target("json", f"{tmp_path}/link")])
+    apart(tmp_path / "fixed.yaml", [Target("json", "-"), Target("json", f"{tmp_path}/other")])
 
 
 def test_writes_files_and_folders(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import signal
 import subprocess
 import sys
 import time
+import types
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from syncline_design import cli
 from syncline_design.cli.app import app
 from syncline_design.cli.shared import guarded
 from syncline_design.comparison.diff import diff
@@ -217,6 +219,45 @@ def test_an_interrupted_cluster_ends_with_one_line(folder: Path, seconds: float)
     assert process.returncode == 130
     assert b"Traceback" not in said, said.decode()
     assert said.decode().splitlines()[-1] == "syncline-design: interrupted"
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["check", "--help"]])
+def test_help_that_nobody_reads_is_no_verdict(arguments: list[str]) -> None:
+    """It ended with 1: does not meet."""
+    reading, writing = os.pipe()
+    os.close(reading)
+    done = subprocess.run([str(COMMAND), *arguments], stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    assert done.returncode == 3
+    said = b"syncline-design: standard output: cannot write: closed by the reader\n"
+    assert done.stderr == said
+
+
+def test_an_interrupt_while_a_command_imports_is_one_line(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    class Interrupted(types.ModuleType):
+        def __getattr__(self, _: str) -> Any:
+            raise KeyboardInterrupt
+
+    name = "syncline_design.cli.app"
+    monkeypatch.setitem(sys.modules, name, Interrupted(name))
+    with pytest.raises(SystemExit) as ended:
+        cli.main()
+    assert ended.value.code == 130
+    assert capsys.readouterr().err == "syncline-design: interrupted\n"
+
+
+def test_a_store_that_is_a_file_is_a_slip_of_the_user(folder: Path) -> None:
+    (folder / "study.yaml").write_text("study: 1\nname: s\nbase: good.yaml\n")
+    (folder / "file").touch()
+    (folder / "circle").symlink_to("circle")
+    for store in ("file", "circle"):
+        found = CliRunner().invoke(
+            app, ["study", str(folder / "study.yaml"), "--store", str(folder / store)]
+        )
+        assert found.exit_code == 2
+        assert "is no folder" in found.stderr
 
 
 def started_workers(parent: int) -> list[str]:

@@ -80,6 +80,11 @@ def main() -> None:
     _start_quickly()
     try:
         app()
+    except SystemExit as end:
+        if isinstance(end.__context__, BrokenPipeError):  # help, or the version, to `| true`
+            say("syncline-design: standard output: cannot write: closed by the reader")
+            raise SystemExit(NO_VERDICT) from None
+        raise
     except OSError as error:  # help, or the version, to a standard output that takes nothing
         say(f"syncline-design: standard output: cannot write: {error.strerror or error}")
         raise SystemExit(NO_VERDICT) from None

@@ -97,7 +97,8 @@ def optimize(
     ] = False,
     pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
     resource: Annotated[
-        Literal["cost", "mass", "power"], typer.Option(help="What the front sets against error.")
+        Literal["cost", "mass", "power"],
+        typer.Option("--resource", "--against", help="What the front sets against error."),
     ] = "cost",
     write_design: Annotated[
         Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")
@@ -185,6 +186,10 @@ def study(
 
     wanted = [*(output or ()), *([f"{output_format}:-"] if output_format else ())]
     targets = output_targets(wanted, STUDY_FORMATS, [study_file])
+    if store is not None and os.path.lexists(store) and not store.is_dir():
+        refuse(
+            f"syncline-design: --store {store}: is no folder; give a folder, or a name not taken"
+        )
     _keep_cases([Path(t.path) for t in targets], store or study_file.parent / FOLDER)
     settings = StudySettings(seed, workers, store, scheduler, dask, fresh=fresh)
     with watched(deadline, targets, quiet=quiet, steps=False):

@@ -149,6 +149,7 @@ def output_targets(
     from syncline_design.report.write import (
         STDOUT,
         OutputError,
+        apart,
         check_targets,
         check_writable,
         parse_target,
@@ -159,7 +160,8 @@ def output_targets(
         targets = [parse_target(text, formats) for text in output or ()]
         for path in specs:
             check_writable(path)
-        check_targets(targets, [*reads, *specs])
+            apart(path, targets)
+        check_targets(targets, reads)
         for path in reads:
             note_read(path)
         claim_outputs([*specs, *(Path(t.path) for t in targets if t.path != STDOUT)])

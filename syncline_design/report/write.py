@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import sys
 from collections.abc import Sequence
@@ -14,7 +15,7 @@ from syncline_design.machine.result_files import OutputError, descriptor_of, is_
 from syncline_design.report.formats import NOT_FOR_A_TERMINAL
 
 __all__ = [
-    "STDOUT", "OutputError", "Target", "check_targets", "check_writable", "parse_target",
+    "STDOUT", "OutputError", "Target", "apart", "check_targets", "check_writable", "parse_target",
     "write_outputs",
 ]  # fmt: skip
 
@@ -71,9 +72,19 @@ def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None
             where = "standard output" if key == STDOUT else target.path
             raise OutputError(f"two outputs go to {where}; give each its own path")
         seen.add(key)
+        if target.path.endswith("/"):
+            raise OutputError(f"{target.path}: is a folder; give the name of a file in it")
         if target.path != STDOUT and not is_stream(target.path):
             _keep_inputs(target, key, inputs)
             check_writable(Path(target.path))
+
+
+def apart(path: Path, targets: Sequence[Target]) -> None:
+    """Refuse a file that is written besides the targets and is one of them."""
+    key = os.path.realpath(path)
+    for target in targets:
+        if target.path != STDOUT and os.path.realpath(target.path) == key:
+            raise OutputError(f"two outputs go to {target.path}; give each its own path")
 
 
 def _keep_inputs(target: Target, key: str, inputs: set[str]) -> None:
@@ -88,6 +99,11 @@ def _keep_inputs(target: Target, key: str, inputs: set[str]) -> None:
 
 def check_writable(path: Path) -> None:
     """Refuse a path that cannot become a file."""
+    try:
+        path.lstat()
+    except OSError as error:
+        if error.errno == errno.ENAMETOOLONG:
+            raise OutputError(f"{str(path)[:80]}...: the name is too long for a file") from None
     if path.is_dir():
         raise OutputError(f"{path}: is a folder; give the name of a file in it")
     if is_stream(path):
