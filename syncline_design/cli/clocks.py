@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from syncline_design.clocks.entry import EntryFiles
     from syncline_design.clocks.study import TimingSettings, TimingStudy
     from syncline_design.comparison.clock_meaning import TimingAndSpec
+    from syncline_design.spec.case import Case
 
 _SHARE = "a share between 0 and 1, such as 0.95"
 
@@ -83,6 +84,7 @@ def timing(
     from syncline_design.report.formats import TIMING_FORMATS
     from syncline_design.report.on_timing import on_timing, render_timing
     from syncline_design.report.render_console import console
+    from syncline_design.spec.load import load
 
     if write_catalog is not None and as_id is None:
         refuse("syncline-design: --write-catalog needs --as ID, the entry's id")
@@ -95,32 +97,32 @@ def timing(
     reads = [*log, *([spec] if spec is not None else [])]
     targets = output_targets(output, TIMING_FORMATS, reads, files.paths if files else ())
     with watched(deadline, targets, quiet=quiet):
+        case = None if spec is None else load(spec)
         study = study_logs(log, settings)
-        whole = _with_spec(study, settings, spec, as_id or "measured", seed)
+        whole = _with_spec(study, settings, case, as_id or "measured", seed)
     if as_id is not None and files is not None:
-        whole = _written(study, whole, as_id, settings, files)
+        currency = "EUR" if case is None else case.spec.currency
+        whole = _written(study, whole, as_id, settings, files, currency)
     emit(console(on_timing(whole)), targets, lambda name: render_timing(name, whole), quiet=quiet)
     return whole.exit_code
 
 
 def _with_spec(
-    study: TimingStudy, settings: TimingSettings, spec: Path | None, identity: str, seed: int
+    study: TimingStudy, settings: TimingSettings, case: Case | None, identity: str, seed: int
 ) -> TimingAndSpec:
     from syncline_design.comparison.clock_meaning import timing_meaning, with_spec
     from syncline_design.machine.deadline import in_force
 
-    if spec is None:
+    if case is None:
         return with_spec(study.timing, None)
-    from syncline_design.spec.load import load
-
     in_force().doing("checking the spec with the measured clock")
-    means = timing_meaning(load(spec), study, settings.kind, identity, seed)
+    means = timing_meaning(case, study, settings.kind, identity, seed)
     return with_spec(study.timing, means)
 
 
 def _written(
     study: TimingStudy, whole: TimingAndSpec, identity: str, settings: TimingSettings,
-    files: EntryFiles,
+    files: EntryFiles, currency: str,
 ) -> TimingAndSpec:  # fmt: skip
     """The entry on the disk, unless no claim could be made."""
     from syncline_design.clocks.entry import with_entry, write_entry
@@ -129,7 +131,7 @@ def _written(
     if not whole.claim.made:
         say(f"no claim, so no entry written: {whole.claim.why_not}")
         return whole
-    timing = with_entry(study, identity, settings.kind, files)
+    timing = with_entry(study, identity, settings.kind, files, currency)
     write_entry(study, timing, files)
     say(f"entry {identity} written to {files.catalog}")
     return with_spec(timing, whole.spec)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import calendar
 import re
+from functools import lru_cache
 from typing import Final
 
 from syncline_design.clocks.series import Row, SourceKind
@@ -44,14 +45,19 @@ def is_repeat(line: str) -> bool:
 
 def stamp(date: str, clock: str) -> float | None:
     """`2026-11-22 03:34:54` as Unix time; a leap second 60 is the one after 59."""
-    day, hours = _STAMP.match(date), _CLOCK.match(clock)
-    if day is None or hours is None:
-        return None
-    try:
-        whole = calendar.timegm((int(day[1]), int(day[2]), int(day[3]), 0, 0, 0))
-    except ValueError:
+    whole, hours = _midnight(date), _CLOCK.match(clock)
+    if whole is None or hours is None:
         return None
     return whole + 3600.0 * int(hours[1]) + 60.0 * int(hours[2]) + float(hours[3])
+
+
+@lru_cache(256)
+def _midnight(date: str) -> int | None:
+    day = _STAMP.match(date)
+    try:
+        return calendar.timegm((int(day[1]), int(day[2]), int(day[3]), 0, 0, 0)) if day else None
+    except ValueError:
+        return None
 
 
 def _row(time_s: float, cells: list[str]) -> tuple[SourceKind, Row, str] | None:

@@ -44,7 +44,7 @@ def read(file: LogFile) -> list[Sheet]:
     mark = _mark(header)
     columns = _columns(file, [c.strip() for c in next(csv.reader([header], delimiter=mark))], line)
     comma = mark != ","
-    rows: list[Row] = []
+    sheet = Sheet(SourceKind("CSV", "csv", 1, "unknown", "utc"))
     stamps_utc = True
     session: str | None = None
     for number, cells in _split(numbered, mark, file):
@@ -58,10 +58,13 @@ def read(file: LogFile) -> list[Sheet]:
         row, own = at.row(session)
         if row is not None:
             stamps_utc &= row.time_s > _EARLIEST_UTC
-            rows.append(row)
+            sheet.add(row)
             session = own
-    kind = SourceKind("CSV", "csv", 1, "unknown", "utc" if stamps_utc else "boot")
-    return [Sheet(kind, rows)]
+    if not sheet.figures:
+        raise refused(file.path, "no samples", expected="rows below the header", line=line)
+    if not stamps_utc:
+        sheet.kind = SourceKind("CSV", "csv", 1, "unknown", "boot")
+    return [sheet]
 
 
 def _split(

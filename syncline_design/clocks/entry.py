@@ -12,6 +12,8 @@ from syncline_design.clocks.files import refused
 from syncline_design.clocks.result import CatalogEntry, EntryKind, Timing
 from syncline_design.clocks.study import TimingStudy
 from syncline_design.machine.result_files import write_files
+from syncline_design.machine.streams import harmless
+from syncline_design.spec.load import load_builtin
 
 _ID: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,79}")
 _SECTIONS: Final[dict[EntryKind, str]] = {"clock": "clocks", "timestamping": "timestamping"}
@@ -37,6 +39,10 @@ def entry_files(identity: str, catalog: Path | None) -> EntryFiles:
     if not _ID.fullmatch(identity):
         raise refused(Path(f"--as {identity[:40]}"), "not an id",
                       expected="letters, digits, _ . - and a letter first")  # fmt: skip
+    known = load_builtin()
+    if any(identity in getattr(known, section) for section in _SECTIONS.values()):
+        raise refused(Path(f"--as {identity}"), "a built-in catalog has an entry of that id",
+                      hint="take another id")  # fmt: skip
     path = catalog or Path(f"{identity}.yaml")
     if path.exists():
         try:
@@ -59,9 +65,11 @@ def entry_files(identity: str, catalog: Path | None) -> EntryFiles:
     )
 
 
-def with_entry(study: TimingStudy, identity: str, kind: EntryKind, files: EntryFiles) -> Timing:
+def with_entry(
+    study: TimingStudy, identity: str, kind: EntryKind, files: EntryFiles, currency: str = "EUR"
+) -> Timing:  # fmt: skip
     """The result with its entry; nothing is written yet."""
-    text = entry_text(study.timing, identity, kind, files.values.name)
+    text = entry_text(study.timing, identity, kind, files.values.name, currency)
     entry = CatalogEntry(identity, kind, str(files.catalog), str(files.values), text)
     return replace(study.timing, entry=entry)
 
@@ -87,7 +95,9 @@ def values_of(study: TimingStudy, kind: EntryKind) -> list[float]:
     return sorted((sign * study.offsets_s).tolist())
 
 
-def entry_text(timing: Timing, identity: str, kind: EntryKind, values_file: str) -> str:
+def entry_text(
+    timing: Timing, identity: str, kind: EntryKind, values_file: str, currency: str
+) -> str:  # fmt: skip
     """One catalog file with one entry."""
     claim, key = timing.claim, "offset" if kind == "clock" else "error"
     lines = [
@@ -115,7 +125,7 @@ def entry_text(timing: Timing, identity: str, kind: EntryKind, values_file: str)
     if lines[-1] == "      events:":
         lines[-1] = "      events: []"
     lines += [
-        "    cost: 0 EUR",
+        f"    cost: 0 {currency}",
         "    mass: 0 g",
         "    power: 0 W",
         "    basis: {cost: assumption, mass: assumption, power: assumption}",
@@ -128,7 +138,8 @@ def entry_text(timing: Timing, identity: str, kind: EntryKind, values_file: str)
 
 
 def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=True)
+    """A double-quoted scalar; what a catalog may not hold is written as an escape."""
+    return json.dumps(harmless(text, one_line=True), ensure_ascii=False)
 
 
 def _time(value_s: float) -> str:

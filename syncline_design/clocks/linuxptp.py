@@ -17,17 +17,20 @@ _PROGRAM: Final = re.compile(r"\b(ptp4l|phc2sys|ts2phc)(?=\[|: )")
 _STAMP: Final = re.compile(r"\[(\d{1,12}(?:\.\d+)?)\]")
 _TAG: Final = re.compile(r"\[([\w.@-]+?)(?::\d)?\]")
 _INTEGER: Final = r"([-+]?\d{1,18})"
+# Every repeat has an end: a hostile line costs no more than its length.
+_GAP: Final = r"\s{1,16}"
 _SAMPLE: Final = re.compile(
-    rf"(?P<what>[\w/.-]+)?\s*(?:master|phc|sys|\bPHC)?\s*offset\s+{_INTEGER}\s+s(\d)"
-    rf"(?:\s+freq\s+{_INTEGER})?(?:\s+(?:path\s+)?delay\s+{_INTEGER})?"
+    rf"(?:(?P<what>[\w/.-]{{1,64}})\s{{1,4}})?(?:(?:master|phc|sys)\s{{1,4}})?offset{_GAP}{_INTEGER}"
+    rf"{_GAP}s(\d)(?:{_GAP}freq{_GAP}{_INTEGER})?(?:{_GAP}(?:path{_GAP})?delay{_GAP}{_INTEGER})?"
 )
 _SUMMARY: Final = re.compile(
-    rf"(?P<what>[\w/.-]+\s+)?rms\s+{_INTEGER}\s+max\s+{_INTEGER}"
-    rf"(?:\s+freq\s+{_INTEGER}\s+\+/-\s+\d+)?(?:\s+delay\s+{_INTEGER})?"
+    rf"(?:(?P<what>[\w/.-]{{1,64}})\s{{1,4}})?rms{_GAP}{_INTEGER}{_GAP}max{_GAP}{_INTEGER}"
+    rf"(?:{_GAP}freq{_GAP}{_INTEGER}{_GAP}\+/-{_GAP}\d{{1,18}})?(?:{_GAP}delay{_GAP}{_INTEGER})?"
 )
-_LOST: Final = re.compile(r"port \d+[^:]*: SLAVE to (?!SLAVE)|link down|timed out")
+_LOST: Final = re.compile(r"port \d{1,5}[^:]{0,64}: SLAVE to (?!SLAVE)|link down")
 _STARTED: Final = re.compile(r"INITIALIZING to LISTENING on INIT_COMPLETE|selected /dev/ptp\d+ as")
 _UNIX: Final = 1e9
+_MOST: Final = 512  # characters before and behind a program's name
 _RANKS: Final = {"phc2sys": 1, "ptp4l": 2, "ts2phc": 3}
 _STEERING: Final[dict[str, Steering]] = {
     "phc2sys": "servo",
@@ -45,10 +48,10 @@ class Reader:
 
     def row(self, line: str) -> tuple[SourceKind, Row, str] | None:
         """A line of any of the three programs that holds an offset, or says that lock was lost."""
-        program = _PROGRAM.search(line)
+        program = _PROGRAM.search(line[:_MOST])
         if program is None:
             return None
-        rest = line[program.end() :]
+        rest = line[program.end() : program.end() + _MOST]
         stamps = list(_STAMP.finditer(rest))[:2]
         if not stamps:
             return None
@@ -75,6 +78,8 @@ class Reader:
     def _sample(
         self, key: tuple[str, str], time_s: float, body: str
     ) -> tuple[SourceKind, Row, str] | None:
+        if "offset" not in body and "rms" not in body:
+            return None
         found = _SAMPLE.search(body)
         summary = None if found else _SUMMARY.search(body)
         if found is not None:

@@ -27,7 +27,7 @@ def gpsd_row(line: str) -> tuple[SourceKind, Row, str] | None:
         whole = int(found["clock_sec"]) - int(found["real_sec"])
         offset = whole + 1e-9 * (int(found["clock_nsec"]) - int(found["real_nsec"]))
         time_s = int(found["real_sec"]) + 1e-9 * int(found["real_nsec"])
-    except (ValueError, KeyError, TypeError, RecursionError, AttributeError):
+    except (ValueError, KeyError, TypeError, RecursionError, AttributeError, OverflowError):
         return None
     if kind not in ("PPS", "TOFF"):
         return None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -72,13 +73,13 @@ def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:
         if not number % 4096:
             in_force().check()
         parsed = read(line)
-        if parsed is None:
+        if parsed is None or not _is_finite(parsed[1]):
             if not _is_decoration(line) and not chrony.is_repeat(line):
                 strange.append(number)
             continue
         kind, row, reference = parsed
         sheet = found.setdefault(kind.name, Sheet(kind))
-        sheet.rows.append(row)
+        sheet.add(row)
         if reference:
             sheet.references.add(reference)
         total += 1
@@ -87,6 +88,12 @@ def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:
     if name in _JOURNALS:
         return list(found.values()), []
     return list(found.values()), _strange(file, strange, total)
+
+
+def _is_finite(row: Row) -> bool:
+    """Figures that are some; only a line that says that lock was lost has no offset."""
+    known = math.isfinite(row.offset_s) or (math.isnan(row.offset_s) and not row.locked)
+    return math.isfinite(row.time_s) and known and not math.isinf(row.hard_s)
 
 
 def _strange(file: LogFile, strange: list[int], total: int) -> list[str]:
@@ -138,12 +145,11 @@ def _joined(parts: list[tuple[LogFile, Sheet]]) -> Series:
     """Rotations of one log, the oldest first: by their stamps where these are of UTC."""
     kind = parts[0][1].kind
     if kind.stamps == "utc":
-        parts = sorted(parts, key=lambda part: part[1].rows[0].time_s if part[1].rows else 0.0)
+        parts = sorted(parts, key=lambda part: part[1].figures[0])
     else:
         parts = sorted(parts, key=lambda part: part[0].order)
-    rows = [row for _, sheet in parts for row in sheet.rows]
-    references = {name for _, sheet in parts for name in sheet.references}
-    return series_of(kind, tuple(str(file.path) for file, _ in parts), rows, references)
+    files = tuple(str(file.path) for file, _ in parts)
+    return series_of(kind, files, [sheet for _, sheet in parts])
 
 
 def _demand_once(series: Sequence[Series], files: dict[str, LogFile]) -> None:
@@ -151,21 +157,27 @@ def _demand_once(series: Sequence[Series], files: dict[str, LogFile]) -> None:
 
     Within a log a row that comes back is one too: a rotation and its copy.
     """
-    seen: dict[str, dict[tuple[float, float], int]] = {}
+    hint = "a session counts once: give each once"
     for index, one in enumerate(series):
-        known = seen.setdefault(one.kind.name, {})
-        rows = list(zip(one.time_s.tolist(), one.offset_s.tolist(), strict=True))
-        twice = [known[row] for row in rows if row in known]
-        if len(twice) > max(2, len(rows) // 20):
-            other = series[twice[0]].files[0]
-            raise refused(files[one.files[0]].path, f"the same session as in {other}",
-                          found=f"{len(twice)} rows of {one.kind.name} with the same stamp and "
-                          "offset", hint="a session counts once: give each once")  # fmt: skip
-        if len(one.files) > 1 and len(rows) - len(set(rows)) > max(2, len(rows) // 20):
+        rows = one.time_s + 1j * one.offset_s
+        most = max(2, len(one) // 20)
+        for other in series[:index]:
+            if other.kind.name != one.kind.name or _apart(one, other):
+                continue
+            twice = int(np.sum(np.isin(rows, other.time_s + 1j * other.offset_s)))
+            if twice > most:
+                raise refused(files[one.files[0]].path, f"the same session as in {other.files[0]}",
+                              found=f"{twice} rows of {one.kind.name} with the same stamp and "
+                              "offset", hint=hint)  # fmt: skip
+        if len(one.files) > 1 and len(one) - np.unique(rows).shape[0] > most:
             raise refused(files[one.files[-1]].path, f"the same session as in {one.files[0]}",
-                          found="rows with the same stamp and offset",
-                          hint="a session counts once: give each once")  # fmt: skip
-        known.update(dict.fromkeys(rows, index))
+                          found="rows with the same stamp and offset", hint=hint)  # fmt: skip
+
+
+def _apart(one: Series, other: Series) -> bool:
+    """Whether no stamp of one can be a stamp of the other."""
+    return bool(np.min(one.time_s) > np.max(other.time_s)
+                or np.min(other.time_s) > np.max(one.time_s))  # fmt: skip
 
 
 def _free_running(one: Series) -> tuple[Series, str]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from array import array
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Literal, NamedTuple
 
@@ -55,8 +57,18 @@ class Sheet:
     """Rows of one source of one file, under construction."""
 
     kind: SourceKind
-    rows: list[Row] = field(default_factory=list)
+    figures: array[float] = field(default_factory=lambda: array("d"))
     references: set[str] = field(default_factory=set)
+
+    def add(self, row: Row) -> None:
+        """One more row."""
+        self.figures.extend(row)
+
+    @property
+    def columns(self) -> Array:
+        """One row of the result is one field of `Row`."""
+        found: Array = np.frombuffer(self.figures, dtype=np.float64).reshape(-1, len(Row._fields))
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,10 +99,11 @@ class Series:
 
 
 def series_of(
-    kind: SourceKind, files: tuple[str, ...], rows: list[Row], references: set[str]
-) -> Series:
-    """Rows as columns."""
-    table = np.array([tuple(map(float, row)) for row in rows], dtype=np.float64).reshape(-1, 7)
+    kind: SourceKind, files: tuple[str, ...], sheets: Sequence[Sheet]
+) -> Series:  # fmt: skip
+    """Rows of several files as columns."""
+    table = np.concatenate([sheet.columns for sheet in sheets])
+    references = frozenset[str]().union(*(sheet.references for sheet in sheets))
     time_s, offset_s, hard_s, locked, rate, skew, restart = table.T.copy()
     return Series(kind, files, time_s, offset_s, hard_s, locked > 0.5, rate, skew, restart > 0.5,
-                  frozenset(references))  # fmt: skip
+                  references)  # fmt: skip

@@ -19,6 +19,7 @@ GAP_FACTOR: Final = 10.0  # of the median interval between samples
 STEP_SIGMAS: Final = 12.0
 LEAST_SAMPLES: Final = 20
 SHORTEST_S: Final = 90.0
+MOST_SKEW: Final = 1e-3  # larger ones say that the daemon knows nothing yet
 _MAD: Final = 1.4826  # to a normal standard deviation
 _DAY: Final = 86400.0
 
@@ -68,7 +69,7 @@ class ClockSession:
         if not np.any(np.isfinite(hard)):
             return math.nan
         skew = np.nan_to_num(self.series.skew[self.steady])
-        aged = hard + np.where(skew < 1e-3, skew, 0.0) * self.weight_s[self.steady]
+        aged = hard + np.where(skew < MOST_SKEW, skew, 0.0) * self.weight_s[self.steady]
         return float(np.nanmax(aged))
 
 
@@ -151,6 +152,13 @@ def _size(offsets: Array) -> float:
     return float(np.max(known)) if known.shape[0] else 0.0
 
 
+def _drifted(series: Series, first: int, last: int) -> float:
+    """What a clock may have drifted between two rows by the daemon's skew before; 0: unknown."""
+    skew = float(series.skew[first])
+    span = float(series.time_s[last] - series.time_s[first])
+    return skew * span if 0.0 < skew < MOST_SKEW else 0.0
+
+
 def _startup_events(series: Series, startup: Flags) -> list[ClockEvent]:
     count = int(np.sum(startup))
     if not count:
@@ -168,7 +176,7 @@ def _lock_events(series: Series, startup: Flags, longest: float) -> list[ClockEv
     for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
         back = min(stop, len(series) - 1)
         begins, ends = float(series.time_s[start]), float(series.time_s[back])
-        size = _size(series.offset_s[start : back + 1])
+        size = _size(series.offset_s[start : back + 1]) + _drifted(series, max(0, start - 1), back)
         found.append(ClockEvent("unlock", begins, ends, size))
         if ends - begins > longest or (stop - start > 1 and ends > begins):
             found.append(ClockEvent("holdover", begins, ends, size))
@@ -178,12 +186,12 @@ def _lock_events(series: Series, startup: Flags, longest: float) -> list[ClockEv
 
 
 def _gap_events(series: Series, longest: float) -> list[ClockEvent]:
-    """Times without samples: the size is the larger offset at the two ends."""
+    """Times without samples: the larger offset at the two ends, and what the skew brings."""
     places = np.flatnonzero(np.diff(series.time_s) > longest)
     return [
         ClockEvent("gap", float(series.time_s[k]), float(series.time_s[k + 1]),
-                   _size(series.offset_s[k : k + 2]))
-        for k in places
+                   _size(series.offset_s[k : k + 2]) + _drifted(series, k, k + 1))
+        for k in places.tolist()
     ]  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from syncline_design.clocks.series import Array
 
 Method = Literal["log-normal", "order statistic"]
+LEFT_SKEWED: Final = -0.5
 LEAST_SESSIONS: Final = 5  # what the recipe was measured from
 
 
@@ -40,7 +41,7 @@ def tolerance_bound(quantiles: Array, share: float, confidence: float) -> tuple[
     """Bound [s] that covers a share of future sessions' quantiles, and what it is made by.
 
     The larger of the largest session, which alone is a bound from as many sessions on as the order
-    statistic needs, and of a log-normal tolerance bound.
+    statistic needs, and of a tolerance bound that takes a transform of the quantiles as normal.
     """
     largest = float(np.max(quantiles))
     count = int(quantiles.shape[0])
@@ -49,14 +50,12 @@ def tolerance_bound(quantiles: Array, share: float, confidence: float) -> tuple[
     positive = quantiles[quantiles > 0.0]
     if count < 2 or not positive.shape[0]:
         return largest, method
-    logs = np.log(np.maximum(quantiles, float(np.min(positive))))
     k = normal_factor(count, share, raised_confidence(count, confidence))
-    raised = float(np.mean(logs)) + k * _spread(logs)
-    return max(largest, math.exp(min(raised, 700.0))), method
+    return max(largest, _raised(np.maximum(quantiles, float(np.min(positive))), k)), method
 
 
 def raised_confidence(count: int, confidence: float) -> float:
-    """The confidence of the log-normal part: sessions are log-normal only about.
+    """The confidence of the transformed part: sessions are of its shape only about.
 
     The more sessions there are, the less of a miss is due to their number and the more to their
     shape: of what may be missed 2/3 is taken at 5 sessions, 1/3 from 20 on.  Measured on clocks of
@@ -65,8 +64,26 @@ def raised_confidence(count: int, confidence: float) -> float:
     return 1.0 - (1.0 - confidence) / (1.0 + min(count / 10.0, 2.0))
 
 
-def _spread(logs: Array) -> float:
-    """Standard deviation, or that of the upper side where this is the wider one."""
+def _raised(quantiles: Array, k: float) -> float:
+    """The larger bound of log-normal and of cube-root-normal quantiles.
+
+    Small sessions say nothing about large ones: logarithms further below the median than the
+    largest is above it count as if they were not.  Where many sessions are much smaller than the
+    rest (skewness of the logarithms below -0.5) they are not log-normal: the cube root alone
+    counts, which makes squares of normal values nearly normal (Wilson and Hilferty 1931).
+    """
+    logs = np.log(quantiles)
+    cubic = max(0.0, _mean_plus(np.cbrt(quantiles), k)) ** 3
     away = logs - np.mean(logs)
-    upper = 2.0 * float(np.sum(away[away > 0.0] ** 2)) / (logs.shape[0] - 1)
-    return math.sqrt(max(float(np.var(logs, ddof=1)), upper))
+    spread = float(np.mean(away**2))
+    if spread == 0.0 or float(np.mean(away**3)) < LEFT_SKEWED * spread**1.5:
+        return cubic
+    low = 2.0 * float(np.median(logs)) - float(np.max(logs))
+    return max(cubic, math.exp(min(_mean_plus(np.maximum(logs, low), k), 700.0)))
+
+
+def _mean_plus(values: Array, k: float) -> float:
+    """mean + k s; s: standard deviation, or that of the upper side where this is the wider one."""
+    away = values - np.mean(values)
+    upper = 2.0 * float(np.sum(away[away > 0.0] ** 2)) / (values.shape[0] - 1)
+    return float(np.mean(values)) + k * math.sqrt(max(float(np.var(values, ddof=1)), upper))

@@ -39,6 +39,10 @@ _RESTS: Final = {
     "says that they do not)",
     "unknown_and_declared": "offsets as given, and what was declared beside",
 }
+_METHODS: Final = {
+    "log-normal": "a tolerance bound over sessions, never below the largest",
+    "order statistic": "the largest session (order statistic), or what raises it",
+}
 _WORDS: Final = {
     "meets": "meets its requirements",
     "fails": "does not meet its requirements",
@@ -100,11 +104,14 @@ def _sentences(result: Timing) -> Iterator[str]:
 def _claim_words(result: Timing) -> str:
     claim = result.claim
     length = "" if claim.session_s is None else f" of {format_duration(claim.session_s)}"
+    lost = any(event.kind == "unlock" for event in result.events)
+    in_lock = f" in lock (and within {numbers.time(result.event_bound_s)} else, as seen)"
+    in_lock = in_lock if lost else ""
     return (
         f"With {numbers.percent(claim.confidence)} confidence, at least "
-        f"{numbers.percent(claim.session_share)} of future sessions like these {claim.sessions}"
-        f"{length} keep |offset| within {numbers.time(result.bound_s)} for "
-        f"{numbers.percent(claim.coverage)} of their time."
+        f"{numbers.percent(claim.session_share)} of future sessions like these ({claim.sessions}"
+        f"{length}) keep |offset| within {numbers.time(result.bound_s)} for "
+        f"{numbers.percent(claim.coverage)} of their time{in_lock}."
     )
 
 
@@ -137,7 +144,7 @@ def _claim(result: Timing) -> list[Node]:
     claim = result.claim
     facts: list[tuple[str, Inline]] = [("Rests on", _RESTS[claim.rests_on])]
     if claim.method is not None:
-        facts.append(("Statistical bound by", f"{claim.method} over sessions"))
+        facts.append(("Statistical bound by", _METHODS[claim.method]))
     if result.use != "larger":
         facts.append(("Bound taken", f"the {result.use} one alone, as asked"))
     facts += [(f"Declared: {name}", numbers.time(value)) for name, value in result.declared.items()]
