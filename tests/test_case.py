@@ -110,9 +110,7 @@ def test_every_candidate_says_where_it_is_defined() -> None:
         for role in stage.roles:
             for one in role.sensors:
                 file, line, column = one.origin.rsplit(":", 2)
-                assert (file, one.origin) == (
-                    "builtin:sensors.yaml",
-                    case.origins["sensors", one.id],
-                )
+                assert file.startswith("builtin:sensors")
+                assert one.origin == case.origins["sensors", one.id]
                 assert int(line) > 1
                 assert int(column) > 1

@@ -101,7 +101,7 @@ def reproduce(catalog: Catalog | None = None, simulate: bool = True, seed: int =
     seed: of the starting points of their search; nothing else here is random.
     """
     in_force().doing("computing what the paper prints")
-    catalog = load_builtin() if catalog is None else catalog
+    catalog = load_builtin(families=False) if catalog is None else catalog
     cells = tuple(
         _cell((table, row, column), printed, _computed_si(catalog, table, row, column))
         for table in (*TAU_CRIT_TABLES, "text")

@@ -57,7 +57,8 @@ class Candidate(Generic[E]):
 class RoleCase:
     """What may take one role, in the order of the spec (of the catalog for a query).
 
-    inline: a timestamp error given in place; there are no methods then.
+    inline: a timestamp error given in place; there are no methods then.  incomplete: what answers
+    the query but lacks a figure that the spec needs, by that figure.
     """
 
     role: RoleName
@@ -65,6 +66,7 @@ class RoleCase:
     sensors: tuple[Candidate[SensorEntry], ...]
     methods: tuple[Candidate[TimestampingEntry], ...]
     inline: InlineTimestamping | None
+    incomplete: tuple[tuple[str, str], ...] = ()  # (id, figure)
 
     def sensor(self, identity: str) -> SensorEntry | None:
         """The candidate sensor of that id."""
@@ -187,16 +189,48 @@ def _role(case: Case, stage: StageChoice, name: RoleName, choice: RoleChoice) ->
     elif stamping is not None and not isinstance(stamping, InlineTimestamping):
         methods = stamping.candidates
     listed = case.catalog.timestamping
+    sensors = _sensors(case, stage, name, choice)
+    incomplete = _incomplete(case, choice, sensors)
+    without = {identity for identity, _ in incomplete}
     return RoleCase(
         name,
         choice,
-        _sensors(case, stage, name, choice),
+        tuple(one for one in sensors if one.id not in without),
         tuple(
             Candidate(one, listed[one], case.origins.get(("timestamping", one), ""))
             for one in methods
         ),
         inline,
+        incomplete,
     )
+
+
+def _incomplete(
+    case: Case, choice: RoleChoice, sensors: tuple[Candidate[SensorEntry], ...]
+) -> tuple[tuple[str, str], ...]:
+    """What a query finds without a figure that is due, unless nothing else answers it.
+
+    Whoever lists ids means them: there a missing figure is an error.
+    """
+    if not isinstance(choice.candidates, Query):
+        return ()
+    due = figures_due(case.spec, True)
+    found = tuple(
+        (one.id, figure) for one in sensors for figure in due if getattr(one.entry, figure) is None
+    )
+    return found if len({identity for identity, _ in found}) < len(sensors) else ()
+
+
+def figures_due(spec: Spec, is_open: bool) -> dict[str, str]:
+    """Cost, mass or power where something needs it of every part, and what does."""
+    due: dict[str, str] = {
+        r.kind: f"requirement {r.id}"
+        for r in spec.requirements
+        if r.kind in ("cost", "mass", "power")
+    }
+    if spec.objective != "error" and is_open:
+        due.setdefault(spec.objective, f"objective: {spec.objective}")
+    return due
 
 
 def _sensors(

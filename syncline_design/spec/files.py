@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
@@ -25,12 +28,30 @@ from syncline_design.spec.yaml_text import (
 )
 
 BUILTIN_PACKAGE = "syncline_design.catalogs"
+_LINE = re.compile(
+    r"^(?:(?P<section>[a-z]+):|  (?P<id>[^\s:#-][^\s:]*):"
+    r"|    (?P<key>modality|type): (?P<word>\S+))"
+)
 MOST_PATH = 4096  # characters; following a longer one takes seconds
+
+
+@dataclass(frozen=True, slots=True)
+class Unread:
+    """An entry of a shipped family that no spec has asked for yet: its file, what a query sees."""
+
+    file: str
+    place: str
+    modality: str = ""
+    type: str = ""
 
 
 @dataclass
 class Collection:
-    """Catalog entries as they are drawn together, with where each came from."""
+    """Catalog entries as they are drawn together, with where each came from.
+
+    families: whether those of the package may be drawn in; unread: their entries, by id and place,
+    once something is asked for that the other files do not have.
+    """
 
     entries: dict[str, dict[str, Any]] = field(default_factory=lambda: {s: {} for s in SECTIONS})
     origins: dict[tuple[str, str], str] = field(
@@ -39,6 +60,8 @@ class Collection:
     documents: dict[tuple[str, str], tuple[ParsedFile, KeyPath]] = field(default_factory=dict)
     problems: list[Flaw] = field(default_factory=list)
     digests: list[str] = field(default_factory=list)
+    unread: dict[tuple[str, str], Unread] = field(default_factory=dict)
+    families: bool = False
 
     def catalog(self) -> Catalog:
         """The merged catalog; its entries have been validated one by one."""
@@ -52,7 +75,36 @@ class Collection:
             dict(self.documents),
             list(self.problems),
             list(self.digests),
+            dict(self.unread),
+            self.families,
         )
+
+    def note_families(self) -> None:
+        """Learn which entries the shipped families hold, once."""
+        if self.families:
+            self.families = False
+            self.unread.update(_families())
+            self.origins.update((key, one.place) for key, one in self.unread.items())
+
+    def draw(self, wanted: Iterable[tuple[str, str]]) -> None:
+        """Read the shipped families that hold these entries, as far as they are unread."""
+        wanted = [key for key in wanted if key not in self.documents]
+        if not wanted:
+            return
+        self.note_families()
+        for shown in sorted({self.unread[key].file for key in wanted if key in self.unread}):
+            family = _family(shown)
+            for section, found in family.entries.items():
+                self.entries[section].update(found)
+            self.documents.update(family.documents)
+            self.problems.extend(family.problems)
+            self.digests.extend(family.digests)
+            self.unread = {key: one for key, one in self.unread.items() if one.file != shown}
+
+    def draw_all(self) -> None:
+        """Read every shipped family."""
+        self.note_families()
+        self.draw(list(self.unread))
 
     def sha256(self) -> str:
         """One hash over all files, in the order they were drawn in."""
@@ -71,17 +123,59 @@ def problem_at(
 
 
 def add_builtin(collection: Collection) -> None:
-    """Draw in every catalog file of the package."""
-    folder = files(BUILTIN_PACKAGE)
-    for resource in sorted(folder.iterdir(), key=lambda r: r.name):
-        if resource.name.endswith(".yaml"):
-            path = Path(str(resource))
-            shown = f"builtin:{resource.name}"
-            _add_document(collection, read(path, shown), path.parent, path.parent, shown)
+    """Draw in the catalog files of the package.
+
+    A family (a file in a folder of the package) is read once a spec asks for one of its entries:
+    most specs name a few, and reading all would take longer than checking such a spec.
+    """
+    for path in sorted(_package().glob("*.yaml")):
+        shown = f"builtin:{path.name}"
+        _add_document(collection, read(path, shown), path.parent, path.parent, shown)
+    collection.families = True
+
+
+def _package() -> Path:
+    return Path(str(files(BUILTIN_PACKAGE)))
+
+
+@functools.cache
+def _families() -> Mapping[tuple[str, str], Unread]:
+    """What the shipped families hold, from their lines alone: they are indented by two spaces."""
+    found: dict[tuple[str, str], Unread] = {}
+    for path in sorted(_package().glob("*/*.yaml")):
+        shown = f"builtin:{path.parent.name}/{path.name}"
+        found.update(_listed(path.read_text("utf-8"), shown))
+    return found
+
+
+def _listed(text: str, shown: str) -> Iterator[tuple[tuple[str, str], Unread]]:
+    section, identity, place, told = "", "", "", {"modality": "", "type": ""}
+    for number, line in enumerate((*text.splitlines(), "end:"), 1):
+        match = _LINE.match(line)
+        if match is None:
+            continue
+        if match["key"]:
+            told[match["key"]] = match["word"]
+            continue
+        if identity:
+            yield (section, identity), Unread(shown, place, told["modality"], told["type"])
+        section, identity = match["section"] or section, match["id"] or ""
+        place, told = f"{shown}:{number}:3", {"modality": "", "type": ""}
+
+
+@functools.cache
+def _family(shown: str) -> Collection:
+    """One shipped family, read once a process."""
+    alone = Collection()
+    path = _package() / shown.removeprefix("builtin:")
+    _add_document(alone, read(path, shown), path.parent, _package(), shown)
+    return alone
 
 
 def add_own(collection: Collection, spec: ParsedFile, folder: Path) -> None:
     """Draw in the catalogs that a spec names, and those that these name."""
+    if isinstance(spec.data, dict) and "catalogs" in spec.data:
+        collection.note_families()  # their ids are taken
     _add_listed(collection, spec, folder, folder.resolve(), (spec.file,))
 
 

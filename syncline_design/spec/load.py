@@ -26,7 +26,13 @@ from syncline_design.spec.files import (
     problem_at,
 )
 from syncline_design.spec.known_effects import effect_problems
-from syncline_design.spec.references import currency_problems, misfits, missing_figures, unknown_ids
+from syncline_design.spec.references import (
+    currency_problems,
+    draw_in,
+    misfits,
+    missing_figures,
+    unknown_ids,
+)
 from syncline_design.spec.spec import Spec
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile, TextPosition, parse, read
@@ -79,6 +85,7 @@ def catalogs_of(document: ParsedFile, path: Path, builtin: bool = True) -> Colle
     if builtin:
         add_builtin(collection)
     add_own(collection, document, path.parent)
+    draw_in(document, collection)
     return collection
 
 
@@ -87,12 +94,20 @@ def load_document(document: ParsedFile, path: Path, collection: Collection) -> C
     return _complete(document, path, collection.copy())
 
 
-def load_builtin() -> Catalog:
-    """The shipped catalogs alone."""
-    collection = Collection()
-    add_builtin(collection)
+def load_builtin(families: bool = True) -> Catalog:
+    """The shipped catalogs alone; without families, those that hold the paper's entries."""
+    collection = builtin_collection(families)
     _stop_at(collection.problems)
     return collection.catalog()
+
+
+def builtin_collection(families: bool = True) -> Collection:
+    """The shipped catalogs, and where each entry stands."""
+    collection = Collection()
+    add_builtin(collection)
+    if families:
+        collection.draw_all()
+    return collection
 
 
 def _stop_at(problems: list[Flaw]) -> None:
@@ -112,6 +127,7 @@ def _complete(
     document: ParsedFile, path: Path, collection: Collection, found: FilesRead | None = None
 ) -> Case:
     """The case, or every problem of the file; found: what was read since the spec was asked for."""
+    draw_in(document, collection)  # a study's case may name what its base does not
     filled = fill_empirical(document, path.parent, path.parent, collection)
     spec, problems = validate(Spec, document, filled)
     problems = [*document.problems, *problems, *collection.problems]

@@ -8,7 +8,7 @@ from typing import Any
 
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import ROLES
-from syncline_design.spec.case import Case, RoleCase, usable_primitives
+from syncline_design.spec.case import Case, RoleCase, figures_due, usable_primitives
 from syncline_design.spec.choices import Query
 from syncline_design.spec.fields import MAX_SUGGESTIONS, did_you_mean
 from syncline_design.spec.files import Collection, problem_at
@@ -39,6 +39,30 @@ def unknown_ids(spec: ParsedFile, collection: Collection) -> list[Flaw]:
                 at = (*path, "requires", identity)
                 problems.append(_unknown(document, at, "infrastructure", identity, collection))
     return problems
+
+
+def draw_in(spec: ParsedFile, collection: Collection) -> None:
+    """Read the shipped families that a spec can need: by an id, or by a query that they answer."""
+    collection.draw((section, identity) for section, _, identity in _spec_ids(spec.data))
+    for role, query in _queries(spec.data):
+        kind = query.get("type")
+        collection.note_families()
+        collection.draw(
+            [
+                key
+                for key, one in collection.unread.items()
+                if one.modality == role and kind in (None, one.type)
+            ]
+        )
+
+
+def _queries(data: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+    stages = _at(data, ("stages",))
+    for stage in stages if isinstance(stages, tuple) else ():
+        for role in ROLES:
+            query = _at(stage, (role, "candidates"))
+            if isinstance(query, dict):
+                yield role, query
 
 
 def _unknown(
@@ -283,14 +307,7 @@ def _has_options(role: RoleCase) -> bool:
 
 def missing_figures(document: ParsedFile, case: Case) -> list[Flaw]:
     """Costs, masses and powers that a requirement or the objective needs and a catalog lacks."""
-    spec = case.spec
-    needed: dict[str, str] = {
-        r.kind: f"requirement {r.id}"
-        for r in spec.requirements
-        if r.kind in ("cost", "mass", "power")
-    }
-    if spec.objective != "error" and is_open(case):
-        needed.setdefault(spec.objective, f"objective: {spec.objective}")
+    needed = figures_due(case.spec, is_open(case))
     return [
         problem_at(
             document, path, f"{label} has no {figure}", f"a {figure}, needed by {reason}",

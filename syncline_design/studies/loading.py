@@ -342,6 +342,7 @@ def _value_problems(base: Base, key: str, value: Any) -> list[Flaw]:
 def override_entry(catalogs: Collection, path: KeyPath, value: Any, spec: ParsedFile) -> Collection:
     """The catalogs with `catalog.SECTION[ID].KEY...` set; BadInput says why that cannot be."""
     section, identity = str(path[1]), str(path[2])
+    catalogs.draw([(section, identity)])
     origin = catalogs.documents.get((section, identity))
     if origin is None:
         known = [name for part, name in catalogs.origins if part == section]

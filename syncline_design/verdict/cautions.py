@@ -11,7 +11,7 @@ from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
 from syncline_design.simulation.ensemble import outside_words
-from syncline_design.spec.case import Case
+from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.verdict.tree import Assumption, Caution, ErrorFigures
 from syncline_design.verdict.verified import Verified
@@ -33,6 +33,7 @@ def cautions(
         *_simulation(verified),
         *_assumptions(assumed),
         *_transcripts(copied),
+        *_incomplete(case),
     )
 
 
@@ -223,3 +224,21 @@ def _transcripts(copied: Mapping[str, Sequence[str]]) -> Iterator[Caution]:
         named = ", ".join(figures)
         message = f"read in another's copy of the maker's figures: {named} of {entry}"
         yield Caution("transcript", message, entry=entry, key=named)
+
+
+def _incomplete(case: Case) -> Iterator[Caution]:
+    """Entries that answer a query but lack a figure that is due, one line a role."""
+    due = figures_due(case.spec, True)
+    for stage in case.stages:
+        for role in stage.roles:
+            lacking: dict[str, list[str]] = {}
+            for identity, figure in role.incomplete:
+                lacking.setdefault(figure, []).append(identity)
+            for figure, entries in lacking.items():
+                yield Caution(
+                    "incomplete-entry",
+                    f"{stage.choice.name}.{role.role}: left out of the query for want of a "
+                    f"{figure}, needed by {due[figure]}: {', '.join(entries)}",
+                    entry=", ".join(entries),
+                    key=figure,
+                )
