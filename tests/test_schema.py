@@ -27,7 +27,7 @@ from syncline_design.spec.yaml_text import read
 
 ROOT = Path(__file__).parent.parent
 CORPUS = Path(__file__).parent / "corpus"
-SPECS, CATALOGS = sorted(ROOT.glob("specs/*.yaml")), sorted(ROOT.glob("catalogs/*.yaml"))
+SPECS, CATALOGS = sorted(ROOT.glob("specs/*.yaml")), sorted(ROOT.glob("catalogs/**/*.yaml"))
 EXPECTED: dict[str, dict[str, Any]] = read(CORPUS / "expected.yaml").data
 
 # Slips that a schema alone can see: the shape of one value, not what it refers to.

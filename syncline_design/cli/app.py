@@ -38,7 +38,9 @@ app = typer.Typer(
     add_completion=False,
     pretty_exceptions_enable=False,
 )
-catalog = typer.Typer(help="Look into the built-in catalogs.", no_args_is_help=True)
+catalog = typer.Typer(
+    help="Look into the built-in catalogs, check and grow your own.", no_args_is_help=True
+)
 app.add_typer(catalog, name="catalog")
 
 app.command("check")(design.check)
@@ -51,6 +53,8 @@ app.command("timing")(clocks.timing)
 app.command("reproduce")(evidence.reproduce)
 catalog.command("list")(library.catalog_list)
 catalog.command("show")(library.catalog_show)
+catalog.command("check")(library.catalog_check)
+catalog.command("add")(library.catalog_add)
 app.command("schema")(library.schema)
 app.command("init")(library.init)
 

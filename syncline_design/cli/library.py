@@ -3,12 +3,27 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from syncline_design.cli.shared import guarded, refuse, show
-from syncline_design.report.formats import FileName, ResultName
+from syncline_design.cli.shared import (
+    QuietOption,
+    emit,
+    guarded,
+    output_option,
+    output_targets,
+    refuse,
+    show,
+)
+from syncline_design.model.roles import ROLES
+from syncline_design.report.formats import CATALOG_FORMATS, FileName, ResultName
+
+if TYPE_CHECKING:
+    from syncline_design.report.catalogs import Wanted
+
+
+CatalogOutput = Annotated[list[str] | None, output_option(CATALOG_FORMATS)]
 
 
 @guarded
@@ -17,32 +32,154 @@ def catalog_list(
         str | None,
         typer.Argument(help="platforms, sensors, timestamping, infrastructure or clocks."),
     ] = None,
+    modality: Annotated[
+        str | None, typer.Option(help="Sensors of this modality: position, attitude, ranging.")
+    ] = None,
+    kind: Annotated[
+        str | None, typer.Option("--type", metavar="TYPE", help="Sensors of this type.")
+    ] = None,
+    reach: Annotated[
+        str | None, typer.Option(metavar="LENGTH", help="Sensors that measure this far: 120 m.")
+    ] = None,
+    medium: Annotated[
+        str | None, typer.Option(help="Sensors that measure through air or water.")
+    ] = None,
+    max_cost: Annotated[
+        str | None, typer.Option(metavar="MONEY", help="Sensors up to this price: 5000 EUR.")
+    ] = None,
+    output: CatalogOutput = None,
+    quiet: QuietOption = False,
 ) -> int:
-    """List what the built-in catalogs hold."""
-    from syncline_design.report.catalogs import SECTIONS, list_text
-    from syncline_design.spec.load import load_builtin
+    """List what the built-in catalogs hold, or the sensors of them that fit."""
+    from syncline_design.report.catalogs import SECTIONS, list_text, listed
+    from syncline_design.report.json_out import json_text
+    from syncline_design.spec.load import builtin_collection
 
     if section is not None and section not in SECTIONS:
         refuse(f"syncline-design: catalog list {section}: expected one of {', '.join(SECTIONS)}")
-    show(list_text(load_builtin(), section))
+    wanted = _wanted(modality, kind, reach, medium, max_cost)
+    if wanted.narrows and section not in (None, "sensors"):
+        refuse(f"syncline-design: catalog list {section}: only sensors can be narrowed")
+    targets = output_targets(output, CATALOG_FORMATS)
+    collection = builtin_collection()
+    catalog = collection.catalog()
+    found = listed(catalog, collection.origins, section, wanted)
+    text = list_text(catalog, found)
+    emit(text, targets, lambda _: json_text(found.to_json()), quiet=quiet)
     return 0
 
 
-@guarded
-def catalog_show(identity: Annotated[str, typer.Argument(metavar="ID")]) -> int:
-    """Show one catalog entry with its figures, sources and assumptions."""
-    from syncline_design.report.catalogs import show_text, suggestion
-    from syncline_design.spec.load import load_builtin
+def _wanted(
+    modality: str | None,
+    kind: str | None,
+    reach: str | None,
+    medium: str | None,
+    max_cost: str | None,
+) -> Wanted:
+    """What a list is narrowed to; a word or a figure that cannot be meant is refused."""
+    from syncline_design.model.quantity import Dimension, UnitError, parse_quantity
+    from syncline_design.report.catalogs import Wanted
 
-    catalog = load_builtin()
-    text = show_text(catalog, identity)
-    if text is None:
+    for option, word, known in (
+        ("--modality", modality, ROLES),
+        ("--medium", medium, ("air", "water")),
+    ):
+        if word is not None and word not in known:
+            refuse(f"syncline-design: {option} {word}: expected one of {', '.join(known)}")
+    try:
+        far = None if reach is None else parse_quantity(reach, Dimension.LENGTH, tolerance=False)
+        most = (
+            None if max_cost is None else parse_quantity(max_cost, Dimension.MONEY, tolerance=False)
+        )
+    except UnitError as error:
+        refuse(f"syncline-design: catalog list: {error}")
+    return Wanted(modality, kind, far, medium, most)
+
+
+@guarded
+def catalog_show(
+    identity: Annotated[str, typer.Argument(metavar="ID")],
+    output: CatalogOutput = None,
+    quiet: QuietOption = False,
+) -> int:
+    """Show one catalog entry: figures, kinds, conversions, sources, assumptions."""
+    from syncline_design.report.catalogs import entry_data, entry_text, suggestion
+    from syncline_design.report.json_out import json_text
+    from syncline_design.spec.load import builtin_collection
+
+    targets = output_targets(output, CATALOG_FORMATS)
+    collection = builtin_collection()
+    catalog = collection.catalog()
+    found = entry_data(catalog, collection.origins, identity)
+    if found is None:
         refuse(
             f"syncline-design: catalog show {identity}: no such entry"
             f"{suggestion(catalog, identity)}"
         )
-    show(text)
+    emit(entry_text(found), targets, lambda _: json_text(found.to_json()), quiet=quiet)
     return 0
+
+
+@guarded
+def catalog_check(
+    files: Annotated[
+        list[Path] | None,
+        typer.Argument(metavar="[FILE]...", help="Catalog files; without them, the built-in ones."),
+    ] = None,
+    output: CatalogOutput = None,
+    quiet: QuietOption = False,
+) -> int:
+    """Look catalogs over: units, sources, conversions, siblings, ids, duplicates, lifecycle."""
+    from syncline_design.report.catalogs import check_text
+    from syncline_design.report.json_out import json_text
+    from syncline_design.spec.catalog_check import check_catalogs
+
+    targets = output_targets(output, CATALOG_FORMATS, files or ())
+    for path in files or ():
+        if not path.is_file():
+            refuse(f"syncline-design: catalog check {path}: no such file")
+    found = check_catalogs(files or ())
+    emit(check_text(found), targets, lambda _: json_text(found.to_json()), quiet=quiet)
+    return found.exit_code
+
+
+@guarded
+def catalog_add(
+    kind: Annotated[
+        str, typer.Option("--from-template", metavar="TYPE", help="Kind of entry: lidar, gnss, ...")
+    ],
+    to: Annotated[
+        Path | None, typer.Option("--to", metavar="FILE", help="Catalog file that it is put into.")
+    ] = None,
+) -> int:
+    """Write a stub of an entry, to be filled in from a data sheet."""
+    from datetime import date
+
+    from syncline_design.report.catalog_stub import STUB_TYPES, put_in, stub
+    from syncline_design.report.write import Target, write_outputs
+
+    if kind not in STUB_TYPES:
+        refuse(f"syncline-design: --from-template {kind}: expected one of {', '.join(STUB_TYPES)}")
+    section, text = stub(kind, date.today().isoformat())
+    if to is None:
+        show(f"{section}:\n{text}")
+        return 0
+    before = _catalog_text(to)
+    write_outputs([(Target("text", str(to)), put_in(before, section, text))])
+    return 0
+
+
+def _catalog_text(path: Path) -> str:
+    """The text of a catalog that an entry is to be put into; empty where there is none yet."""
+    from syncline_design.spec.yaml_text import read
+
+    if not path.exists():
+        return ""
+    document = read(path)
+    if not isinstance(document.data, dict | None) or document.problems:
+        reason = str(document.problems[0]) if document.problems else f"{path}: not a catalog"
+        refuse(f"{reason}; mend it before something is added")
+    return document.text
 
 
 @guarded

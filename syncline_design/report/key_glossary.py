@@ -130,6 +130,7 @@ KEYS: dict[str, str] = {
     "to": "When it ended.",
     "trajectory": "Where the vehicles go: {manoeuvre: NAME} or {file: PATH}.",
     "type": "Kind of sensor, such as gnss, ins, lidar, usbl, mbes.",
+    "unusual": "Why a figure stands apart from those of its siblings: {reach: looks far}.",
     "use": "Id of the catalog platform whose keys hold where none is given here.",
     "v_max": "Largest speed of the vehicle.",
     "value": "The constant error.",

@@ -10,14 +10,19 @@ from syncline_design.comparison import clock_meaning, difference, meaning
 from syncline_design.diagnosis import result as diagnosis
 from syncline_design.machine.records import schema_of
 from syncline_design.paper import reproduce
+from syncline_design.report import catalogs
 from syncline_design.report.formats import ResultName
 from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
+from syncline_design.spec import catalog_check
 from syncline_design.studies import data as study
 from syncline_design.verdict import optimise
 from syncline_design.verdict import tree as verdict
 
 _RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
+    "catalog-check": (catalog_check.CatalogCheck, catalog_check.SCHEMA),
+    "catalog-entry": (catalogs.CatalogEntry, catalogs.ENTRY_SCHEMA),
+    "catalog-list": (catalogs.CatalogList, catalogs.LIST_SCHEMA),
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
     "optimisation": (optimise.Optimisation, optimise.SCHEMA),

@@ -97,16 +97,21 @@ class Entry(FileRecord):
     basis: Basis | None = None  # "assumption", or per figure: {cost: assumption}
     note: str = ""
     figures: Figures  # what sources print, by figure or by part: sigma_attitude.yaw
+    unusual: dict[str, Text] = Field(default_factory=dict)  # figure to why it stands apart
 
     @model_validator(mode="after")
     def _names_figures(self) -> Entry:
         known = [name for name in type(self).model_fields if name not in _ABOUT]
         named = self.basis if isinstance(self.basis, dict) else {}
-        if not named and not self.figures:
+        if not named and not self.figures and not self.unusual:
             return self
         errors: list[tuple[KeyPath, PydanticCustomError]] = [
             ((field, key), refusal("no such figure", hint=hint))
-            for field, keys in (("basis", named), ("figures", self.figures))
+            for field, keys in (
+                ("basis", named),
+                ("figures", self.figures),
+                ("unusual", self.unusual),
+            )
             for key, hint in unknown_figures(iter(keys), known)
         ]
         if errors:
@@ -127,7 +132,7 @@ class Entry(FileRecord):
         return named
 
 
-_ABOUT = frozenset({"name", "source", "basis", "note", "figures"})
+_ABOUT = frozenset({"name", "source", "basis", "note", "figures", "unusual"})
 
 
 class Product(Entry):

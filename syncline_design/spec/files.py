@@ -138,6 +138,11 @@ def _package() -> Path:
     return Path(str(files(BUILTIN_PACKAGE)))
 
 
+def published_ids() -> Path:
+    """The ids of all shipped entries that a release had, `SECTION ID` a line."""
+    return _package() / "ids.txt"
+
+
 @functools.cache
 def _families() -> Mapping[tuple[str, str], Unread]:
     """What the shipped families hold, from their lines alone: they are indented by two spaces."""
@@ -170,6 +175,15 @@ def _family(shown: str) -> Collection:
     path = _package() / shown.removeprefix("builtin:")
     _add_document(alone, read(path, shown), path.parent, _package(), shown)
     return alone
+
+
+def add_file(collection: Collection, path: Path) -> ParsedFile:
+    """Draw in one catalog file by itself, and those that it names."""
+    document = read(path)
+    collection.note_families()
+    _add_document(collection, document, path.parent, path.parent.resolve(), str(path))
+    _add_listed(collection, document, path.parent, path.parent.resolve(), (str(path),))
+    return document
 
 
 def add_own(collection: Collection, spec: ParsedFile, folder: Path) -> None:

@@ -32,6 +32,12 @@ def unknown_ids(spec: ParsedFile, collection: Collection) -> list[Flaw]:
         if (section, identity) not in collection.origins
     )
     problems = [_unknown(spec, *item, collection) for item in islice(unknown, MAX_SUGGESTIONS)]
+    return problems + unknown_requirements(collection)
+
+
+def unknown_requirements(collection: Collection) -> list[Flaw]:
+    """Shared hardware that an entry requires and no catalog has."""
+    problems: list[Flaw] = []
     for document, path in collection.documents.values():
         requires = _at(document.data, (*path, "requires"))
         for identity in requires if isinstance(requires, dict) else ():

@@ -149,8 +149,22 @@ def assumptions(entries: list[UsedEntry]) -> tuple[Assumption, ...]:
 
 def transcripts(entries: list[UsedEntry]) -> dict[str, list[str]]:
     """Figures that were read in another's copy of a maker's document only, by entry."""
-    found = {used.id: _resting_on(used.entry, "transcript") for used in entries}
+    found = {
+        used.id: [
+            figure
+            for figure in _resting_on(used.entry, "transcript")
+            if split_figure(figure)[0] in _WEIGHED
+        ]
+        for used in entries
+    }
     return {identity: figures for identity, figures in found.items() if figures}
+
+
+# What a verdict is computed from.
+_WEIGHED = frozenset(
+    {"sigma_position", "sigma_attitude", "sigma_range", "sigma_bearing", "error", "offset"}
+    | {"drift", "holdover", "cost", "mass", "power"}
+)
 
 
 def _resting_on(entry: Entry, basis: str) -> list[str]:
@@ -170,7 +184,18 @@ def _figure_text(entry: Entry, figure: str) -> str:
 
 
 _NOT_FIGURES = frozenset(
-    {"name", "source", "basis", "note", "modality", "type", "timeline", "figures", "lifecycle"}
+    {
+        "name",
+        "source",
+        "basis",
+        "note",
+        "modality",
+        "type",
+        "timeline",
+        "figures",
+        "unusual",
+        "lifecycle",
+    }
 )
 
 
@@ -191,7 +216,7 @@ def figure_text(value: Any) -> str:
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key}: {figure_text(item)}" for key, item in value.items()) + "}"
     if hasattr(value, "model_fields_set"):
-        parts = [(key, item) for key, item in value if item not in (None, (), [], {})]
+        parts = [(key, item) for key, item in value if item not in (None, "", (), [], {})]
         return " ".join(
             str(item) if key == "distribution" else f"{key} {figure_text(item)}"
             for key, item in parts
@@ -206,11 +231,10 @@ def sources(entries: list[UsedEntry]) -> tuple[Source, ...]:
 
 
 def told_source(entry: Entry) -> str:
-    """An entry's sources in one line: its own words, else those of its figures, each once."""
-    if entry.source or not entry.figures:
-        return entry.source
+    """An entry's sources in one line: its own words, then those of its figures, each once."""
     by_source: dict[str, list[str]] = {}
     for key, one in entry.figures.items():
         place = f"{one.source} ({one.address})" if one.address else one.source
         by_source.setdefault(place, []).append(key)
-    return "; ".join(f"{', '.join(keys)}: {place}" for place, keys in by_source.items())
+    told = (f"{', '.join(keys)}: {place}" for place, keys in by_source.items())
+    return "; ".join([*([entry.source] if entry.source else []), *told])

@@ -1,0 +1,291 @@
+"""Catalog files looked over as a whole: format, sources, conversions, siblings, ids, lifecycle.
+
+What loading refuses is wrong; what is found here besides may be right and has to be said: a source,
+a successor, why a figure stands apart.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+from typing import Any, Final, Literal
+
+from syncline_design.machine.records import Record, optional
+from syncline_design.model.conversion import conversion_of, printed_value
+from syncline_design.model.quantity import UnitError, format_like
+from syncline_design.spec.catalog import SECTIONS, Entry, Product, SensorEntry
+from syncline_design.spec.facts import (
+    AXES,
+    SIGMA_DIMENSIONS,
+    Lifecycle,
+    PrintedFigure,
+    Reach,
+    split_figure,
+)
+from syncline_design.spec.fields import did_you_mean
+from syncline_design.spec.files import Collection, add_builtin, add_file, published_ids
+from syncline_design.spec.references import unknown_requirements
+from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
+
+SCHEMA: Final = "syncline-design/catalog-check/v1"
+FACTOR: Final = 5.0  # further than this from the siblings' median is asked about
+FEWEST_SIBLINGS: Final = 4
+CLOSE: Final = 0.02  # between a figure and what its conversion gives: three digits are written
+_ID = re.compile(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*")
+Code = Literal[
+    "format", "duplicate", "id", "unsourced", "conversion", "siblings", "successor", "published"
+]
+# Words about an entry, or what its type says anyway: they need no source.
+_PLAIN: Final = frozenset(
+    {"name", "source", "basis", "note", "figures", "unusual", "modality", "type", "medium"}
+    | {"needs", "corrects", "lifecycle", "timeline", "requires", "lead_time"}
+)  # fmt: skip
+_COMPARED: Final = (*SIGMA_DIMENSIONS, "reach", "rate", "cost", "mass", "power")
+
+
+@dataclass(frozen=True, slots=True)
+class Finding(Record):
+    """One thing to mend, or to say: where, what, what to do."""
+
+    code: Code
+    file: str
+    line: int
+    column: int
+    message: str
+    hint: str
+    section: str | None = optional()
+    entry: str | None = optional()
+    key: str | None = optional()
+
+    def __str__(self) -> str:
+        """`file:line:col: section.entry.key: message; hint`."""
+        path = ".".join(part for part in (self.section, self.entry, self.key) if part)
+        words = f"{path}: {self.message}" if path else self.message
+        told = f"{words}; {self.hint}" if self.hint else words
+        return f"{self.file}:{self.line}:{self.column}: {told}"
+
+
+@dataclass(frozen=True, slots=True)
+class CatalogCheck(Record):
+    """What was looked at and what was found."""
+
+    schema: str
+    files: tuple[str, ...]
+    entries: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def exit_code(self) -> int:
+        """0 without findings, else 1."""
+        return 1 if self.findings else 0
+
+
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """One entry with the document that it stands in."""
+
+    section: str
+    id: str
+    entry: Any
+    document: ParsedFile
+
+    def finding(self, code: Code, key: str, message: str, hint: str) -> Finding:
+        path: KeyPath = (self.section, self.id, *([key] if key else []))
+        line, column = self.document.key_positions.get(path, self.document.position(path))
+        return Finding(
+            code, self.document.file, line, column, message, hint, self.section, self.id,
+            key or None,
+        )  # fmt: skip
+
+
+def check_catalogs(paths: Sequence[Path] = ()) -> CatalogCheck:
+    """Look over catalog files, each with what it names; without paths, the shipped ones."""
+    collection = Collection()
+    add_builtin(collection)
+    own = [add_file(collection, path).file for path in paths]
+    collection.draw_all()
+    every = list(_entries(collection))
+    looked_at = [one for one in every if not own or not one.document.file.startswith("builtin:")]
+    flaws = collection.problems + unknown_requirements(collection)
+    findings = [_refused(flaw) for flaw in flaws]
+    findings += [] if paths else list(_withdrawn(collection))
+    known = {section: {one.id for one in every if one.section == section} for section in SECTIONS}
+    for one in looked_at:
+        findings += [*_ids(one), *_sources(one), *_conversions(one), *_successor(one, known)]
+        findings += _siblings(one, every)
+    findings += _same_names(looked_at, every)
+    found = sorted(set(findings), key=lambda f: (f.file, f.line, f.column, f.code, f.message))
+    files = tuple(dict.fromkeys([*own, *(one.document.file for one in looked_at)]))
+    return CatalogCheck(SCHEMA, files, len(looked_at), tuple(found))
+
+
+def _entries(collection: Collection) -> Iterator[_Place]:
+    for (section, identity), (document, _) in collection.documents.items():
+        entry = collection.entries[section].get(identity)
+        if entry is not None:
+            yield _Place(section, identity, entry, document)
+
+
+def _refused(flaw: Flaw) -> Finding:
+    code: Code = "duplicate" if flaw.message.startswith("this id is taken") else "format"
+    parts = [f"expected {flaw.expected}" if flaw.expected else ""]
+    parts += [f"found {flaw.found}" if flaw.found else "", flaw.hint]
+    message = f"{flaw.path}: {flaw.message}" if flaw.path else flaw.message
+    hint = "; ".join(part for part in parts if part)
+    return Finding(code, flaw.file, flaw.line, flaw.column, message, hint)
+
+
+def _withdrawn(collection: Collection) -> Iterator[Finding]:
+    """Ids that a release had and the shipped catalogs have no more: specs out there name them."""
+    for number, line in enumerate(published_ids().read_text("utf-8").splitlines(), 1):
+        section, _, identity = line.partition(" ")
+        if identity and (section, identity) not in collection.origins:
+            message = f"{identity} of {section} was published and is gone"
+            hint = "bring it back; what is no longer made is discontinued, not deleted"
+            yield Finding("published", "builtin:ids.txt", number, 1, message, hint)
+
+
+def _ids(one: _Place) -> Iterator[Finding]:
+    """An id is for years: specs name it, so it holds no capitals, blanks or signs."""
+    if not _ID.fullmatch(one.id):
+        yield one.finding("id", "", "an id that will not last", "lower case: maker_model_variant")
+
+
+def _sources(one: _Place) -> Iterator[Finding]:
+    """Figures that neither a source nor a basis accounts for."""
+    entry: Entry = one.entry
+    if entry.source:
+        return
+    printed = {split_figure(key)[0] for key in entry.figures}
+    for key, value in entry.told():
+        if key in _PLAIN or value in (None, (), {}, "") or key in printed:
+            continue
+        if key == "primitives" and one.section == "timestamping":
+            continue  # what a method serves is what it is
+        if _is_nothing(value) or _has_basis(entry, key):
+            continue
+        hint = "add it to figures, name a source, or mark it in basis"
+        yield one.finding("unsourced", key, f"no source for {key}", hint)
+
+
+def _is_nothing(value: Any) -> bool:
+    return isinstance(value, float) and value == 0.0
+
+
+def _has_basis(entry: Entry, key: str) -> bool:
+    if entry.basis_of(key) is not None:
+        return True
+    parts = AXES.get(key, {})
+    return bool(parts) and any(entry.basis_of(f"{key}.{part}") for part in parts)
+
+
+def _conversions(one: _Place) -> Iterator[Finding]:
+    """Sigmas that are not what the printed figure and its kind give."""
+    for key, printed in one.entry.figures.items():
+        name, part = split_figure(key)
+        if name not in SIGMA_DIMENSIONS:
+            continue
+        try:
+            converted = converted_sigma(name, printed)
+        except UnitError as error:
+            yield one.finding("conversion", name, f"the printed figure of {key}: {error}", "")
+            continue
+        if converted is None:
+            wanted = "a kind that says how wide the error spreads: 1 sigma, cep50, 95 %, ..."
+            message = f"the printed figure of {key} is of the kind {printed.kind}"
+            yield one.finding("conversion", name, message, wanted)
+            continue
+        for written in _axis_figures(getattr(one.entry, name), name, part):
+            if abs(float(written) - converted) > CLOSE * converted:
+                says = format_like(getattr(written, "text", ""), converted)
+                message = (
+                    f"{getattr(written, 'text', written)} is written, "
+                    f"{printed.figure} ({printed.kind}) gives {says}"
+                )
+                yield one.finding("conversion", name, message, "write what the conversion gives")
+                break
+
+
+def converted_sigma(name: str, printed: PrintedFigure) -> float | None:
+    """One standard deviation per axis that a printed figure stands for, in SI; None: none."""
+    conversion = conversion_of(printed.kind)
+    if conversion is None:
+        return None
+    over = None if printed.over is None else float(printed.over)
+    return conversion.factor * printed_value(printed.figure, SIGMA_DIMENSIONS[name], over)
+
+
+def _axis_figures(value: Any, name: str, part: str) -> tuple[Any, ...]:
+    axes = value if isinstance(value, tuple) else (value,)
+    if not part or len(axes) == 1:
+        return axes
+    return tuple(axes[axis] for axis in AXES[name][part])
+
+
+def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[Finding]:
+    """Who comes after a product that is no longer made, as far as that is known."""
+    lifecycle: Lifecycle | None = getattr(one.entry, "lifecycle", None)
+    if lifecycle is None:
+        return
+    follower = lifecycle.successor
+    if follower is None and lifecycle.status == "discontinued" and not lifecycle.note:
+        hint = "name the successor, or say in its note that none is known"
+        yield one.finding("successor", "lifecycle", "discontinued without a successor", hint)
+    if follower is not None and (follower not in known[one.section] or follower == one.id):
+        hint = did_you_mean(follower, known[one.section] - {one.id}) or "an id of this section"
+        yield one.finding("successor", "lifecycle", f"no such successor: {follower}", hint)
+
+
+def _siblings(one: _Place, every: Sequence[_Place]) -> Iterator[Finding]:
+    """Figures more than a factor of 5 off the median of the same kind of sensor."""
+    entry = one.entry
+    if not isinstance(entry, SensorEntry) or not entry.type:
+        return
+    family = [
+        other.entry
+        for other in every
+        if other.section == one.section
+        and other.id != one.id
+        and (other.entry.modality, other.entry.type) == (entry.modality, entry.type)
+    ]
+    for key in _COMPARED:
+        value = _size(entry, key)
+        sizes = [size for size in (_size(other, key) for other in family) if size]
+        if not value or len(sizes) < FEWEST_SIBLINGS or key in entry.unusual:
+            continue
+        middle = median(sizes)
+        if not middle / FACTOR <= value <= middle * FACTOR:
+            ratio = max(value / middle, middle / value)
+            way = "more" if value > middle else "less"
+            message = (
+                f"{ratio:.3g} times {way} than the median of {len(sizes)} others "
+                f"of type {entry.type}"
+            )
+            hint = f"look at the unit; if it is right, say why: unusual: {{{key}: ...}}"
+            yield one.finding("siblings", key, message, hint)
+
+
+def _size(entry: Product, key: str) -> float | None:
+    """One number to compare by: a sigma over its axes, the far end of a reach."""
+    value = getattr(entry, key)
+    if isinstance(value, Reach):
+        value = value.farthest()
+    if isinstance(value, tuple):
+        return math.sqrt(sum(float(axis) ** 2 for axis in value) / len(value))
+    return None if value is None else float(value)
+
+
+def _same_names(looked_at: Sequence[_Place], every: Sequence[_Place]) -> Iterator[Finding]:
+    """Two entries of a section by one name: a reader of a report cannot tell them apart."""
+    first: dict[tuple[str, str], _Place] = {}
+    asked = {(one.section, one.id) for one in looked_at}
+    for one in every:
+        name = " ".join(one.entry.name.casefold().split())
+        other = first.setdefault((one.section, name), one) if name else one
+        if other is not one and (one.section, one.id) in asked:
+            message = f"the same name as {other.id}"
+            yield one.finding("duplicate", "name", message, "say in which variant they differ")
