@@ -39,10 +39,14 @@ def number(text: Any) -> float:
 
 
 @functools.cache
-def read_catalog() -> dict[str, Any]:
+def read_catalog(families: bool = False) -> dict[str, Any]:
+    """The catalogs that hold the paper's entries; with families, all that is shipped."""
     merged: dict[str, Any] = {}
     for name in ("platforms", "sensors", "timestamping"):
         merged.update(yaml.safe_load((CATALOGS / f"{name}.yaml").read_text("utf-8")))
+    for path in sorted(CATALOGS.glob("*/*.yaml")) if families else ():
+        for section, entries in yaml.safe_load(path.read_text("utf-8")).items():
+            merged[section].update(entries)
     return merged
 
 
@@ -77,10 +81,16 @@ def norm(values: list[str]) -> float:
 def sensor_error(sensor: dict[str, Any], distance_m: float) -> float:
     """A sensor's term of the paper's eq. sensor_error_ub [m]; a scalar sigma_p is per axis."""
     if sensor["modality"] == "position":
-        return math.sqrt(3) * number(sensor["sigma_position"])
+        return norm(_axes(sensor["sigma_position"], 3))
     if sensor["modality"] == "attitude":
-        return norm(sensor["sigma_attitude"]) * distance_m
-    return number(sensor["sigma_range"]) + norm(sensor["sigma_bearing"]) * distance_m
+        return norm(_axes(sensor["sigma_attitude"], 3)) * distance_m
+    bearing = norm(_axes(sensor["sigma_bearing"], 2))
+    return number(sensor["sigma_range"]) + bearing * distance_m
+
+
+def _axes(sigma: str | list[str], count: int) -> list[str]:
+    """One figure holds for every axis."""
+    return sigma if isinstance(sigma, list) else [sigma] * count
 
 
 @dataclass(frozen=True)
@@ -138,7 +148,7 @@ class Enumeration:
     def __init__(self, spec: dict[str, Any], gnss_everywhere: bool = False) -> None:
         self.spec = spec
         self.gnss_everywhere = gnss_everywhere
-        self.catalog = read_catalog()
+        self.catalog = read_catalog(families=True)
         self.k = spec.get("coverage_factor", 3)
         self.stages = [self._stage(raw) for raw in spec["stages"]]
         self.vehicles = list(dict.fromkeys(stage.vehicle for stage in self.stages))
@@ -165,7 +175,12 @@ class Enumeration:
         keys = wanted["candidates"].items()
         sensors = self.catalog["sensors"].items()
         fits = [n for n, s in sensors if all(s[key] == value for key, value in keys)]
-        return [name for name in fits if self.catalog["sensors"][name]["modality"] == role]
+        fits = [name for name in fits if self.catalog["sensors"][name]["modality"] == role]
+        objective = self.spec.get("objective", "cost")
+        due = {one["kind"] for one in self.spec["requirements"]} | {objective}
+        due &= {"cost", "mass", "power"}
+        whole = [name for name in fits if due <= set(self.catalog["sensors"][name])]
+        return whole or fits
 
     def options(self, slot: Slot) -> list[Option]:
         """What a role can be: every sensor, primitive and method that fit together."""
@@ -237,7 +252,8 @@ class Enumeration:
         sync = per_sensor if self.spec.get("sync_model") == "per_sensor" else rate * tau
         bought = self._bought(at, dict(zip(self.vehicles, clocks, strict=True)))
         cost, mass, power = (
-            sum(number(e[key]) for e in bought) for key in ("cost", "mass", "power")
+            sum(number(e[key]) if key in e else math.nan for e in bought)
+            for key in ("cost", "mass", "power")
         )
         return Outcome(options, clocks, cost, mass, power, error, rate, tau, error + sync)
 

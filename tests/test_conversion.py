@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -106,3 +108,31 @@ def test_printed_values(text: str, dimension: Dimension, over: float, value: flo
 def test_a_printed_value_that_cannot_be_read_says_so(text: str) -> None:
     with pytest.raises(UnitError):
         printed_value(text, LENGTH, None)
+
+
+def test_the_guide_gives_the_factor_of_every_kind() -> None:
+    """The table of docs/catalogs.md against scipy, not against the table of the code."""
+    guide = (Path(__file__).parent.parent / "docs" / "catalogs.md").read_text("utf-8")
+    section = guide.split("## What is printed, and what is counted")[1].split("\n## ")[0]
+    rows = [line.strip("|").split("|") for line in section.splitlines() if line.startswith("| `")]
+    told = {row[0].strip(): row[2].strip() for row in rows}
+    wanted = {
+        "`1 sigma`, `std`, `rms`": 1.0,
+        "`drms`": math.sqrt(0.5),
+        "`2drms`": math.sqrt(0.125),
+        "`mrse`": math.sqrt(1 / 3),
+        "`cep50`": 1 / stats.rayleigh.ppf(0.5),
+        "`sep50`": 1 / math.sqrt(stats.chi2.ppf(0.5, 3)),
+        "`50 %`, `median`": 1 / stats.halfnorm.ppf(0.5),
+        "`95 %`": 1 / stats.halfnorm.ppf(0.95),
+        "`max`": stats.uniform(-1.0, 2.0).std(),
+        "`resolution`": stats.uniform(0.0, 1.0).std(),
+        "`beam width`": 1 / (2 * math.sqrt(2 * math.log(2))),
+        "`1/e2 width`": 0.25,
+        "`typical`, `unstated`": 1.0,
+    }
+    assert set(told) == {*wanted, "`2 sigma`, `3 sigma`"}
+    for kind, factor in wanted.items():
+        assert float(told[kind]) == pytest.approx(factor, abs=5e-5), kind
+    named = {word for row in told for word in re.findall(r"`([^`]+)`", row)}
+    assert named - {"50 %"} == {kind for kind in kinds() if conversion_of(kind)} - {"cep95"}
