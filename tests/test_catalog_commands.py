@@ -132,6 +132,32 @@ def test_parts_are_held_against_their_own_axes(tmp_path: Path) -> None:
             assert [one.code for one in found] == ([] if figure == kept else ["conversion"])
 
 
+def test_one_file_with_a_fault_of_each_kind_names_them_all(tmp_path: Path) -> None:
+    """What is wrong with one entry hides nothing of another, nor does a taken id."""
+    entries = {
+        "format": GOOD.replace("medium: air", "medium: vacuum"),
+        "siblings": GOOD.replace("mass: 900 g", "mass: 900 kg"),
+        "unsourced": GOOD.replace("    source: data sheet 2231 revision 4\n", ""),
+        "id": GOOD.replace("acme_lidar_one", "Acme9"),
+        "duplicate": GOOD.replace("acme_lidar_one", "livox_mid360"),
+        "successor": GOOD.replace("status: active", "status: discontinued"),
+        "conversion": GOOD + f"    figures: {{sigma_range: {{figure: 9 cm, kind: rms, {SHEET}}}\n",
+    }
+    text = "sensors:\n"
+    for number, (code, entry) in enumerate(entries.items()):
+        body = entry.removeprefix("sensors:\n").replace("Acme One", f"Acme {code}")
+        text += body.replace("acme_lidar_one", f"acme_lidar_{number}")
+    found = findings(tmp_path, text)
+    assert sorted(one.code for one in found if one.code != "unsourced") == sorted(
+        set(entries) - {"unsourced"}
+    )
+    assert {one.entry for one in found if one.code == "unsourced"} == {"acme_lidar_2"}
+    taken = GOOD.replace("acme_lidar_one", "livox_mid360").replace("mass: 900 g", "mass: 9 t")
+    assert {one.code for one in findings(tmp_path, taken)} == {"duplicate", "format"}
+    taken = GOOD.replace("acme_lidar_one", "livox_mid360").replace("mass: 900 g", "mass: 900 kg")
+    assert {one.code for one in findings(tmp_path, taken)} == {"duplicate", "siblings"}
+
+
 def test_without_a_line_for_all_every_figure_wants_a_source_of_its_own(tmp_path: Path) -> None:
     bare = GOOD.replace("    source: data sheet 2231 revision 4\n", "")
     printed = f"{{sigma_range: {{figure: 2 cm, kind: rms, {SHEET}}}"

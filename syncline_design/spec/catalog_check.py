@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 from typing import Any, Final, Literal
@@ -17,7 +17,7 @@ from typing import Any, Final, Literal
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.conversion import conversion_of, printed_value
 from syncline_design.model.quantity import UnitError, format_like
-from syncline_design.spec.catalog import SECTIONS, Entry, Product, SensorEntry
+from syncline_design.spec.catalog import SECTIONS, Catalog, Entry, Product, SensorEntry
 from syncline_design.spec.facts import (
     AXES,
     SIGMA_DIMENSIONS,
@@ -29,6 +29,7 @@ from syncline_design.spec.facts import (
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import Collection, add_builtin, add_file, published_ids
 from syncline_design.spec.references import unknown_requirements
+from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
 
 SCHEMA: Final = "syncline-design/catalog-check/v1"
@@ -106,9 +107,9 @@ def check_catalogs(paths: Sequence[Path] = ()) -> CatalogCheck:
     """Look over catalog files, each with what it names; without paths, the shipped ones."""
     collection = Collection()
     add_builtin(collection)
-    own = [add_file(collection, path).file for path in paths]
+    own = [add_file(collection, path) for path in paths]
     collection.draw_all()
-    every = list(_entries(collection))
+    every = list(_entries(collection, own))
     looked_at = [one for one in every if not own or not one.document.file.startswith("builtin:")]
     flaws = collection.problems + unknown_requirements(collection)
     findings = [_refused(flaw) for flaw in flaws]
@@ -119,15 +120,35 @@ def check_catalogs(paths: Sequence[Path] = ()) -> CatalogCheck:
         findings += _siblings(one, every)
     findings += _same_names(looked_at, every)
     found = sorted(set(findings), key=lambda f: (f.file, f.line, f.column, f.code, f.message))
-    files = tuple(dict.fromkeys([*own, *(one.document.file for one in looked_at)]))
+    read = (*own, *(one.document for one in looked_at))
+    files = tuple(dict.fromkeys(document.file for document in read))
     return CatalogCheck(SCHEMA, files, len(looked_at), tuple(found))
 
 
-def _entries(collection: Collection) -> Iterator[_Place]:
+def _entries(collection: Collection, own: Sequence[ParsedFile]) -> Iterator[_Place]:
+    """Every entry that can be read, by itself where something else in its file cannot.
+
+    An id that is taken already is looked at all the same.
+    """
     for (section, identity), (document, _) in collection.documents.items():
-        entry = collection.entries[section].get(identity)
+        entry = collection.entries[section].get(identity) or _alone(document, section, identity)
         if entry is not None:
             yield _Place(section, identity, entry, document)
+    for document in own:
+        for section in SECTIONS:
+            entries = document.data.get(section) if isinstance(document.data, dict) else None
+            for identity in entries if isinstance(entries, dict) else ():
+                if collection.documents[section, identity][0] is not document:
+                    entry = _alone(document, section, identity)
+                    if entry is not None:
+                        yield _Place(section, identity, entry, document)
+
+
+def _alone(document: ParsedFile, section: str, identity: str) -> Any:
+    """One entry of a document; None where it cannot be read, which loading has said."""
+    single = replace(document, data={section: {identity: document.data[section][identity]}})
+    model, _ = validate(Catalog, single)
+    return None if model is None else getattr(model, section)[identity]
 
 
 def _refused(flaw: Flaw) -> Finding:

@@ -1,0 +1,184 @@
+"""Whether a sensor can work where it would stand: its facts against those of the stage.
+
+Each rule compares two figures and says both.  What an entry does not tell rules nothing out; it is
+named, so that somebody looks it up.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.spec.catalog import SensorEntry
+from syncline_design.spec.facts import FULL_TURN, FieldOfView, Medium
+
+Code = Literal["reach", "medium", "look", "depth", "temperature", "discontinued"]
+_SLACK = 1e-12  # of sums and differences of angles
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What a stage asks of its sensors; None: it asks nothing of that kind.
+
+    nearest, farthest: distance to the object [m]; reflectivity: of the object, 0.8 for 80 %.
+    """
+
+    stage: str
+    nearest: float
+    farthest: float
+    medium: Medium | None = None
+    look: FieldOfView | None = None
+    depth: float | None = None
+    temperature: Quantity | None = None
+    reflectivity: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RuledOut:
+    """Why a sensor cannot work on a stage: what its entry says and what the stage asks."""
+
+    code: Code
+    reason: str
+    figure: str
+    limit: str
+
+
+@dataclass(frozen=True, slots=True)
+class NotTold:
+    """A fact that a rule needs and an entry does not give."""
+
+    entry: str
+    key: str
+    reason: str
+
+
+def ruled_out(
+    identity: str, sensor: SensorEntry, around: Surroundings, allow_discontinued: bool = False
+) -> Iterator[RuledOut]:
+    """Every reason why a sensor cannot work on a stage, the strongest first."""
+    if sensor.modality == "ranging":
+        yield from _medium(identity, sensor, around)
+        yield from _reach(identity, sensor, around)
+        yield from _look(identity, sensor, around)
+    yield from _depth(identity, sensor, around)
+    yield from _temperature(identity, sensor, around)
+    if not allow_discontinued:
+        yield from _lifecycle(identity, sensor)
+
+
+def not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[NotTold]:
+    """Facts that a rule of this stage needs and an entry does not give."""
+    if sensor.modality == "ranging":
+        if around.medium is not None and sensor.medium is None:
+            yield _unknown(identity, "medium", f"{around.stage} looks into {around.medium}")
+        far = None if sensor.reach is None else sensor.reach.farthest(around.reflectivity)
+        if far is None:
+            asked = f"{around.stage}.distance is {_length(around.farthest)}"
+            yield _unknown(identity, "reach", asked)
+        for axis, wanted in around.look or ():
+            seen = sensor.field_of_view
+            if wanted is not None and (seen is None or getattr(seen, axis) is None):
+                asked = f"{around.stage} looks {wanted.text} in {axis}"
+                yield _unknown(identity, f"field_of_view.{axis}", asked)
+    if around.depth and sensor.depth_rating is None:
+        yield _unknown(identity, "depth_rating", f"{around.stage} is at {_length(around.depth)}")
+    if around.temperature is not None and sensor.temperature is None:
+        yield _unknown(identity, "temperature", f"{around.stage} has {around.temperature.text}")
+
+
+def _unknown(identity: str, key: str, asked: str) -> NotTold:
+    return NotTold(identity, key, f"{identity} gives no {key}, {asked}: look this up first")
+
+
+def _medium(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+    """Sound goes through water, light and radio through air; who does both says so."""
+    if sensor.medium is None or around.medium is None:
+        return
+    if "both" not in (sensor.medium, around.medium) and sensor.medium != around.medium:
+        reason = (
+            f"{identity}: measures through {sensor.medium}, "
+            f"{around.stage} looks into {around.medium}"
+        )
+        yield RuledOut("medium", reason, f"medium: {sensor.medium}", f"medium: {around.medium}")
+
+
+def _reach(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+    """min <= distance <= max, at both ends of the distance."""
+    reach = sensor.reach
+    if reach is None:
+        return
+    far = reach.farthest(around.reflectivity)
+    if far is not None and around.farthest > far:
+        asked = f"{around.stage}.distance is {_length(around.farthest)}"
+        yield RuledOut(
+            "reach", f"{identity}: reaches {_length(far)}, {asked}",
+            f"reach: {_length(far)}", f"distance: {_length(around.farthest)}",
+        )  # fmt: skip
+    if reach.min is not None and around.nearest < reach.min:
+        asked = f"{around.stage}.distance is {_length(around.nearest)}"
+        yield RuledOut(
+            "reach", f"{identity}: measures from {_length(reach.min)} on, {asked}",
+            f"reach: from {_length(reach.min)}", f"distance: {_length(around.nearest)}",
+        )  # fmt: skip
+
+
+def _look(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+    """Where the stage has to look lies inside the field of view; azimuth goes round."""
+    if around.look is None or sensor.field_of_view is None:
+        return
+    for axis, wanted in around.look:
+        seen: Quantity | None = getattr(sensor.field_of_view, axis)
+        if wanted is None or seen is None or lies_within(wanted, seen, axis == "azimuth"):
+            continue
+        reason = f"{identity}: sees {seen.text} in {axis}, {around.stage} looks {wanted.text}"
+        yield RuledOut("look", reason, f"{axis}: {seen.text}", f"{axis}: {wanted.text}")
+
+
+def lies_within(inner: Quantity, outer: Quantity, goes_round: bool) -> bool:
+    """Whether one interval of angles [rad] is part of another, modulo a turn if it goes round."""
+    if goes_round and outer.high - outer.low >= FULL_TURN * (1.0 - _SLACK):
+        return True
+    turns = math.ceil((outer.low - inner.low) / FULL_TURN - _SLACK) if goes_round else 0
+    low, high = inner.low + turns * FULL_TURN, inner.high + turns * FULL_TURN
+    return low >= outer.low - _SLACK and high <= outer.high + _SLACK
+
+
+def _depth(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+    """The housing stands the depth of the stage."""
+    rating = sensor.depth_rating
+    if around.depth and rating is not None and rating < around.depth:
+        reason = (
+            f"{identity}: goes down to {_length(rating)}, {around.stage} is at "
+            f"{_length(around.depth)}"
+        )
+        figure, limit = f"depth_rating: {_length(rating)}", f"depth: {_length(around.depth)}"
+        yield RuledOut("depth", reason, figure, limit)
+
+
+def _temperature(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+    """All temperatures of the stage lie within those that the sensor works at."""
+    asked, works = around.temperature, sensor.temperature
+    if asked is None or works is None:
+        return
+    if asked.low < works.low or asked.high > works.high:
+        reason = f"{identity}: works at {works.text}, {around.stage} has {asked.text}"
+        figure, limit = f"temperature: {works.text}", f"temperature: {asked.text}"
+        yield RuledOut("temperature", reason, figure, limit)
+
+
+def _lifecycle(identity: str, sensor: SensorEntry) -> Iterator[RuledOut]:
+    """Only what can be had today, unless the spec allows more."""
+    lifecycle = sensor.lifecycle
+    if lifecycle is None or lifecycle.status == "active":
+        return
+    follower = f", {lifecycle.successor} follows it" if lifecycle.successor else ""
+    reason = f"{identity}: {lifecycle.status}, read {lifecycle.read}{follower}"
+    figure = f"lifecycle: {lifecycle.status}"
+    yield RuledOut("discontinued", reason, figure, "allow_discontinued: no")
+
+
+def _length(value: float) -> str:
+    return str(getattr(value, "text", "") or format_quantity(value, Dimension.LENGTH))
