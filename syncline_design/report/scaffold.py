@@ -36,7 +36,7 @@ stages:
       candidates: [ublox_f9p_pvt, ublox_f9p_rtk]      # open: the cheapest that works is chosen
       lever_arm: [0.30 m, 0 m, -0.20 m]               # forward, right, down
     attitude:
-      candidates: {{modality: attitude}}                # a query: every attitude sensor
+      candidates: {{modality: attitude, type: ins}}     # a query: every INS of the catalog
     ranging:
       candidates: [velodyne_hdl32e, riegl_vux1uav]
       lever_arm: [0.05 m, 0 m, 0.12 m]
