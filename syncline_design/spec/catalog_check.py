@@ -49,7 +49,7 @@ _COMPARED: Final = (*SIGMA_DIMENSIONS, "reach", "rate", "cost", "mass", "power")
 
 
 @dataclass(frozen=True, slots=True)
-class Finding(Record):
+class CatalogFinding(Record):
     """One thing to mend, or to say: where, what, what to do."""
 
     code: Code
@@ -77,7 +77,7 @@ class CatalogCheck(Record):
     schema: str
     files: tuple[str, ...]
     entries: int
-    findings: tuple[Finding, ...]
+    findings: tuple[CatalogFinding, ...]
 
     @property
     def exit_code(self) -> int:
@@ -94,10 +94,10 @@ class _Place:
     entry: Any
     document: ParsedFile
 
-    def finding(self, code: Code, key: str, message: str, hint: str) -> Finding:
+    def finding(self, code: Code, key: str, message: str, hint: str) -> CatalogFinding:
         path: KeyPath = (self.section, self.id, *([key] if key else []))
         line, column = self.document.key_positions.get(path, self.document.position(path))
-        return Finding(
+        return CatalogFinding(
             code, self.document.file, line, column, message, hint, self.section, self.id,
             key or None,
         )  # fmt: skip
@@ -151,32 +151,32 @@ def _alone(document: ParsedFile, section: str, identity: str) -> Any:
     return None if model is None else getattr(model, section)[identity]
 
 
-def _refused(flaw: Flaw) -> Finding:
+def _refused(flaw: Flaw) -> CatalogFinding:
     code: Code = "duplicate" if flaw.message.startswith("this id is taken") else "format"
     parts = [f"expected {flaw.expected}" if flaw.expected else ""]
     parts += [f"found {flaw.found}" if flaw.found else "", flaw.hint]
     message = f"{flaw.path}: {flaw.message}" if flaw.path else flaw.message
     hint = "; ".join(part for part in parts if part)
-    return Finding(code, flaw.file, flaw.line, flaw.column, message, hint)
+    return CatalogFinding(code, flaw.file, flaw.line, flaw.column, message, hint)
 
 
-def _withdrawn(collection: Collection) -> Iterator[Finding]:
+def _withdrawn(collection: Collection) -> Iterator[CatalogFinding]:
     """Ids that a release had and the shipped catalogs have no more: specs out there name them."""
     for number, line in enumerate(published_ids().read_text("utf-8").splitlines(), 1):
         section, _, identity = line.partition(" ")
         if identity and (section, identity) not in collection.origins:
             message = f"{identity} of {section} was published and is gone"
             hint = "bring it back; what is no longer made is discontinued, not deleted"
-            yield Finding("published", "builtin:ids.txt", number, 1, message, hint)
+            yield CatalogFinding("published", "builtin:ids.txt", number, 1, message, hint)
 
 
-def _ids(one: _Place) -> Iterator[Finding]:
+def _ids(one: _Place) -> Iterator[CatalogFinding]:
     """An id is for years: specs name it, so it holds no capitals, blanks or signs."""
     if not _ID.fullmatch(one.id):
         yield one.finding("id", "", "an id that will not last", "lower case: maker_model_variant")
 
 
-def _sources(one: _Place) -> Iterator[Finding]:
+def _sources(one: _Place) -> Iterator[CatalogFinding]:
     """Figures that neither a source nor a basis accounts for."""
     entry: Entry = one.entry
     if entry.source:
@@ -204,7 +204,7 @@ def _has_basis(entry: Entry, key: str) -> bool:
     return bool(parts) and any(entry.basis_of(f"{key}.{part}") for part in parts)
 
 
-def _conversions(one: _Place) -> Iterator[Finding]:
+def _conversions(one: _Place) -> Iterator[CatalogFinding]:
     """Sigmas that are not what the printed figure and its kind give."""
     for key, printed in one.entry.figures.items():
         name, part = split_figure(key)
@@ -247,7 +247,7 @@ def _axis_figures(value: Any, name: str, part: str) -> tuple[Any, ...]:
     return tuple(axes[axis] for axis in AXES[name][part])
 
 
-def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[Finding]:
+def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[CatalogFinding]:
     """Who comes after a product that is no longer made, as far as that is known."""
     lifecycle: Lifecycle | None = getattr(one.entry, "lifecycle", None)
     if lifecycle is None:
@@ -261,7 +261,7 @@ def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[Finding]:
         yield one.finding("successor", "lifecycle", f"no such successor: {follower}", hint)
 
 
-def _siblings(one: _Place, every: Sequence[_Place]) -> Iterator[Finding]:
+def _siblings(one: _Place, every: Sequence[_Place]) -> Iterator[CatalogFinding]:
     """Figures more than a factor of 5 off the median of the same kind of sensor."""
     entry = one.entry
     if not isinstance(entry, SensorEntry) or not entry.type:
@@ -300,7 +300,7 @@ def _size(entry: Product, key: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _same_names(looked_at: Sequence[_Place], every: Sequence[_Place]) -> Iterator[Finding]:
+def _same_names(looked_at: Sequence[_Place], every: Sequence[_Place]) -> Iterator[CatalogFinding]:
     """Two entries of a section by one name: a reader of a report cannot tell them apart."""
     first: dict[tuple[str, str], _Place] = {}
     asked = {(one.section, one.id) for one in looked_at}
