@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.report.catalog_stub import STUB_TYPES, put_in, stub
-from syncline_design.report.catalogs import CatalogEntry, CatalogList
+from syncline_design.report.catalogs import CatalogList, WholeEntry
 from syncline_design.report.json_out import json_text
 from syncline_design.report.result_schemas import ResultName, result_schema
 from syncline_design.spec import catalog_check, files
@@ -267,8 +267,8 @@ def test_show_tells_figure_kind_conversion_and_source() -> None:
     [
         ("catalog-list", CatalogList, ("list",)),
         ("catalog-list", CatalogList, ("list", "sensors", "--reach", "50 m")),
-        ("catalog-entry", CatalogEntry, ("show", "exail_gaps_m5")),
-        ("catalog-entry", CatalogEntry, ("show", "ocxo")),
+        ("catalog-entry", WholeEntry, ("show", "exail_gaps_m5")),
+        ("catalog-entry", WholeEntry, ("show", "ocxo")),
         ("catalog-check", CatalogCheck, ("check",)),
     ],
 )

@@ -20,7 +20,7 @@ from syncline_design.model.roles import ROLES
 from syncline_design.report.formats import CATALOG_FORMATS, FileName, ResultName
 
 if TYPE_CHECKING:
-    from syncline_design.report.catalogs import Wanted
+    from syncline_design.report.catalogs import Narrowing
 
 
 CatalogOutput = Annotated[list[str] | None, output_option(CATALOG_FORMATS)]
@@ -75,10 +75,10 @@ def _wanted(
     reach: str | None,
     medium: str | None,
     max_cost: str | None,
-) -> Wanted:
+) -> Narrowing:
     """What a list is narrowed to; a word or a figure that cannot be meant is refused."""
     from syncline_design.model.quantity import Dimension, UnitError, parse_quantity
-    from syncline_design.report.catalogs import Wanted
+    from syncline_design.report.catalogs import Narrowing
 
     for option, word, known in (
         ("--modality", modality, ROLES),
@@ -93,7 +93,7 @@ def _wanted(
         )
     except UnitError as error:
         refuse(f"syncline-design: catalog list: {error}")
-    return Wanted(modality, kind, far, medium, most)
+    return Narrowing(modality, kind, far, medium, most)
 
 
 @guarded

@@ -35,7 +35,7 @@ _NOT_IN_A_LINE = frozenset(
 
 
 @dataclass(frozen=True, slots=True)
-class Wanted:
+class Narrowing:
     """What a list is narrowed to; reach in m, cost with its currency."""
 
     modality: str | None = None
@@ -148,7 +148,7 @@ class ShownFigure(Record):
 
 
 @dataclass(frozen=True, slots=True)
-class CatalogEntry(Record):
+class WholeEntry(Record):
     """One entry of a catalog, whole."""
 
     schema: str
@@ -165,10 +165,10 @@ Origins = Mapping[tuple[str, str], str]
 
 
 def listed(
-    catalog: Catalog, origins: Origins, section: str | None, wanted: Wanted | None = None
+    catalog: Catalog, origins: Origins, section: str | None, wanted: Narrowing | None = None
 ) -> CatalogList:
     """The entries of a catalog, of one section or of all, that fit."""
-    asked = wanted or Wanted()
+    asked = wanted or Narrowing()
     entries: list[ListedEntry] = []
     undecided: list[Undecided] = []
     for name in SECTIONS if section is None else (section,):
@@ -233,14 +233,14 @@ def shown(value: Any) -> str:
     return visible(figure_text(value))
 
 
-def entry_data(catalog: Catalog, origins: Origins, identity: str) -> CatalogEntry | None:
+def entry_data(catalog: Catalog, origins: Origins, identity: str) -> WholeEntry | None:
     """Every figure of an entry with what its sources print; None: no such entry."""
     for section in SECTIONS:
         entry: Entry | None = getattr(catalog, section).get(identity)
         if entry is not None:
             origin = origins.get((section, identity), "")
             figures = tuple(_shown_figure(entry, key, value) for key, value in _figures(entry))
-            return CatalogEntry(
+            return WholeEntry(
                 ENTRY_SCHEMA, section, identity, entry.name, origin, figures, entry.source,
                 entry.note,
             )  # fmt: skip
@@ -285,7 +285,7 @@ def _printed(name: str, one: PrintedFigure) -> Printed:
     )
 
 
-def entry_text(entry: CatalogEntry) -> str:
+def entry_text(entry: WholeEntry) -> str:
     """An entry for people: its figures, marked where they are assumed, then what was read."""
     rows = [[one.key, visible(one.value), one.basis or ""] for one in entry.figures]
     lines = [f"{entry.id} ({entry.section}): {visible(entry.name)}", *aligned(rows)]

@@ -21,7 +21,7 @@ from syncline_design.verdict import tree as verdict
 
 _RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "catalog-check": (catalog_check.CatalogCheck, catalog_check.SCHEMA),
-    "catalog-entry": (catalogs.CatalogEntry, catalogs.ENTRY_SCHEMA),
+    "catalog-entry": (catalogs.WholeEntry, catalogs.ENTRY_SCHEMA),
     "catalog-list": (catalogs.CatalogList, catalogs.LIST_SCHEMA),
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
