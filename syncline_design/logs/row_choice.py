@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import TIME
 from syncline_design.logs.refusals import refuse
+from syncline_design.logs.runs import pieces_of
 
 MOST_KEPT = 500_000  # rows of one file that are held in memory
 WINDOWS = 40
@@ -28,7 +29,8 @@ class Arranged:
     """Rows of one file by rising stamp.
 
     order (m,): rows of the file; stamps (m,) [s]; rows: of the file; rejected: left out, by
-    reason; thinned: left out because the log is too long.
+    reason; thinned: left out because the log is too long; pieces (m,): of rising stamps, of a file
+    that was put in order and has few.
     """
 
     path: Path
@@ -38,11 +40,15 @@ class Arranged:
     rejected: dict[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     thinned: int = 0
+    pieces: Index | None = None
 
     def part(self, keep: NDArray[np.bool_]) -> Arranged:
         """Some of the rows; the others count as thinned."""
         left = int(keep.shape[0] - np.count_nonzero(keep))
-        return replace(self, order=self.order[keep], stamps=self.stamps[keep], thinned=left)
+        pieces = None if self.pieces is None else self.pieces[keep]
+        return replace(
+            self, order=self.order[keep], stamps=self.stamps[keep], thinned=left, pieces=pieces
+        )
 
 
 def arranged(path: Path, stamps: Array) -> Arranged:
@@ -59,16 +65,19 @@ def arranged(path: Path, stamps: Array) -> Arranged:
     _demand_sense(path, finite)
     stray = _strays(finite)
     notes: tuple[str, ...] = ()
+    pieces: Index | None = None
     count = int(np.count_nonzero(stray))
     if 0 < count <= max(1.0, STRAY * finite.shape[0]):
         rejected["stamp out of order"] = count
         order, finite = order[~stray], finite[~stray]
     elif count:
         notes = (f"{path.name}: rows are not in order of their stamps and were put in order",)
+        pieces = pieces_of(finite)
     if count:
         rising = np.argsort(finite, kind="stable")
         order, finite = order[rising], finite[rising]
-    return Arranged(path, order, finite, int(stamps.shape[0]), rejected, notes)
+        pieces = None if pieces is None else pieces[rising]
+    return Arranged(path, order, finite, int(stamps.shape[0]), rejected, notes, pieces=pieces)
 
 
 def _demand_sense(path: Path, finite: Array) -> None:

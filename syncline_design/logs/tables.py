@@ -22,6 +22,7 @@ from syncline_design.logs.columns import (
 )
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_choice import Arranged, arranged, thinned
+from syncline_design.logs.runs import demand_one_run
 from syncline_design.logs.sources import NANOSECONDS, Clock, RowSource, opened
 from syncline_design.model.quantity import si_name
 from syncline_design.spec.fields import did_you_mean
@@ -185,6 +186,8 @@ def _table(file: _Open, rows: Arranged) -> LogTable:
     if TARGET_ID in file.found:
         columns[TARGET_ID] = file.source.labels(file.found[TARGET_ID][0], keep)[place]
     columns[TIME] = rows.stamps
+    if rows.pieces is not None:
+        demand_one_run(file.source.path, columns, rows.order, rows.pieces)
     rejected, notes, count = dict(rows.rejected), [*file.notes, *rows.notes], rows.rows
     if file.source.cut:
         rejected["cut off in the last row"] = 1
