@@ -22,6 +22,7 @@ from syncline_design.diagnosis.checks import Check, log_checks
 from syncline_design.diagnosis.covariance import inverse_3x3
 from syncline_design.diagnosis.gap import closed_share
 from syncline_design.diagnosis.result import Fit, Gap, HeldOut
+from syncline_design.diagnosis.scatter import scatter
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.report.diagnoses import render_diagnose
@@ -142,6 +143,51 @@ def test_columns_that_come_late_are_said(
     said = check.message.split("they come about ")[1]
     figure, unit = said.split()[:2]
     assert float(figure) * {"ms": 1e-3, "s": 1.0}[unit] == pytest.approx(by_s, abs=0.051)
+
+
+def noisy(stem: str, sigma: float) -> Change:
+    def change(columns: dict[str, Array]) -> None:
+        rng = np.random.default_rng(1)
+        for name in [n for n in columns if n.startswith(stem)]:
+            columns[name] = columns[name] + sigma * rng.standard_normal(columns[name].shape)
+
+    return change
+
+
+@pytest.mark.parametrize(("times_place", "severity"), [(0.2, None), (0.75, "caution"),
+                                                       (2.0, "contradiction")])  # fmt: skip
+@pytest.mark.parametrize("platform", ["multirotor_lines", "car_stops"])
+def test_velocities_that_scatter_are_said(
+    platform: str, times_place: float, severity: str | None, tmp_path: Path
+) -> None:
+    """In 0.1 s by so many times the places' noise; found to 15 % of what was added."""
+    log = run_of(platform, DELAY)
+    sensors = log.run.carriers[0].sensors
+    assert sensors.position_m is not None
+    added = 10.0 * times_place * float(np.sqrt(np.mean(np.square(sensors.position_m))))
+    found = checked(written(log, tmp_path, noisy("velocity_", added)))
+    seen = [c for c in found if c.code == "velocity_columns"]
+    assert [c.severity for c in seen] == ([] if severity is None else [severity])
+    for check in seen:
+        assert "scatter" in check.message
+        assert check.value == pytest.approx(added, rel=0.15)
+
+
+@pytest.mark.parametrize("rate_hz", [0.4, 0.7, 1.0, 2.0, 10.0])
+def test_motion_that_the_rows_miss_is_not_called_noise(rate_hz: float, tmp_path: Path) -> None:
+    """A vessel in waves, sampled ever more coarsely."""
+    log = make_log(scenario("vessel_figure_eights", 4, 300.0, rate_hz))
+    assert not [c for c in checked(written(log, tmp_path)) if c.code == "velocity_columns"]
+
+
+def test_scatter_beside_a_swing() -> None:
+    """Stamps up to a tenth off, a roll of 4 s, noise of 0.2 m/s: found within 10 %."""
+    rng = np.random.default_rng(2)
+    t = np.arange(800) * 0.1 + rng.uniform(-0.01, 0.01, 800)
+    swing = np.stack([np.sin(1.57 * t), np.cos(1.57 * t + 1.0), 0.4 * np.sin(1.8 * t)], axis=1)
+    assert scatter(t, 0.8 * swing) < 0.02
+    found = scatter(t, 0.8 * swing + 0.2 * rng.standard_normal((800, 3)))
+    assert found == pytest.approx(0.2, rel=0.1)
 
 
 COLUMNS = (

@@ -13,10 +13,11 @@ import numpy as np
 
 from syncline_design.diagnosis.agreement import WORDS, disagreement, windows_of
 from syncline_design.diagnosis.result import Check, Severity
+from syncline_design.diagnosis.scatter import scatter, unforetold
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
-from syncline_design.logs.log import StageLog
+from syncline_design.logs.log import LogTrack, StageLog
 from syncline_design.model.quantity import format_estimate
 from syncline_design.model.system import Stage
 
@@ -27,6 +28,7 @@ MEAN_S = {"speed": 2.0, "turn_rate": 1.0}  # motion is averaged over this long
 NOISE = 2.0 * np.sqrt(2.0)  # standard deviations of the difference of two readings
 TOLERANCE = {"velocity": 0.05, "rate": 0.08}
 LATE_S = (0.03, -0.03, 0.06, -0.06, 0.12, -0.12, 0.24, -0.24)  # attitudes, that places may rest on
+USUAL_DELAY_S = 0.1  # by which the noise of velocities is judged
 NAMES = {"speed": ("speed", "v_max"), "turn_rate": ("turn rate", "omega_max"),
          "range": ("range", "distance")}  # fmt: skip
 
@@ -110,6 +112,29 @@ def _columns(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterato
             subject, own = WORDS[code]
             message = f"{subject} of {stage.name} contradict {own}: {found.words}"
             yield Check(code, stage.name, "contradiction", message, found.factor, 1.0, "", 1.0)
+    if moved is None and not logged.follows_position:
+        yield from _scattering(view, index, stage, logged)
+
+
+def _scattering(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterator[Check]:
+    """Velocities so noisy that a delay is no longer told from an arm, which is free of noise."""
+    place_m = _place_sigma_m(view, index)
+    if index == 0 and stage.position is not None:
+        place_m = float(np.sqrt(np.mean(np.square(stage.position.sigma))))
+    track = logged.velocity_track or LogTrack(view.log.time_s, logged.velocity_mps)
+    found = scatter(track.time_s, track.value)
+    harm = found * USUAL_DELAY_S / max(place_m, 1e-300)
+    if harm < 0.5 or unforetold(view.log.time_s, view.rows[index].position_m) > 2.0 * place_m:
+        return
+    severity: Severity = "contradiction" if harm > 1.0 else "caution"
+    message = (
+        f"velocity columns of {stage.name} scatter by {format_estimate(found, None, 'm/s')} from "
+        f"row to row: with a delay of {format_estimate(USUAL_DELAY_S, None, 's')} that is "
+        f"{format_estimate(found * USUAL_DELAY_S, None, 'm')}, the places' own noise "
+        f"{format_estimate(place_m, None, 'm')}; delays and lever arms may be taken for each other"
+    )
+    yield Check("velocity_columns", stage.name, severity, message, found, place_m / USUAL_DELAY_S,
+                "m/s", 1.0)  # fmt: skip
 
 
 def _place_sigma_m(view: Scene, index: int) -> float:
