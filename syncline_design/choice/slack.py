@@ -12,12 +12,17 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
+import numpy as np
+
 from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate, pair_bound
+from syncline_design.choice.narrowed import kept
+from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime, Unfinished
 from syncline_design.choice.problem import build_problem
+from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import NOTHING, Design, Problem
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
@@ -35,6 +40,7 @@ from syncline_design.choice.what_if import (
     with_method_tau,
     with_sensor_error,
 )
+from syncline_design.machine.deadline import in_force
 from syncline_design.machine.records import Record
 from syncline_design.spec.case import Case
 
@@ -245,7 +251,10 @@ def _with_payload(
 
     def same(at: float) -> bool:
         other = changed(at)
-        found = _chosen(other, same_design(problem, design, other), asked.beside)
+        own = same_design(problem, design, other)
+        if other.judge is not None and own is not None and not _stands(other, own):
+            return False  # without simulating every other design
+        found = _chosen(other, own, asked.beside)
         return found is not None and payload(other, found) == now
 
     values = _tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
@@ -288,6 +297,21 @@ def _chosen(problem: Problem, at_hand: Design | None, beside: Beside) -> Design 
         return best_from(problem, at_hand, beside)
     found = choose(problem, "front")
     return found.design if isinstance(found, Choice) else None
+
+
+def _stands(problem: Problem, design: Design) -> bool:
+    """Whether a design, or one of its payload, meets every requirement, simulated ones included."""
+
+    def its_own(r: int, options: Options) -> Bools:
+        place = design.options[r]
+        same = options.sensor == options.sensor[place]
+        return np.asarray(same & (options.method == options.method[place]))
+
+    alone = kept(problem, its_own, lambda _, clock: True).problem
+    try:
+        return any(not judgement(alone, one).failed for one in iter_best(alone, in_force()))
+    except Unfinished:  # the choice itself says what to make of that
+        return True
 
 
 def _is_sole(problem: Problem) -> bool:

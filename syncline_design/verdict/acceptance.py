@@ -76,23 +76,38 @@ class Simulations:
     known: dict[tuple[System, SimulationSettings, float, float], Decision] = field(
         default_factory=dict
     )
+    guessed: dict[tuple[System, SimulationSettings, float, float], Decision] = field(
+        default_factory=dict
+    )
     systems: set[System] = field(default_factory=set)
     refusals: int = 0  # of systems beyond the most
     asked: Case | None = None  # the spec itself; every other one is a what-if
 
-    def decide(self, case: Case, system: System, quantile: float, limit_m: float) -> Decision:
-        """Whether a system's quantile keeps a limit; Unfinished once too many were simulated."""
+    def decide(
+        self, case: Case, system: System, quantile: float, limit_m: float, *, what_if: bool
+    ) -> Decision:
+        """Whether a system's quantile keeps a limit; Unfinished once too many were simulated.
+
+        what_if: the system or the limit is not one of the spec itself; what is close stays open.
+        """
         settings = replace(simulation_settings(case, self.seed), limit_m=None)
         nameless = _nameless(system)
         key = (nameless, settings, quantile, limit_m)
-        if key not in self.known:
-            self.systems.add(nameless)
-            if len(self.systems) > self.most:
-                self.refusals += 1
-                raise Unfinished(f"the search stopped after {self.most} simulated designs")
-            cap = DEFAULT_CAP if case is self.asked else WHAT_IF_CAP
-            self.known[key] = decide(nameless, settings, quantile, limit_m, cap)
-        return self.known[key]
+        if key in self.known:
+            return self.known[key]
+        kept = self.guessed if what_if else self.known
+        if key not in kept:
+            self._count(nameless)
+            cap = WHAT_IF_CAP if what_if or case is not self.asked else DEFAULT_CAP
+            kept[key] = decide(*key, cap)
+        return kept[key]
+
+    def _count(self, nameless: System) -> None:
+        """Unfinished once too many different systems were simulated."""
+        self.systems.add(nameless)
+        if len(self.systems) > self.most:
+            self.refusals += 1
+            raise Unfinished(f"the search stopped after {self.most} simulated designs")
 
     def problem_of(self, case: Case) -> Problem:
         """The design problem of a spec, its simulated requirements included."""
@@ -148,7 +163,8 @@ class _SpecJudge:
         table = problem.roles[role]
         bare = _noise_alone(system_of(self.case, problem, design), table.stage, table.role)
         return any(
-            self._status(bare, name, HOPELESS * limit) == "fail" for name, limit in self.limits
+            self._status(bare, name, HOPELESS * limit, what_if=True) == "fail"
+            for name, limit in self.limits
         )
 
     def _noise_is_changed(self) -> bool:
@@ -161,17 +177,21 @@ class _SpecJudge:
     def judge(self, problem: Problem, design: Design) -> Judgement:
         """Every limit in turn; the first that fails settles it."""
         left_open: list[str] = []
-        system = self._system(problem, design)
+        system, grown = self._system(problem, design)
+        what_if = grown or self.case is not self.simulations.asked
         for name, limit in self.limits:
-            status = self._status(system, name, limit)
+            status = self._status(system, name, limit, what_if=what_if)
             if status == "fail":
                 return Judgement(failed=(name,))
             left_open += [name] if status == "indeterminate" else []
         return Judgement(undecided=tuple(left_open))
 
-    def _system(self, problem: Problem, design: Design) -> System:
-        """The design's system; an option whose error or tau was grown has its sensor's grown."""
-        system = system_of(self.case, problem, design)
+    def _system(self, problem: Problem, design: Design) -> tuple[System, bool]:
+        """The design's system, and whether it is not the spec's own.
+
+        An option whose error or tau was grown has its sensor's grown.
+        """
+        system, grown = system_of(self.case, problem, design), False
         for table, whole, place in zip(
             problem.roles, self.asked.roles, design.options, strict=True
         ):
@@ -180,25 +200,31 @@ class _SpecJudge:
             noise = option.error() / error if error else Fraction(1)
             shift = option.tau() / tau if tau else Fraction(1)
             if noise != 1 or shift != 1:
+                grown = True
                 system = _grown(system, table.stage, table.role, float(noise), float(shift))
-        return system
+        return system, grown
 
-    def _status(self, system: System, name: str, limit_m: float) -> str:
+    def _status(self, system: System, name: str, limit_m: float, *, what_if: bool) -> str:
         try:
-            return self._decision(system, name, limit_m).status
+            return self._decision(system, name, limit_m, what_if=what_if).status
         except SimulationError as error:
             if self.case.spec.monte_carlo.trajectory is not None:
                 refuse_trajectory(self.case, str(error))
             return "indeterminate"
 
-    def _decision(self, system: System, name: str, limit_m: float) -> Decision:
-        quantile = next(float(r.quantile or 0.0) for r in self.requirements if r.id == name)
-        return self.simulations.decide(self.case, system, quantile, limit_m)
+    def _decision(
+        self, system: System, name: str, limit_m: float, *, what_if: bool = False
+    ) -> Decision:
+        own = next(r for r in self.requirements if r.id == name)
+        moved = what_if or limit_m != float(own.limit)
+        quantile = float(own.quantile or 0.0)
+        return self.simulations.decide(self.case, system, quantile, limit_m, what_if=moved)
 
     def reached_m(self, problem: Problem, design: Design, requirement: str) -> float:
         """Upper end of the interval of the quantile that the requirement limits [m]."""
         limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
-        return self._decision(self._system(problem, design), requirement, limit).estimate.high_m
+        system, _ = self._system(problem, design)
+        return self._decision(system, requirement, limit).estimate.high_m
 
     def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
         """The same at other limits."""
