@@ -149,9 +149,10 @@ def test_a_sensor_of_type_gnss(keys: Stage, has: bool, tmp_path: Path) -> None:
 
 RECEIVERS = ["gnss", " GNSS ", "gnss_rtk", "rtk gnss", "GNSS/INS", "gnss-compass", "GPS", "dgps",
              "Galileo", "rtk", "ppp", "QZSS", "navic", "psrtk", "network RTK", "PPK", "satnav",
-             "satellite_compass", "Global Positioning System", "egnos", "satellite"]  # fmt: skip
+             "satellite_compass", "Global Positioning System", "egnos", "satellite", "NAVSTAR",
+             "vrs", "NTRIP rover", "MSAS", "gagan", "OmniSTAR"]  # fmt: skip
 OTHERS = ["", "ins", "usbl", "total_station", "total station", "pingpong", "artkit", "lbl",
-          "local positioning", "pppp", "uwb"]  # fmt: skip
+          "local positioning", "pppp", "uwb", "starlink", "star tracker", "vrsx"]  # fmt: skip
 
 
 @pytest.mark.parametrize("kind", [*RECEIVERS, *OTHERS])

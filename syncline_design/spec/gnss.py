@@ -20,8 +20,10 @@ from syncline_design.spec.spec import Spec
 
 GENERIC = ("gnss", "gps", "satnav")  # inside a word too: dgps, GnssCompass
 ENDINGS = ("rtk", "ppk")  # nrtk, psrtk
-SYSTEMS = {"glonass", "galileo", "beidou", "bds", "qzss", "navic", "irnss"}
-NAMES = SYSTEMS | {"ppp", "sbas", "egnos", "waas", "satellite", "global positioning"}
+SYSTEMS = {"navstar", "glonass", "galileo", "beidou", "bds", "qzss", "navic", "irnss"}
+AUGMENTATIONS = {"sbas", "egnos", "waas", "msas", "gagan", "sdcm", "kass"}
+CORRECTIONS = {"ppp", "vrs", "ntrip", "omnistar", "terrastar"}
+NAMES = SYSTEMS | AUGMENTATIONS | CORRECTIONS | {"satellite", "global positioning"}
 Code = Literal["gnss"]
 
 

@@ -17,8 +17,9 @@ from syncline_design.spec.selection import Selection
 
 # Types of sensors that receive GNSS: parts of words, ends of words, the rest as whole words.
 RECEIVER = re.compile(
-    r"gnss|gps|satnav|(?:rtk|ppk)(?![a-z0-9])|(?<![a-z0-9])(?:glonass|galileo|beidou|bds|qzss|navic|irnss"
-    r"|ppp|sbas|egnos|waas|satellite|global[^a-z0-9]+positioning)(?![a-z0-9])"
+    r"gnss|gps|satnav|(?:rtk|ppk)(?![a-z0-9])"
+    r"|(?<![a-z0-9])(?:navstar|glonass|galileo|beidou|bds|qzss|navic|irnss|sbas|egnos|waas|msas|gagan"
+    r"|sdcm|kass|ppp|vrs|ntrip|omnistar|terrastar|satellite|global[^a-z0-9]+positioning)(?![a-z0-9])"
 )
 
 
