@@ -289,11 +289,12 @@ def test_importing_the_report_package_loads_nothing_heavy() -> None:
     """Renderers know no result; the words of a verdict know its types, and these know arrays."""
     code = (
         "import sys\n"
-        "import syncline_design.report.checks, syncline_design.report.write\n"
+        "import syncline_design.report.formats, syncline_design.report.write\n"
         "import syncline_design.report.render_html, syncline_design.report.render_console\n"
+        "import syncline_design.report.render_markdown\n"
         "heavy = {'jinja2', 'matplotlib', 'numpy', 'scipy', 'cvxpy', 'polars'}\n"
         "print(sorted(heavy & set(sys.modules)))\n"
-        "import syncline_design.report.on_verdict\n"
+        "import syncline_design.report.checks\n"
         "print(sorted((heavy - {'numpy'}) & set(sys.modules)))\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from syncline_design.report.csv_out import render_csv
 from syncline_design.report.formats import CHECK_FORMATS as CHECK_FORMATS
+from syncline_design.report.github import render_github
+from syncline_design.report.json_out import verdicts_json
+from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.on_verdicts import on_verdicts
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
 
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import Checked
@@ -13,41 +20,25 @@ if TYPE_CHECKING:
 
 def render_checks(name: str, verdicts: Sequence[Checked]) -> str:
     """The text of one format for these verdicts; files that were refused may stand among them."""
-    return _renderer(name)(verdicts)
-
-
-def _renderer(name: str) -> Callable[[Sequence[Checked]], str]:
-    """Each format's module loads only when it is asked for."""
     match name:
         case "json":
-            from syncline_design.report.json_out import verdicts_json as render
+            return verdicts_json(verdicts)
         case "html":
-            return _page
+            return html(on_verdicts(verdicts))
         case "junit":
-            from syncline_design.report.junit import render_junit as render
+            # with the XML library, which takes longer to load than all else here
+            from syncline_design.report.junit import render_junit
+
+            return render_junit(verdicts)
         case "sarif":
-            from syncline_design.report.sarif import render_sarif as render
+            from syncline_design.report.sarif import render_sarif  # with its hashes
+
+            return render_sarif(verdicts)
         case "github":
-            from syncline_design.report.github import render_github as render
+            return render_github(verdicts)
         case "markdown":
-            return _markdown
+            return "\n".join(markdown(on_verdict(verdict)) for verdict in verdicts)
         case "csv":
-            from syncline_design.report.csv_out import render_csv as render
+            return render_csv(verdicts)
         case _:
             raise ValueError(f"unknown format {name}")
-    return render
-
-
-def _page(verdicts: Sequence[Checked]) -> str:
-    from syncline_design.report.on_verdicts import on_verdicts
-    from syncline_design.report.render_html import html
-
-    return html(on_verdicts(verdicts))
-
-
-def _markdown(verdicts: Sequence[Checked]) -> str:
-    """Every verdict in full, one after the other."""
-    from syncline_design.report.on_verdict import on_verdict
-    from syncline_design.report.render_markdown import markdown
-
-    return "\n".join(markdown(on_verdict(verdict)) for verdict in verdicts)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from syncline_design.verdict.tree import Checked
+from syncline_design.verdict.tree import SEVERAL_SCHEMA, Checked, Verdicts
 
 
 def json_text(data: Any) -> str:
@@ -28,7 +27,5 @@ def _finite(value: Any) -> Any:
 
 def verdicts_json(verdicts: Sequence[Checked]) -> str:
     """One verdict as it is; several under `verdicts`."""
-    from syncline_design.verdict.tree import SEVERAL_SCHEMA, Verdicts
-
     found = verdicts[0] if len(verdicts) == 1 else Verdicts(SEVERAL_SCHEMA, tuple(verdicts))
     return json_text(found.to_json())

@@ -16,6 +16,9 @@ from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Document, Items, Node, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
+from syncline_design.report.json_out import json_text
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import kind_words, status_word
@@ -26,16 +29,10 @@ def render_diff(name: str, data: Difference) -> str:
     """The text of one format."""
     match name:
         case "json":
-            from syncline_design.report.json_out import json_text
-
             return json_text(data.to_json())
         case "html":
-            from syncline_design.report.render_html import html
-
             return html(on_difference(data))
         case "markdown":
-            from syncline_design.report.render_markdown import markdown
-
             return markdown(on_difference(data))
         case "github":
             level = "notice" if data.exit_code == 0 else "error"

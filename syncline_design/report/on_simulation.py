@@ -21,6 +21,8 @@ from syncline_design.report.document import (
     show,
 )
 from syncline_design.report.formats import SIMULATE_FORMATS as SIMULATE_FORMATS
+from syncline_design.report.json_out import json_text
+from syncline_design.report.render_html import html
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -158,12 +160,8 @@ def render_simulate(name: str, run: SimulatedSpec) -> str:
         case "csv":
             return grid_csv(run.result)
         case "json":
-            from syncline_design.report.json_out import json_text
-
             return json_text(run.result.to_json())
         case "html":
-            from syncline_design.report.render_html import html
-
             return html(on_simulation(run.result, run.system))
         case _:
             raise ValueError(f"unknown format {name}")

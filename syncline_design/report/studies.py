@@ -4,40 +4,36 @@ from __future__ import annotations
 
 from typing import Any
 
+from syncline_design.report import study_findings
+from syncline_design.report.csv_out import csv_text
 from syncline_design.report.formats import STUDY_FORMATS as STUDY_FORMATS
+from syncline_design.report.json_out import json_text
+from syncline_design.report.on_study import on_study
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
 from syncline_design.report.text import visible
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.table import Value, columns, rows, text_columns
 
 
 def render_study(name: str, result: StudyResult) -> str | bytes:
-    """The content of one format; each format's module loads only when it is asked for."""
+    """The content of one format."""
     match name:
         case "csv":
             return study_csv(result)
         case "parquet":
             return study_parquet(result)
         case "json":
-            from syncline_design.report.json_out import json_text
-
             return json_text(result.to_json())
         case "html":
-            from syncline_design.report.on_study import on_study
-            from syncline_design.report.render_html import html
-
             return html(on_study(result))
         case "markdown":
-            from syncline_design.report.on_study import on_study
-            from syncline_design.report.render_markdown import markdown
-
             return markdown(on_study(result))
         case _:
             return _for_ci(name, result)
 
 
 def _for_ci(name: str, result: StudyResult) -> str:
-    from syncline_design.report import study_findings
-
     match name:
         case "junit":
             return study_findings.study_junit(result)
@@ -51,8 +47,6 @@ def _for_ci(name: str, result: StudyResult) -> str:
 
 def study_csv(result: StudyResult) -> str:
     """The table as CSV; text that a spreadsheet would run is disarmed."""
-    from syncline_design.report.csv_out import csv_text
-
     return csv_text(columns(result), rows(result))
 
 

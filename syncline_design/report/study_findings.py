@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 
 from syncline_design.report.ci import Level, Notice, requirement_sentence
+from syncline_design.report.github import github_command
+from syncline_design.report.sarif import sarif_log
 from syncline_design.report.study_words import outcome, rule_sentence
 from syncline_design.report.text import visible
 from syncline_design.studies.result import CaseResult, StudyResult
@@ -85,15 +87,11 @@ def setting_text(case: CaseResult) -> str:
 
 def study_sarif(result: StudyResult) -> str:
     """A SARIF log with one result per missed requirement."""
-    from syncline_design.report.sarif import sarif_log
-
     return sarif_log(study_findings(result))
 
 
 def study_github(result: StudyResult) -> str:
     """Workflow commands: an annotation per missed requirement, a notice with the outcome."""
-    from syncline_design.report.github import github_command
-
     lines = [github_command(finding) for finding in study_findings(result)]
     text = f"{result.study.name}: {outcome(result).word}. {rule_sentence(result)}"
     return "\n".join([*lines, f"::notice ::{visible(text).replace('%', '%25')}"]) + "\n"

@@ -10,6 +10,7 @@ import numpy as np
 from syncline_design.model.budget import budget
 from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation import distribution
+from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
 from syncline_design.simulation.distribution import Binned, Values
 from syncline_design.simulation.ensemble import ensemble_of
 from syncline_design.simulation.excursions import excursions, follows_a_file
@@ -72,8 +73,6 @@ def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS)
 
 def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> Simulation:
     """Monte Carlo and the worst case against the Syncline over the grid of tau."""
-    from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
-
     found = cross_check(system, settings).monte_carlo
     figures = budget(system)
     grid = settings.tau_grid_s or DEFAULT_GRID_S

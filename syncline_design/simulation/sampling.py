@@ -24,6 +24,7 @@ from syncline_design.simulation.draws import RandomSource, generator, stage_draw
 from syncline_design.simulation.kernel import norm
 from syncline_design.simulation.settings import SimulationSettings, demand_simulable
 from syncline_design.simulation.surroundings import moment_draw, tilt_draw
+from syncline_design.simulation.trajectory import trajectory_errors
 
 JOB = 16384  # samples: what a job works on stays in the second-level cache
 PLAIN_STREAM = 1  # first word of the stream key, see draws.generator
@@ -35,8 +36,6 @@ def job_errors(system: System, settings: SimulationSettings, job: int) -> Array:
     """Errors [m] of the whole chain, NED, (3, JOB), of one job."""
     stream = generator(settings.seed, PLAIN_STREAM, job)
     if settings.envelope == "trajectory":
-        from syncline_design.simulation.trajectory import trajectory_errors
-
         apart = generator(settings.seed, EFFECTS_STREAM, job)
         return trajectory_errors(system, settings, stream, apart, JOB)
     if acting_effects.by_stage(system):

@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design import __version__
+from syncline_design.choice.outcome import NoVerdict
 from syncline_design.machine.input_files import ReplacedInputError, noting
+from syncline_design.simulation import SimulationError
 from syncline_design.spec.case import Case
 from syncline_design.spec.keys import plain
 from syncline_design.spec.load import BadInput, without_simulated
@@ -126,9 +128,6 @@ def check_case(study: Study, index: int, settings: CaseSettings) -> CaseRecord:
 def _judged(
     study: Study, base: Base, chosen: Sequence[tuple[str, Any]], settings: CaseSettings
 ) -> CaseRecord:
-    from syncline_design.choice.outcome import NoVerdict
-    from syncline_design.simulation import SimulationError
-
     try:
         case = base.load(chosen)
         return _checked(study, base, case, settings)
@@ -143,6 +142,7 @@ def _judged(
 
 
 def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> CaseRecord:
+    # only where a case is computed: a study whose cases are all there starts at once
     from syncline_design.verdict.verify import CheckSettings, check_loaded
 
     simulated = simulates(study, base)
