@@ -24,7 +24,7 @@ OPEN = """\
 syncline: 1
 name: UAV corridor mapping
 requirements:
-  - {id: ACC-1, kind: accuracy, limit: 0.11 m}
+  - {id: ACC-1, kind: accuracy, limit: 0.12 m}
   - {id: SYNC-1, kind: sync, limit: 1.0}
   - {id: COST-1, kind: cost, limit: 300000 EUR}
   - {id: MASS-1, kind: mass, limit: 6 kg}
