@@ -283,3 +283,29 @@ def test_a_spec_that_pins_everything_fails_in_check_and_optimize() -> None:
     assert found.infeasibility is not None
     checked = verdict("3 cm")
     assert (checked.verdict, checked.exit_code) == ("fails", 1)
+
+
+@pytest.mark.parametrize("timelines", [("utc", "utc"), ("host", "utc"), ("utc", "host")])
+def test_only_who_stamps_on_its_host_is_asked_for_a_clock(timelines: tuple[str, str]) -> None:
+    """A tow fish behind a boat with a clock: its offset enters where a stamp of its is the host's.
+
+    Its attitude and sonar on UTC are on the boat's time whatever its own clock shows.
+    """
+    attitude, ranging = timelines
+    fish = f"""\
+  - name: fish
+    platform: {{v_max: 1 m/s, omega_max: 5 deg/s, distance: 5 m, baseline: 0 m}}
+    attitude:
+      sensor: {{modality: attitude, sigma_attitude: 1 deg, primitives: [pps]}}
+      timestamping: {{error: {{distribution: constant, value: 0 s}}, timeline: {attitude}}}
+    ranging:
+      sensor: {{modality: ranging, sigma_range: 1 mm, sigma_bearing: 1 mdeg, primitives: [pps]}}
+      timestamping: {{error: {{distribution: constant, value: 0 s}}, timeline: {ranging}}}
+"""
+    boat = SPEC.format(limit="9 m", more="").replace(
+        "- name: boat", "- name: boat\n    clock: tcxo"
+    )
+    found = check_loaded(load_text(boat + fish, "tow.yaml"), CheckSettings(monte_carlo=False))
+    told = [w.message for w in found.warnings if w.code == "common-clock"]
+    assert len(told) == (1 if "host" in timelines else 0)
+    assert all("fish gives no `clock`" in message for message in told)

@@ -118,9 +118,11 @@ def _lever_arm(verified: Verified) -> Iterator[Caution]:
 
 def _clocks(case: Case, verified: Verified) -> Iterator[Caution]:
     """Vehicles whose clocks are taken as common because the spec says nothing."""
-    vehicles = {stage.vehicle for stage in verified.system.stages}
+    stages = verified.system.stages
+    vehicles = {stage.vehicle for stage in stages}
     timed = {stage.vehicle_name for stage in case.spec.stages if stage.clock is not None}
-    silent = sorted(vehicles - timed)
+    stamping = {s.vehicle for s in stages if any(one.timeline != UTC for one in s.sensors())}
+    silent = sorted(stamping - timed)  # what UTC alone stamps needs no clock of the host
     if len(vehicles) > 1 and silent:
         yield Caution(
             "common-clock",
