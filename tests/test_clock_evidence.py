@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import math
+import os
 from pathlib import Path
 
 import jsonschema
@@ -159,9 +160,9 @@ def test_too_few_sessions_carry_no_claim(count: int, need: int, tmp_path: Path) 
     assert "no claim, so no entry written" in done.stderr
     assert not entry.exists()
     if count == 1:
-        assert "it says nothing about the next start: 4 more sessions" in " ".join(
-            done.stdout.split()
-        )
+        said = " ".join(done.stdout.split())
+        assert "It holds for this session: |offset| stays below" in said
+        assert "It says nothing about the next start: 4 more sessions" in said
 
 
 def test_the_larger_of_both_bounds_is_taken_unless_asked_otherwise(tmp_path: Path) -> None:
@@ -288,6 +289,7 @@ def test_what_it_means_for_a_spec_is_what_check_then_says(tmp_path: Path) -> Non
     means = json.loads(done.stdout)["spec"]
     assert (means["before"], means["after"]) == ("meets", "fails")
     assert means["requirement_changes"] == ["SYNC-1: pass to fail"]
+    assert means["measured_tau_s"] > 10.0 * means["tau_s"]
     entry = tmp_path / "own_clock.yaml"
     run("timing", *logs, "--as", "own_clock", "--write-catalog", entry)
     with_it = tmp_path / "with.yaml"
@@ -446,3 +448,49 @@ def test_outputs_agree_and_are_as_the_schema_says(tmp_path: Path) -> None:
     assert "No τ changes" not in text.read_text("utf-8") or told["spec"]["before"]
     assert sd.timing(logs).to_json()["bound_s"] == told["bound_s"]
     assert run("timing", *logs).stdout == run("timing", *logs, "--seed", "3").stdout
+
+
+def test_names_of_files_do_no_harm(tmp_path: Path) -> None:
+    """Bytes that are no text, markup, quotes, lines, escapes and hidden turns of direction."""
+    names = [b"a\xff.csv", b"<script>.csv", b'x"; y.csv', "\u202e.csv".encode(), b"new\nline.csv",
+             b"z\x1b[31m.csv"]  # fmt: skip
+    logs = []
+    for plain, name in zip(sessions_csv(tmp_path, [1e-5] * 6), names, strict=True):
+        logs.append(plain.rename(tmp_path / os.fsdecode(name)))
+    entry, page = tmp_path / "own_clock.yaml", tmp_path / "page.html"
+    done = run("timing", *logs, "--as", "own_clock", "--write-catalog", entry, "-o", f"html:{page}",
+               "--conditions", 'bad\x07 \u202e "words"')  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    assert "<script>.csv" not in page.read_text("utf-8")
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(SPEC, "utf-8")
+    offset = load(spec).catalog.clocks["own_clock"].offset
+    assert len(offset.evidence) == 6
+    assert (offset.conditions or "").isprintable()
+
+
+def test_an_entry_has_its_own_id_and_the_spec_s_currency(tmp_path: Path) -> None:
+    logs = _week(tmp_path, 1e-5)
+    taken = run("timing", *logs, "--as", "ntp", "--write-catalog", tmp_path / "a.yaml")
+    assert taken.exit_code == 2
+    assert "built-in" in taken.stderr
+    spec, base = tmp_path / "dollars.yaml", tmp_path / "own_clock.yaml"
+    dollars = SPEC.replace("coverage_factor", "currency: USD\ncoverage_factor")
+    without = dollars.replace("catalogs: [own_clock.yaml]\n", "").replace(
+        "    clock: {candidates: [own_clock]}\n", ""
+    )
+    spec.write_text(without, "utf-8")
+    done = run("timing", *logs, "--as", "own_clock", "--write-catalog", base, "--spec", spec)
+    assert done.exit_code == 0, done.stderr
+    spec.write_text(dollars, "utf-8")
+    assert check_loaded(load(spec), CheckSettings(monte_carlo=False)).verdict == "meets"
+
+
+def test_sessions_of_different_length_are_said(tmp_path: Path) -> None:
+    paths = []
+    for k, count in enumerate((100, 100, 100, 100, 400)):
+        folder = tmp_path / str(k)
+        folder.mkdir()
+        paths += sessions_csv(folder, [1e-5], count=count, seed=k)
+    notes = study_logs(paths, TimingSettings()).timing.notes
+    assert any("the claim is for such a mixture" in note for note in notes)

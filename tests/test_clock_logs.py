@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -271,3 +272,35 @@ def test_tdev_and_mtie_are_those_of_allantools() -> None:
         keys = {"rate": 1.0, "data_type": "phase", "taus": [n]}
         assert tdev(x, n) == pytest.approx(theirs.tdev(x, **keys)[1][0], rel=1e-9)
         assert mtie(x, n) == pytest.approx(theirs.mtie(x, **keys)[1][0], rel=1e-12)
+
+
+HOSTILE = {
+    "one word": "ptp4l[1.5]: " + "a" * 60_000,
+    "blanks": "ptp4l[1.5]: " + " " * 60_000 + "x",
+    "offsets": "ptp4l[1.5]: " + "offset " * 8_000,
+    "brackets": "ptp4l" + "[1.5]" * 10_000,
+    "ports": "ptp4l[1.5]: " + "port 1" * 9_000,
+    "nested JSON": '{"class":"PPS",' + "[" * 60_000,
+    "large JSON": '{"class":"PPS","device":"x","real_sec":1,"real_nsec":0,"clock_nsec":0,'
+    '"clock_sec":1' + "0" * 3_000 + "}",
+    "digits": "ppstest source 0 - assert " + "1" * 60_000,
+}
+
+
+@pytest.mark.parametrize("name", HOSTILE)
+def test_hostile_lines_cost_no_more_than_their_length(name: str, tmp_path: Path) -> None:
+    lines = [HOSTILE[name]] * 20 + [made.ptp4l_line(100.0 + k, 1e-6) for k in range(30)]
+    started = time.process_time()
+    (series,) = read_logs([write(tmp_path / "any.log", lines)]).series
+    assert len(series) == 30
+    assert time.process_time() - started < 2.0
+
+
+def test_figures_that_are_none_are_damaged_lines(tmp_path: Path) -> None:
+    lines = made.tracking(START + 16.0 * np.arange(60), np.full(60, 1e-5))
+    lines[10] = lines[10].replace("-1.000e-05", "nan")
+    lines[20] = lines[20].replace("-1.000e-05", "inf")
+    path = write(tmp_path / "tracking.log", lines)
+    read = read_logs([path])
+    assert len(read.series[0]) == 58
+    assert read.notes == (f"{path}: 2 damaged lines left out, the first at 11",)

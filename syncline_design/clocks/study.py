@@ -36,6 +36,7 @@ from syncline_design.clocks.tolerance import (
     tolerance_bound,
 )
 from syncline_design.machine.deadline import in_force
+from syncline_design.model.quantity import format_duration
 
 MOST_EVENTS: Final = 1000
 MOST_BINS: Final = 1500
@@ -305,6 +306,11 @@ def _notes(sessions: Sequence[ClockSession], figures: _Figures) -> list[str]:
     if short:
         said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
                     "(less than 20 samples in lock, or than 90 s)")  # fmt: skip
+    lengths = [s.duration_s for s in sessions if s.is_counted]
+    if lengths and max(lengths) > 2.0 * min(lengths):
+        said.append(f"sessions of {format_duration(min(lengths))} to "
+                    f"{format_duration(max(lengths))}: the claim is for such a mixture, "
+                    "drift makes long ones worse")  # fmt: skip
     total = sum(len(s.events) for s in sessions)
     if total > MOST_EVENTS:
         said.append(f"{total} events, of which the {MOST_EVENTS} largest are listed")

@@ -37,12 +37,19 @@ class SensorUnderTiming(Record):
 
 @dataclass(frozen=True, slots=True)
 class TimingMeaning(Record):
-    """The verdict as the spec has it and with the measured clock; after None: not put in place."""
+    """The verdict as the spec has it and with the measured clock; after None: not put in place.
+
+    tau_s, total_m: of the whole system, the largest timestamp difference and the error.
+    """
 
     name: str
     file: str
     before: Word
     after: Word | None
+    tau_s: float | None
+    measured_tau_s: float | None
+    total_m: float | None
+    measured_total_m: float | None
     requirement_changes: tuple[str, ...]
     sensors: tuple[SensorUnderTiming, ...]
 
@@ -75,6 +82,7 @@ def timing_meaning(
         after = check_loaded(on_clock(own, study, identity), settings)
     return TimingMeaning(
         before.name, before.file, before.verdict, None if after is None else after.verdict,
+        _tau(before), _tau(after), _total(before), _total(after),
         _changes(before, after), _sensors(before, after, bound),
     )  # fmt: skip
 
@@ -99,6 +107,14 @@ def on_clock(case: Case, study: TimingStudy, identity: str) -> Case:
         case, catalog=case.catalog.model_copy(update={"clocks": clocks}),
         spec=case.spec.model_copy(update={"stages": stages}),
     )  # fmt: skip
+
+
+def _tau(verdict: Verdict | None) -> float | None:
+    return None if verdict is None or verdict.syncline is None else verdict.syncline.tau_s
+
+
+def _total(verdict: Verdict | None) -> float | None:
+    return None if verdict is None or verdict.syncline is None else verdict.syncline.total_m
 
 
 def _changes(before: Verdict, after: Verdict | None) -> tuple[str, ...]:

@@ -92,8 +92,9 @@ def _sentences(result: Timing) -> Iterator[str]:
     if claim.made:
         yield _claim_words(result)
     elif claim.sessions == 1 and result.bound_s is not None and not result.doubts:
-        yield (f"In this session |offset| stays below {numbers.time(result.bound_s)} for "
-               f"{numbers.percent(claim.coverage)} of its time; it says nothing about the next "
+        kept = next(one.quantile_s for one in result.sessions if one.counted)
+        yield (f"It holds for this session: |offset| stays below {numbers.time(kept)} for "
+               f"{numbers.percent(claim.coverage)} of its time. It says nothing about the next "
                f"start: {_more(result)}.")  # fmt: skip
     elif not result.doubts:
         yield f"{_sentence(claim.why_not or '')}: {_more(result)}."
@@ -175,7 +176,18 @@ def _spec(result: TimingAndSpec) -> list[Node]:
     nodes += changes if means.requirement_changes else []
     if not result.claim.made:
         nodes.append(Text("This holds only if the bound does: no claim is made.", quiet=True))
-    if means.after is not None and all(r.measured_tau_s == r.tau_s for r in means.sensors):
+    if means.after is not None and means.tau_s is not None and means.measured_tau_s is not None:
+        nodes.append(Facts((
+            ("\u03c4 of the system", f"{numbers.time(means.tau_s)}, with this clock "
+             f"{numbers.time(means.measured_tau_s)}"),
+            ("Error of the system", f"{numbers.length(means.total_m)}, with this clock "
+             f"{numbers.length(means.measured_total_m)}"),
+        ), "record"))  # fmt: skip
+    if (
+        means.after is not None
+        and means.tau_s == means.measured_tau_s
+        and all(r.measured_tau_s == r.tau_s for r in means.sensors)
+    ):
         nodes.append(Text("No \u03c4 changes: all stamps are of one clock, whose offset cancels, "
                           "or the spec's own clock has the same bound.", quiet=True))  # fmt: skip
     return [*nodes, *show(_sensors(means), silent=True)]
