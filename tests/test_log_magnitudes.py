@@ -94,3 +94,19 @@ def test_names_are_found_below_comments_whatever_ends_a_line(end: str, tmp_path:
     assert found.names == ("time_s", "range_m")
     assert found.separator == ";"
     assert path.read_bytes()[found.body :].startswith(b"0,5; 1,25")
+
+
+@pytest.mark.parametrize("cell", ["1e400", "-1e999", "9" * 190 + "e200"])
+def test_figures_beyond_a_float_are_no_missing_values(tmp_path: Path, cell: str) -> None:
+    """They counted as missing, while 1e200 was refused; `inf` says that nothing is known."""
+    lines = write(tmp_path / "plain.csv", columns()).read_text(encoding="utf-8").splitlines()
+    place = lines[0].split(",").index("range_m")
+    row = lines[4].split(",")
+    for text, wanted in ((cell, None), ("inf", 1), ("-Infinity", 1)):
+        row[place] = text
+        path = tmp_path / "log.csv"
+        path.write_text("\n".join([*lines[:4], ",".join(row), *lines[5:]]) + "\n", "utf-8")
+        if wanted is None:
+            assert f"log.csv:5:{place + 1}: range_m: text among numbers" in refusal(path)
+        else:
+            assert read(path).rejected == {"missing value": wanted}

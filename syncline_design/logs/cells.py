@@ -92,6 +92,11 @@ def numbers(text: pl.Series, comma: bool) -> tuple[Array, str]:
         row = int(bad[0])
         mark_name = "point or comma" if comma else "point"
         raise BadCellError(row, str(text[row]), f"a number with a decimal {mark_name}, or nothing")
+    endless = found.is_infinite().fill_null(False)
+    if endless.any():  # `inf` is nothing known; a figure too large for a float is a fault
+        rows = (endless & ~text.str.to_lowercase().str.contains("inf", literal=True)).arg_true()
+        if len(rows):
+            raise BadCellError(int(rows[0]), str(text[int(rows[0])]), "a figure below 1e308")
     values: Array = found.to_numpy().astype(float)
     values[~np.isfinite(values)] = np.nan
     return values, mark

@@ -197,16 +197,17 @@ class TextSource:
                 yield self._text(block, place).filter(pl.Series(kept))
 
     def _fast(self, block: delimited.RowBlock, places: Sequence[int]) -> list[Array] | None:
-        """Columns that are plain figures throughout; None where one is not."""
+        """Columns that are plain finite figures throughout; None where one is not."""
         import polars as pl
 
         try:
             frame = delimited.parsed(block, self.how, places, as_text=False)
         except pl.exceptions.PolarsError:
             return None
-        return [
-            _finite(frame.get_column(f"column_{k + 1}").to_numpy().astype(float)) for k in places
-        ]
+        found = [frame.get_column(f"column_{k + 1}").to_numpy().astype(float) for k in places]
+        if any(bool(np.any(np.isinf(values))) for values in found):
+            return None  # `inf`, or a figure too large for a float: the text tells
+        return [_finite(values) for values in found]
 
     def _text(self, block: delimited.RowBlock, place: int) -> pl.Series:
         import polars as pl
