@@ -7,7 +7,7 @@ what the lag lacks of it at one stamp has decayed by exp(-h / T) at the next.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
@@ -21,6 +21,7 @@ from syncline_design.logs.log import LogTrack, Rows
 
 MEMORY_S = 60.0  # of the past that is looked at
 AHEAD = 12  # rows after a stamp that the spline up to it feels
+KEPT = 3  # time constants whose lag is kept
 FORGOTTEN = 1e-18  # share of the past that no longer counts
 
 
@@ -38,6 +39,7 @@ class LoggedPast:
     rotation: Array
     rate_radps: Array
     from_positions: bool = False
+    found: dict[float, tuple[Array, Array]] = field(default_factory=dict, compare=False, repr=False)
 
     def part(self, index: Rows) -> LoggedPast:
         """The same past at some of the stamps."""
@@ -51,7 +53,17 @@ class LoggedPast:
         )
 
     def __call__(self, time_constant_s: float) -> tuple[Array, Array]:
-        """Lag of the place [m], NED, (n, 3), and of R_nb (n, 3, 3)."""
+        """Lag of the place [m], NED, (n, 3), and of R_nb (n, 3, 3).
+
+        A fit asks for the same constant again while it moves other figures.
+        """
+        if time_constant_s not in self.found:
+            while len(self.found) >= KEPT:
+                del self.found[next(iter(self.found))]
+            self.found[time_constant_s] = self._lag(time_constant_s)
+        return self.found[time_constant_s]
+
+    def _lag(self, time_constant_s: float) -> tuple[Array, Array]:
         near = _needed(self.velocity.time_s, self.at_s)
         velocity = pieces(self.velocity.time_s[near], self.velocity.value[near])
         near = _needed(self.stamps_s, self.at_s)
