@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import json
 import math
+import pickle
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal
 
 import jsonschema
@@ -21,6 +24,11 @@ from syncline_design.machine.records import (
     schema_of,
     with_texts,
 )
+from syncline_design.spec.load import load
+from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.verify import CheckSettings, check_loaded
+
+SPEC = Path(__file__).parent.parent / "specs" / "usv_wire_missing.yaml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,3 +161,35 @@ def test_figures_that_json_cannot_hold_are_refused(figure: str) -> None:
     assert figure in text
     with pytest.raises(NotThisResultError, match=r"changes\[0\]\.from: .*finite"):
         read_as(Whole, text)
+
+
+def test_the_mappings_of_a_result_are_as_frozen_as_it_is() -> None:
+    """`verdict.design.stages[0].roles.clear()` emptied a frozen verdict, and none had a hash."""
+    verdict = check_loaded(load(SPEC), CheckSettings(monte_carlo=False))
+    assert verdict.design is not None
+    roles: Any = verdict.design.stages[0].roles
+    known = dict(roles)
+    for change in (
+        roles.clear,
+        lambda: roles.update(position=None),
+        lambda: roles.setdefault("x", 1),
+        lambda: roles.pop("position"),
+        lambda: roles.__setitem__("x", 1),
+        lambda: roles.__delitem__("position"),
+    ):
+        with pytest.raises(TypeError, match="frozen"):
+            change()
+    assert roles == known
+    for again in (pickle.loads(pickle.dumps(verdict)), copy.deepcopy(verdict)):
+        assert again == verdict
+        assert hash(again) == hash(verdict)
+        with pytest.raises(TypeError, match="frozen"):
+            again.design.stages[0].roles.clear()
+    assert read_as(Verdict, json.dumps(verdict.to_json())) == verdict
+
+
+def test_a_case_is_not_emptied_by_who_looks_at_it() -> None:
+    catalog: Any = load(SPEC).catalog
+    with pytest.raises(TypeError, match="frozen"):
+        catalog.sensors.clear()
+    assert pickle.loads(pickle.dumps(catalog)) == catalog

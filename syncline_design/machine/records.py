@@ -14,9 +14,12 @@ files of an earlier state of the same version still read.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Final, TypeVar
+
+from syncline_design.machine.frozen import frozen
 
 Json = dict[str, Any]
 R = TypeVar("R", bound="Record")
@@ -41,9 +44,23 @@ class Record:
         "allow_inf_nan": False,
     }
 
+    def __post_init__(self) -> None:
+        """Its mappings are as frozen as it is."""
+        for name in _mappings(type(self)):  # type: ignore[arg-type]
+            value = getattr(self, name)
+            if value is not None:
+                object.__setattr__(self, name, frozen(value))
+
     def to_json(self) -> Json:
         """The record as plain data, ready for `json`."""
         return _record_json(self)
+
+
+@functools.cache
+def _mappings(kind: Any) -> tuple[str, ...]:
+    """The fields of a record that hold a mapping."""
+    fields = dataclasses.fields(kind)
+    return tuple(one.name for one in fields if str(one.type).startswith(("Mapping[", "dict[")))
 
 
 class _NullIsInfinite:

@@ -11,6 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from syncline_design.machine.frozen import frozen
 from syncline_design.machine.input_files import note_place
 from syncline_design.model.quantity import UNITS, Dimension, Quantity, UnitError, parse_quantity
 from syncline_design.spec.catalog import SECTIONS, Catalog, CatalogFile
@@ -65,7 +66,8 @@ class Collection:
 
     def catalog(self) -> Catalog:
         """The merged catalog; its entries have been validated one by one."""
-        return Catalog.model_construct(**self.entries)  # type: ignore[arg-type]
+        merged = {section: frozen(found) for section, found in self.entries.items()}
+        return Catalog.model_construct(**merged)  # type: ignore[arg-type]
 
     def copy(self) -> Collection:
         """A copy to which problems, digests and entries can be added."""
