@@ -27,7 +27,7 @@ Make = Callable[[np.random.Generator, int], Array]
 SAMPLES, STEP_S = 480, 60.0  # a session of 8 h
 SIGMA_S = 1e-6
 POPULATION = 40_000
-SESSIONS = (5, 20, 60)
+SESSIONS = (3, 5, 20, 60)
 SHARE = CONFIDENCE = COVERAGE = 0.95
 BEGIN, END = "<!-- coverage: begin -->", "<!-- coverage: end -->"
 
@@ -227,7 +227,7 @@ def misses(found: Sequence[Cell]) -> list[str]:
         if cell.method != "over sessions" or cell.family in APART:
             continue
         least = 0.88 if cell.sessions < 20 else 0.92
-        widest = {5: math.inf, 20: 2.0, 60: 1.6}[cell.sessions]
+        widest = {20: 2.0, 60: 1.6}.get(cell.sessions, math.inf)
         if cell.low < least or cell.width > widest:
             held = f"holds in {100 * cell.share:.1f} % (from {100 * cell.low:.1f} %)"
             out.append(f"{cell.family}, {cell.sessions}: {held}, width {cell.width:.2f}")
@@ -247,7 +247,7 @@ def main() -> None:
     text = report(found, chosen.studies, chosen.seed)
     missed = misses(found)
     said = "\n".join(f"- {one}" for one in missed) or "- none"
-    asked = "lower limit 92 % at 20 and 60, 88 % at 5; width 2 at 20, 1.6 at 60"
+    asked = "lower limit 92 % at 20 and 60, 88 % below; width 2 at 20, 1.6 at 60"
     text += f"\nMissed by the first six ({asked}):\n\n{said}\n"
     print(text)
     if chosen.write is not None:

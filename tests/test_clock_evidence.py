@@ -101,14 +101,14 @@ def test_the_largest_session_carries_it_from_59_on() -> None:
     assert tolerance_bound(many[:58], 0.95, 0.95)[1] == "log-normal"
 
 
-@pytest.mark.parametrize("count", [5, 20, 60])
+@pytest.mark.parametrize("count", [3, 5, 20, 60])
 def test_a_new_bias_at_each_start_is_bounded_without_waste(count: int) -> None:
     """|normal| biases, 95 % below 1.96: held as above, at most twice as wide at 20."""
     studies = np.abs(np.random.default_rng(4).normal(size=(400, count))) + 0.1
     bounds = np.array([tolerance_bound(q, 0.95, 0.95)[0] for q in studies])
     share = float(np.mean(bounds >= 2.06))
-    assert share - 1.96 * math.sqrt(share * (1.0 - share) / 400) > (0.88 if count == 5 else 0.92)
-    assert np.median(bounds) / 2.06 < {5: 6.0, 20: 2.1, 60: 1.6}[count]
+    assert share - 1.96 * math.sqrt(share * (1.0 - share) / 400) > (0.88 if count <= 5 else 0.92)
+    assert np.median(bounds) / 2.06 < {3: 30.0, 5: 6.0, 20: 2.1, 60: 1.6}[count]
 
 
 @pytest.mark.parametrize("count", [5, 20, 60])
@@ -147,7 +147,7 @@ def test_a_claim_over_sessions(tmp_path: Path) -> None:
     assert len(timing.evidence) == 20
 
 
-@pytest.mark.parametrize(("count", "need"), [(1, 4), (2, 3), (4, 1)])
+@pytest.mark.parametrize(("count", "need"), [(1, 2), (2, 1)])
 def test_too_few_sessions_carry_no_claim(count: int, need: int, tmp_path: Path) -> None:
     paths = sessions_csv(tmp_path, [1e-5] * count)
     timing = study_logs(paths, TimingSettings()).timing
@@ -162,7 +162,7 @@ def test_too_few_sessions_carry_no_claim(count: int, need: int, tmp_path: Path) 
     if count == 1:
         said = " ".join(done.stdout.split())
         assert "It holds for this session: |offset| stays below" in said
-        assert "It says nothing about the next start: 4 more sessions" in said
+        assert "It says nothing about the next start: 2 more sessions" in said
 
 
 def test_the_larger_of_both_bounds_is_taken_unless_asked_otherwise(tmp_path: Path) -> None:

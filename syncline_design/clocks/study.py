@@ -306,6 +306,10 @@ def _notes(sessions: Sequence[ClockSession], figures: _Figures) -> list[str]:
     if short:
         said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
                     "(less than 20 samples in lock, or than 90 s)")  # fmt: skip
+    largest = float(np.max(figures.quantiles, initial=0.0))
+    if figures.statistical_s is not None and figures.statistical_s > 3.0 * largest > 0.0:
+        times = figures.statistical_s / largest
+        said.append(f"the bound is {times:.3g} times the largest session: more would narrow it")
     lengths = [s.duration_s for s in sessions if s.is_counted]
     if lengths and max(lengths) > 2.0 * min(lengths):
         said.append(f"sessions of {format_duration(min(lengths))} to "
