@@ -221,6 +221,19 @@ def test_the_system_clock_is_phc2sys_and_ptp4l_together(tmp_path: Path) -> None:
     assert timing.hard_bound_s == pytest.approx(4e-7 + 1.5e-6 + 0.25e-6, rel=0.02)
 
 
+def test_lost_lock_of_the_card_is_lost_lock_of_the_chain(tmp_path: Path) -> None:
+    lines = []
+    for i in range(400):
+        lost = 200 <= i < 230
+        lines.append(made.ptp4l_line(1000.0 + i, 4e-6 if lost else 3e-8, 0 if lost else 2))
+        lines.append(made.phc2sys_line(1000.5 + i, 1e-8))
+    timing = study_logs([write(tmp_path / "boot.log", lines)], TimingSettings()).timing
+    (lock,) = [event for event in timing.events if event.kind == "unlock"]
+    assert lock.size_s == pytest.approx(4e-6 + 1e-8, rel=1e-3)
+    assert timing.sessions[0].samples == 400 - 31
+    assert timing.event_bound_s == pytest.approx(4e-6 + 1e-8, rel=1e-3)
+
+
 def _week(folder: Path, sigma_s: float) -> list[Path]:
     return sessions_csv(folder, [sigma_s] * 7, count=400, step_s=60.0, seed=2)
 

@@ -151,13 +151,15 @@ def _pairs(system: Sequence[Series], cards: Sequence[Series]) -> list[tuple[Seri
 
 
 def _sum(system: Series, card: Series) -> Series | None:
-    good = card.locked & np.isfinite(card.offset_s)
-    known = card.part(good)
+    """Offsets and hard bounds added; in lock only where both are, and where the card was heard."""
+    known = card.part(np.isfinite(card.offset_s))
     if len(known) < 2:
         return None
-    nearest = np.clip(np.searchsorted(known.time_s, system.time_s), 1, len(known) - 1)
-    apart = np.minimum(np.abs(system.time_s - known.time_s[nearest - 1]),
-                       np.abs(known.time_s[nearest] - system.time_s))  # fmt: skip
+    after = np.clip(np.searchsorted(known.time_s, system.time_s), 1, len(known) - 1)
+    before_s = np.abs(system.time_s - known.time_s[after - 1])
+    after_s = np.abs(known.time_s[after] - system.time_s)
+    apart = np.minimum(before_s, after_s)
+    locked = known.locked[after] & known.locked[after - 1]
     reach = max(10.0 * float(np.median(np.diff(known.time_s))), 1.0)
     kind = replace(system.kind, name=f"CLOCK_REALTIME by phc2sys and {card.kind.name}", rank=0,
                    steering=card.kind.steering)  # fmt: skip
@@ -165,7 +167,8 @@ def _sum(system: Series, card: Series) -> Series | None:
     begin[:1] = True
     files = tuple(dict.fromkeys((*system.files, *card.files)))
     return replace(
-        system, kind=kind, files=files, restart=begin, locked=system.locked & (apart <= reach),
+        system, kind=kind, files=files, restart=begin,
+        locked=system.locked & locked & (apart <= reach),
         offset_s=system.offset_s + np.interp(system.time_s, known.time_s, known.offset_s),
         hard_s=system.hard_s + np.interp(system.time_s, known.time_s, known.hard_s),
     )  # fmt: skip
