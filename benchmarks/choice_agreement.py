@@ -22,10 +22,11 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
+from plain_front import front_by_enumeration
 from random_problems import random_problem, with_random_limits
 from syncline_design import __version__
 from syncline_design.choice.decide import best_by_front
-from syncline_design.choice.enumerate import all_designs, front_by_enumeration
+from syncline_design.choice.enumerate import all_designs
 from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
 from syncline_design.choice.front import front
 from syncline_design.choice.milp import best_by_milp

@@ -19,47 +19,12 @@ from syncline_design.choice.evaluate import broken, evaluate, known_or_more
 from syncline_design.choice.narrowed import Narrowed, narrowed
 from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, Options, ResourceName
 from syncline_design.choice.partition import best_of
+from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import in_force
 
-MOST_STEPS = 64  # points of a front of the roles beside; between them it takes its lower corners
 EXACT = 2**52  # sums of whole amounts below it are exact as floats
 TIED = 1e-11  # errors of one order: 12 figures
-
-
-@dataclass(frozen=True, slots=True)
-class Stairs:
-    """Least amounts, rising, for least errors [m], falling: what some roles take at least."""
-
-    amount: Floats
-    error: Floats
-
-    def least_within(self, error_m: Floats) -> Floats:
-        """Least amount at no more than these errors; infinite where there is none."""
-        place = np.searchsorted(-self.error, -error_m, side="left")
-        amounts = np.append(self.amount, math.inf)
-        return np.asarray(amounts[place])
-
-    def beside(self, other: Stairs) -> Stairs:
-        """Two groups of roles together."""
-        amounts = np.add.outer(self.amount, other.amount).ravel()
-        return stairs(amounts, np.add.outer(self.error, other.error).ravel())
-
-
-NO_ROLES = Stairs(np.zeros(1), np.zeros(1))
-
-
-def stairs(amount: Floats, error: Floats) -> Stairs:
-    """The lower left staircase of points, thinned out to its lower corners."""
-    order = np.lexsort((error, amount))
-    amount, error = amount[order], error[order]
-    lowest = np.minimum.accumulate(error)
-    steps = np.flatnonzero(np.append(True, error[1:] < lowest[:-1]))
-    amount, error = amount[steps], error[steps]
-    if len(steps) <= MOST_STEPS:
-        return Stairs(amount, error)
-    starts = np.linspace(0, len(steps), MOST_STEPS, endpoint=False).astype(np.intp)
-    return Stairs(amount[starts], error[np.append(starts[1:], len(steps)) - 1])
 
 
 @dataclass(frozen=True, slots=True)

@@ -31,8 +31,8 @@ from syncline_design.choice.evaluate import (
     rank,
     total_error_m,
 )
-from syncline_design.choice.labels import Labels, concatenate, total_m
-from syncline_design.choice.merge import Ceiling, Merge, lowered
+from syncline_design.choice.labels import Labels, total_m
+from syncline_design.choice.merge import Ceiling, Merge
 from syncline_design.choice.narrowed import says_all, stated
 from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, ResourceName
 from syncline_design.choice.outcome import Deadline, FrontPoint, PriceStep, TooLarge
@@ -43,11 +43,15 @@ from syncline_design.machine.deadline import in_force, within
 
 @dataclass(frozen=True, slots=True)
 class _Finished:
-    """Complete designs by rising resource; `clocks` lists the combinations of clocks."""
+    """Complete designs by rising resource; clocks: of each vehicle those that are left."""
 
-    labels: Labels  # the last column of `choice` is a place in `clocks`
+    labels: Labels
     total: Floats
     clocks: tuple[tuple[int, ...], ...]
+
+    def take(self, rows: Indices) -> _Finished:
+        """Some of them."""
+        return _Finished(self.labels.take(rows), self.total[rows], self.clocks)
 
 
 def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint, ...]:
@@ -154,6 +158,8 @@ def demand_structure(problem: Problem) -> None:
         if other.role != "ranging" or not (same or chain):
             raise TooLarge("pairs of timestamps that do not form a chain of stages")
     stages = [role.stage for role in problem.roles]
+    if any(set(stages).isdisjoint(vehicle.stages) for vehicle in problem.vehicles):
+        raise TooLarge("a vehicle without sensors")
     if stages != sorted(stages):
         raise TooLarge("roles that are not in the order of the stages")
 
@@ -161,44 +167,25 @@ def demand_structure(problem: Problem) -> None:
 def _merge_all(
     tables: Tables, accuracy: bool, deadline: Deadline, *, guarded: bool, ceiling: Ceiling | None
 ) -> _Finished:
-    """Complete designs of every combination of clocks that may matter, the front of them."""
-    combinations = tuple(clock_combinations(tables.problem))
-    parts: list[Labels] = []
-    for place, clocks in enumerate(combinations):
-        deadline.check()
-        merge = Merge(tables, clocks, accuracy=accuracy, guarded=guarded, ceiling=ceiling)
-        labels = merge.run(deadline)
-        if labels is not None and len(labels):
-            if not guarded:
-                ceiling = lowered(ceiling, labels, total_m(tables.problem, labels))
-            clock = np.full((len(labels), 1), place, dtype=np.intp)
-            parts.append(replace(labels, choice=np.column_stack([labels.choice, clock])))
-    if not parts:
-        return _Finished(_no_labels(len(tables.keys)), np.zeros(0), combinations)
-    finished = _with_total(tables, concatenate(parts), combinations)
+    """Complete designs with every clock that may matter, the front of them."""
+    useful = tuple(useful_clocks(tables.problem))
+    merge = Merge(tables, useful, accuracy=accuracy, guarded=guarded, ceiling=ceiling)
+    labels = merge.run(deadline)
+    if labels is None or not len(labels):
+        return _Finished(_no_labels(len(tables.keys)), np.zeros(0), useful)
+    finished = _Finished(labels, total_m(tables.problem, labels), useful)
     if guarded:
-        rows = np.flatnonzero(_hold_sync(tables, finished))
-        finished = _Finished(finished.labels.take(rows), finished.total[rows], combinations)
-    ties = tie_order(tables, finished.labels.resources, finished.labels.ties)
-    rows = undominated(Columns((finished.labels.resources[0], finished.total), tie=ties))
-    labels, total = finished.labels.take(rows), finished.total[rows]
-    order = np.argsort(-total, kind="stable")
-    return _Finished(labels.take(order), total[order], combinations)
+        finished = finished.take(np.flatnonzero(_hold_sync(tables, finished)))
+    labels, total = finished.labels, finished.total
+    ties = tie_order(tables, labels.resources, labels.ties)
+    finished = finished.take(undominated(Columns((labels.resources[0], total), tie=ties)))
+    return finished.take(np.argsort(-finished.total, kind="stable"))
 
 
 def _no_labels(keys: int) -> Labels:
-    none = np.zeros(0)
+    none, no_choice = np.zeros(0), np.zeros((0, 1), dtype=np.intp)
     whole = tuple(np.zeros(0, dtype=np.int64) for _ in range(keys))
-    return Labels(
-        whole, (), none, none, none, none, (), np.zeros((0, 1), dtype=np.intp), none, none > 0
-    )
-
-
-def _with_total(
-    tables: Tables, labels: Labels, combinations: tuple[tuple[int, ...], ...]
-) -> _Finished:
-    """Complete designs with their total error."""
-    return _Finished(labels, total_m(tables.problem, labels), combinations)
+    return Labels(whole, (), none, none, none, none, none, (), no_choice, no_choice, none, none > 0)
 
 
 def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
@@ -223,13 +210,15 @@ def _designs(tables: Tables, finished: _Finished, rows: Indices) -> list[Design]
     options = np.column_stack(
         [np.array(order)[places[:, r]] for r, order in enumerate(tables.order)]
     )
-    clocks = [finished.clocks[place] for place in places[:, -1].tolist()]
-    return [Design(tuple(o), c) for o, c in zip(options.tolist(), clocks, strict=True)]
+    chosen = finished.labels.clocks[rows]
+    clocks = np.column_stack([np.array(own)[chosen[:, v]] for v, own in enumerate(finished.clocks)])
+    return [
+        Design(tuple(o), tuple(c)) for o, c in zip(options.tolist(), clocks.tolist(), strict=True)
+    ]
 
 
-def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
-    """Clock indices per vehicle, without clocks that another one of the vehicle replaces."""
-    useful = []
+def useful_clocks(problem: Problem) -> Iterator[tuple[int, ...]]:
+    """Clock places per vehicle, without clocks that another one of the vehicle replaces."""
     known = says_all(problem)
     for vehicle in problem.vehicles:
         order = sorted(range(len(vehicle.clocks)), key=lambda i: vehicle.clocks[i].id or "")
@@ -242,8 +231,7 @@ def clock_combinations(problem: Problem) -> Iterator[tuple[int, ...]]:
                 if j != i
             ):
                 kept.append(i)
-        useful.append(kept)
-    yield from itertools.product(*useful)
+        yield tuple(kept)
 
 
 def _replaces(one: ClockOption, other: ClockOption, earlier: bool, known: bool) -> bool:

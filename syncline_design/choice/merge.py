@@ -7,20 +7,23 @@ dominated partial designs are dropped on the way.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from syncline_design.choice.arrays import RoleArrays, Tables, tie_order
-from syncline_design.choice.labels import Addition, Labels, concatenate, extend, total_m, with_pair
+from syncline_design.choice.arrays import Scaled, Tables, tie_order
+from syncline_design.choice.labels import NOT_MET, Addition, Labels, concatenate, extend, total_m
 from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import Deadline
 from syncline_design.choice.pareto import Columns, Guard, undominated
 from syncline_design.choice.safety import Safety, TimingClass
-from syncline_design.choice.table import Problem, VehicleTable
+from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
+from syncline_design.choice.table import ClockOption, Problem, VehicleTable
 
+STEPS = 24  # of the staircases that bound what is still to come
 FEW = 64  # partial designs that are not worth comparing with one another
 
 
@@ -30,6 +33,13 @@ class Ceiling:
 
     amount: Column
     total: Floats
+
+    def reaches(self, amount: Floats, total: Floats) -> Bools:
+        """Whether these least figures come as low as every known design of no larger amount."""
+        known = self.amount.astype(np.float64)
+        place = np.searchsorted(known, amount * (1.0 - MARGIN), side="right") - 1
+        best = np.where(place >= 0, self.total[np.maximum(place, 0)], np.inf)
+        return np.asarray(total <= best * (1.0 + MARGIN))
 
 
 def lowered(ceiling: Ceiling | None, labels: Labels, total: Floats) -> Ceiling:
@@ -53,6 +63,11 @@ class StageRoles:
     reference: int | None
 
     @property
+    def first(self) -> int:
+        """Index of the first role decided in this stage."""
+        return (*self.leaves, self.last)[0]
+
+    @property
     def last(self) -> int:
         """Index of the last role decided in this stage."""
         return self.leaves[-1] if self.reference is None else self.reference
@@ -71,31 +86,30 @@ def stage_roles(problem: Problem) -> tuple[StageRoles, ...]:
 
 
 class Merge:
-    """Merging for one combination of clocks; `run` gives the complete designs that remain."""
+    """Merging of all roles; `run` gives the complete designs that remain.
+
+    useful: the clocks of each vehicle that no other one of it replaces, by place.
+    """
 
     def __init__(
         self,
         tables: Tables,
-        clocks: tuple[int, ...],
+        useful: Sequence[Sequence[int]],
         *,
         accuracy: bool,
         guarded: bool,
         ceiling: Ceiling | None,
     ) -> None:
         self.tables, self.problem, self.ceiling = tables, tables.problem, ceiling
-        self.clocks = [v.clocks[i] for v, i in zip(self.problem.vehicles, clocks, strict=True)]
-        self.offsets = tuple(clock.offset_bound_s for clock in self.clocks)
+        vehicles = self.problem.vehicles
+        self.clocks = [[v.clocks[i] for i in own] for v, own in zip(vehicles, useful, strict=True)]
         self.stages = stage_roles(self.problem)
         self.rates = {(p.role, p.reference): p.rate_mps for p in self.problem.pairs}
         self.rate = self.problem.sync_rate_mps
         self.per_sensor = self.problem.sync_model == "per_sensor"
         self.accuracy_m = self.problem.limits.accuracy_m if accuracy else None
-        self.error_after = _after([role.error.min() for role in tables.roles], 0.0)
-        self.resources_after = [
-            _after([role.resources[k].min() for role in tables.roles], 0)
-            for k in range(len(tables.keys))
-        ]
-        self.systematic_after = _after([(r.error - r.noise).min() for r in tables.roles], 0.0)
+        self.offsets = tuple(max(c.offset_bound_s for c in clocks) for clocks in self.clocks)
+        self.after = Remaining(tables, self.stages, self.clocks)
         self.safety = Safety(tables, self.offsets) if guarded else None
         self.capacity = _most_channels(tables)
 
@@ -103,15 +117,12 @@ class Merge:
         """Complete designs that no other one replaces; None when there is none."""
         labels = self._start()
         for number, stage in enumerate(self.stages):
-            parts = []
             complete = number == len(self.stages) - 1 and not self.tables.tracked
-            for timing in self._classes(stage):
-                deadline.check()
-                done = self._stage(labels, number, timing)
-                if len(done):
-                    parts.append(done)
-                    if complete and self.safety is None:
-                        self.ceiling = lowered(self.ceiling, done, total_m(self.problem, done))
+            parts = []
+            for done in self._ways(labels, number, deadline):
+                parts.append(done)
+                if complete and self.safety is None:
+                    self.ceiling = lowered(self.ceiling, done, total_m(self.problem, done))
             if not parts:
                 return None
             labels = concatenate(parts)
@@ -121,39 +132,72 @@ class Merge:
         mask = self._within_budgets(labels, len(self.problem.roles) - 1)
         return labels.take(mask)
 
-    def _start(self) -> Labels:
-        scales = (*self.tables.keys, *self.tables.ties)
-        sums = [
-            np.array([sum(s.whole(c.resources.of(s.name)) for c in self.clocks)], dtype=s.dtype)
-            for s in scales
-        ]
-        items = [self.problem.infrastructure[i].id for i in self.tables.tracked]
-        used = [
-            np.array([sum(n for name, n in clock.requires if name == item)])
-            for clock in self.clocks
-            for item in items
-        ]
-        zero, cut = np.zeros(1), len(self.tables.keys)
-        choice = np.zeros((1, 0), dtype=np.intp)
-        return Labels(
-            tuple(sums[:cut]),
-            tuple(sums[cut:]),
-            zero,
-            zero,
-            zero,
-            zero,
-            tuple(used),
-            choice,
-            zero,
-            zero > 0,
-        )
+    def _ways(self, labels: Labels, number: int, deadline: Deadline) -> Iterator[Labels]:
+        """Labels after one stage, for each clock of its vehicle and timing of its reference."""
+        stage = self.stages[number]
+        safety = self.safety
+        for place, clock in enumerate(self.clocks[stage.vehicle]):
+            group = self._on_clock(labels, number, place, clock)
+            offset = clock.offset_bound_s
+            self.offsets = (
+                *self.offsets[: stage.vehicle], offset, *self.offsets[stage.vehicle + 1 :]
+            )  # fmt: skip
+            self.safety = None if safety is None else safety.at(stage.vehicle, offset)
+            for timing in self._classes(stage, group):
+                deadline.check()
+                done = self._stage(group, number, timing)
+                if len(done):
+                    yield done
+        self.safety = safety
 
-    def _classes(self, stage: StageRoles) -> Iterator[TimingClass]:
-        """Distinct (tau, timeline) of the stage's reference; one empty class without one."""
+    def _on_clock(self, labels: Labels, number: int, place: int, clock: ClockOption) -> Labels:
+        """Labels whose vehicle has a clock: chosen now where this is the vehicle's first stage."""
+        vehicle = self.stages[number].vehicle
+        if any(stage.vehicle == vehicle for stage in self.stages[:number]):
+            return labels.take(labels.clocks[:, vehicle] == place)
+        clocks = labels.clocks.copy()
+        clocks[:, vehicle] = place
+        keys = self._charged(labels.resources, self.tables.keys, clock)
+        ties = self._charged(labels.ties, self.tables.ties, clock)
+        used = list(labels.used)
+        for k, item in enumerate(self.tables.tracked):
+            at = vehicle * len(self.tables.tracked) + k
+            name = self.problem.infrastructure[item].id
+            used[at] = used[at] + sum(n for one, n in clock.requires if one == name)
+        return replace(labels, resources=keys, ties=ties, used=tuple(used), clocks=clocks)
+
+    def _charged(
+        self, sums: tuple[Column, ...], scales: tuple[Scaled, ...], clock: ClockOption
+    ) -> tuple[Column, ...]:
+        """Sums with what a clock takes."""
+        each = [scale.whole(clock.resources.of(scale.name)) for scale in scales]
+        return tuple(np.asarray(own + one) for own, one in zip(sums, each, strict=True))
+
+    def _start(self) -> Labels:
+        nothing = [np.zeros(1, dtype=s.dtype) for s in (*self.tables.keys, *self.tables.ties)]
+        cut, vehicles = len(self.tables.keys), len(self.problem.vehicles)
+        used = [np.zeros(1, dtype=np.int64) for _ in range(vehicles * len(self.tables.tracked))]
+        zero, no_choice = np.zeros(1), np.zeros((1, 0), dtype=np.intp)
+        return Labels(
+            tuple(nothing[:cut]), tuple(nothing[cut:]), zero, zero, zero, NOT_MET, zero,
+            tuple(used), no_choice, np.zeros((1, vehicles), dtype=np.intp), zero, zero > 0,
+        )  # fmt: skip
+
+    def _classes(self, stage: StageRoles, labels: Labels) -> Iterator[TimingClass]:
+        """Classes of the stage's reference: one for each timeline while no pair has met yet.
+
+        Then every bound grows alike with the reference's (per_sensor: it only adds to a sum); else,
+        and where the sync limit is guarded, one for each tau too.  One empty class without any.
+        """
         if stage.reference is None:
             yield TimingClass(None, 0.0, False, np.zeros(0, dtype=np.intp))
             return
         role = self.tables.roles[stage.reference]
+        if self.safety is None and (self.per_sensor or not labels.bound.any()):
+            for host in sorted(set(role.host.tolist())):
+                rows = np.flatnonzero(role.host == host)
+                yield TimingClass(stage.reference, float(role.tau[rows].min()), host, rows, False)
+            return
         pairs = sorted(set(zip(role.tau.tolist(), role.host.tolist(), strict=True)))
         for tau, host in pairs:
             rows = np.flatnonzero((role.tau == tau) & (role.host == host))
@@ -165,52 +209,54 @@ class Merge:
         if before is not None and before.reference is not None:
             labels = self._chain(labels, before, stage, timing)
         for role in stage.leaves:
-            options = self.tables.roles[role]
-            bound = self._leaf_bound(role, options, stage, timing)
-            rate = self.rates.get((role, timing.role), 0.0)
             keep = partial(self._keep, role=role, timing=timing)
-            labels = extend(labels, Addition(options, bound, rate, self._used_at(stage)), keep)
+            labels = extend(labels, self._leaf(role, stage, timing), keep)
         if timing.role is None:
             return labels
         keep = partial(self._keep, role=timing.role, timing=timing)
+        rate = math.fsum(r for (_, reference), r in self.rates.items() if reference == timing.role)
         options = self.tables.roles[timing.role].take(timing.rows)
-        labels = extend(labels, Addition(options, None, 0.0, self._used_at(stage)), keep)
-        tau, host = np.full(len(labels), timing.tau_s), np.full(len(labels), timing.host)
-        return replace(labels, reference_tau=tau, reference_host=host)
+        added = Addition(options, rate, self._used_at(stage), reference=True)
+        return extend(labels, added, keep)
 
     def _chain(
         self, labels: Labels, before: StageRoles, stage: StageRoles, timing: TimingClass
     ) -> Labels:
-        """The pair of two stages' references meets."""
+        """The reference of the stage before is to meet that of this one."""
         rate = self.rates.get((before.reference or 0, timing.role))
         if rate is None:
             return labels
-        bound = labels.reference_tau + timing.tau_s
-        bound = bound + self._offset(labels.reference_host, before.vehicle, timing, stage.vehicle)
-        labels = with_pair(labels, bound, rate)
+        own = labels.clocks[:, before.vehicle]
+        offsets = np.array([c.offset_bound_s for c in self.clocks[before.vehicle]])[own]
+        meets = labels.reference_tau + self._offset(
+            labels.reference_host, offsets, before.vehicle, timing, stage.vehicle
+        )
+        labels = replace(labels, meets=meets, sync=labels.sync + rate * meets)
         return labels.take(self._keep(labels, role=before.last, timing=timing))
 
-    def _leaf_bound(
-        self, role: int, options: RoleArrays, stage: StageRoles, timing: TimingClass
-    ) -> Floats | None:
-        if (role, timing.role) not in self.rates:
-            return None
+    def _leaf(self, role: int, stage: StageRoles, timing: TimingClass) -> Addition:
+        options, used_at = self.tables.roles[role], self._used_at(stage)
+        rate = self.rates.get((role, timing.role))
+        if rate is None:
+            return Addition(options, 0.0, used_at)
+        own = np.array(self.offsets[stage.vehicle])
         if timing.role is None:
-            return np.asarray(options.tau + self._from_utc(options.host, stage.vehicle))
-        offset = self._offset(options.host, stage.vehicle, timing, stage.vehicle)
-        return np.asarray(options.tau + timing.tau_s + offset)
+            bound = np.asarray(options.tau + np.where(options.host, own, 0.0))
+            return Addition(options, rate, used_at, bound=bound)
+        offset = self._offset(options.host, own, stage.vehicle, timing, stage.vehicle)
+        return Addition(options, rate, used_at, meets=np.asarray(options.tau + offset))
 
-    def _offset(self, host: Bools, vehicle: int, timing: TimingClass, other: int) -> Floats:
-        """Offset between timelines: 0 on the same one, else both host clocks' against UTC."""
-        theirs = self.offsets[other] if timing.host else 0.0
-        offset = self._from_utc(host, vehicle) + theirs
+    def _offset(
+        self, host: Bools, own: Floats, vehicle: int, timing: TimingClass, other: int
+    ) -> Floats:
+        """Offset between timelines: 0 on the same one, else both host clocks' against UTC.
+
+        own: that of the first vehicle's clock.
+        """
+        offset = np.where(host, own, 0.0) + (self.offsets[other] if timing.host else 0.0)
         if vehicle == other:
             return np.where(host == timing.host, 0.0, offset)
         return np.where(host | timing.host, offset, 0.0)
-
-    def _from_utc(self, host: Bools, vehicle: int) -> Floats:
-        """Offset of timelines from UTC: the host clock's, or none."""
-        return np.where(host, self.offsets[vehicle], 0.0)
 
     def _used_at(self, stage: StageRoles) -> int:
         return stage.vehicle * len(self.tables.tracked)
@@ -235,70 +281,123 @@ class Merge:
 
     def _keep(self, labels: Labels, *, role: int, timing: TimingClass) -> Indices:
         """Rows worth going on with after a role is decided."""
-        mask = self._within_budgets(labels, role) & self._within_accuracy(labels, role)
+        bound = timing.met(labels, role)
+        mask = self._within_budgets(labels, role) & self._within_accuracy(labels, bound, role)
         if self.safety is not None:
-            mask &= self.safety.can_reach(labels, role)
+            mask &= self.safety.can_reach(labels, bound, role)
         rows = np.flatnonzero(mask)
-        if len(rows) < len(labels):
-            labels = labels.take(rows)
         if self.ceiling is not None and len(rows):
-            below = self._below_ceiling(labels, role)
-            rows, labels = rows[below], labels.take(below)
+            rows = rows[self._below_ceiling(labels.take(rows), bound[rows], role)]
         if len(rows) <= FEW:
             return rows
-        return rows[undominated(self._columns(labels, role, timing))]
+        if len(rows) < len(labels):
+            labels, bound = labels.take(rows), bound[rows]
+        return rows[undominated(self._columns(labels, bound, role, timing))]
 
-    def _columns(self, labels: Labels, role: int, timing: TimingClass) -> Columns:
-        total = labels.error + (labels.sync if self.per_sensor else self.rate * labels.bound)
-        used = [
+    def _columns(self, labels: Labels, bound: Floats, role: int, timing: TimingClass) -> Columns:
+        total = labels.error + (labels.sync if self.per_sensor else self.rate * bound)
+        few = [
             used > 0 if self.capacity[i] else used
             for i, used in enumerate(labels.used)
             if used.any()
         ]
+        if role == timing.role and not timing.single and role < len(self.problem.roles) - 1:
+            few.append(labels.reference_tau)  # the stage to come meets it
         guard = None
         if self.safety is not None:
-            safe = self.safety.safe(labels, role, timing)
-            guard = Guard(safe, labels.noise, labels.bound)
+            safe = self.safety.safe(labels, bound, role, timing)
+            guard = Guard(safe, labels.noise, bound)
         value, weak = labels.error, [total]
         if self.per_sensor or role == len(self.problem.roles) - 1:
             value, weak = total, []
         ties = tie_order(self.tables, labels.resources, labels.ties)
         unknown, silent = self.tables.has_unknown_ties, not self.tables.keys[0].known
-        return Columns((*labels.resources, value), [*weak, *used], ties, guard, unknown, silent)
+        return Columns((*labels.resources, value), [*weak, *few], ties, guard, unknown, silent)
 
     def _within_budgets(self, labels: Labels, role: int) -> Bools:
         mask = np.ones(len(labels), dtype=bool)
         for scale, sums, after in zip(
-            self.tables.keys, labels.resources, self.resources_after, strict=True
+            self.tables.keys, labels.resources, self.after.resources, strict=True
         ):
             budget = self.problem.limits.budget(scale.name)
             if budget is not None:
                 mask &= np.asarray(sums + after[role] <= scale.whole(budget), dtype=bool)
         return mask
 
-    def _least_total(self, labels: Labels, role: int) -> Floats:
-        caused = labels.sync if self.per_sensor else self.rate * labels.bound
-        error = labels.error + self.error_after[role]
-        if self.safety is not None:
-            systematic = labels.error - labels.noise + self.systematic_after[role]
-            error = np.maximum(error, self.safety.least_error(labels) + systematic)
-        return np.asarray(error + self.problem.fixed_error_m + caused)
+    def _caused(self, labels: Labels, bound: Floats) -> Floats:
+        """Sync error so far [m], with what every design has."""
+        caused = labels.sync if self.per_sensor else self.rate * bound
+        return np.asarray(caused + self.problem.fixed_error_m)
 
-    def _within_accuracy(self, labels: Labels, role: int) -> Bools:
+    def _demanded(self, labels: Labels, bound: Floats, role: int) -> Floats:
+        """Sensor and systematic error that the bound demands of any completion [m]."""
+        if self.safety is None:
+            return labels.error
+        systematic = labels.error - labels.noise + self.after.systematic[role]
+        return np.asarray(self.safety.least_error(bound) + systematic)
+
+    def _within_accuracy(self, labels: Labels, bound: Floats, role: int) -> Bools:
         if self.accuracy_m is None:
             return np.ones(len(labels), dtype=bool)
-        return np.asarray(self._least_total(labels, role) <= self.accuracy_m * (1.0 + MARGIN))
+        error = np.maximum(
+            labels.error + self.after.error[role], self._demanded(labels, bound, role)
+        )
+        total = error + self._caused(labels, bound)
+        return np.asarray(total <= self.accuracy_m * (1.0 + MARGIN))
 
-    def _below_ceiling(self, labels: Labels, role: int) -> Bools:
-        """Labels that may still end cheaper or more accurate than every known design."""
+    def _below_ceiling(self, labels: Labels, bound: Floats, role: int) -> Bools:
+        """Labels that may still end cheaper or more accurate than every known design.
+
+        Whatever the roles still to come are, they add no less than some step of their staircase.
+        """
         assert self.ceiling is not None
-        amounts = labels.resources[0] + self.resources_after[0][role]
-        place = np.searchsorted(self.ceiling.amount, amounts, side="right") - 1
-        best = np.where(place >= 0, self.ceiling.total[np.maximum(place, 0)], np.inf)
-        return np.asarray(self._least_total(labels, role) <= best * (1.0 + MARGIN))
+        out = np.zeros(len(labels), dtype=bool)
+        left = np.arange(len(labels))
+        amount, error = labels.resources[0].astype(np.float64), labels.error
+        demanded, caused = self._demanded(labels, bound, role), self._caused(labels, bound)
+        steps = self.after.steps[role]
+        for more, adds in zip(steps.amount.tolist(), steps.error.tolist(), strict=True):
+            total = np.maximum(error[left] + adds, demanded[left]) + caused[left]
+            below = self.ceiling.reaches(amount[left] + more, total)
+            out[left[below]] = True
+            left = left[~below]
+            if not len(left):
+                break
+        return out
 
 
-def _after(least: list[float], zero: float) -> list[float]:
+class Remaining:
+    """What the roles still to come add at least, after each role."""
+
+    def __init__(
+        self,
+        tables: Tables,
+        stages: Sequence[StageRoles],
+        clocks: Sequence[Sequence[ClockOption]],
+    ) -> None:
+        roles = tables.roles
+        first = [min(s.first for s in stages if s.vehicle == v) for v in range(len(clocks))]
+        self.resources = []
+        for k, scale in enumerate(tables.keys):
+            each = [role.resources[k].min() for role in roles]
+            for own, r in zip(clocks, first, strict=True):  # chosen just before that role
+                each[r] = each[r] + min(scale.whole(c.resources.of(scale.name)) for c in own)
+            self.resources.append(_after(each, 0))
+        self.error = _after([role.error.min() for role in roles], 0.0)
+        self.systematic = _after([(role.error - role.noise).min() for role in roles], 0.0)
+        self.steps = [NO_ROLES]
+        for r in range(len(roles) - 1, 0, -1):
+            amount = roles[r].resources[0].astype(np.float64)
+            here = stairs(amount, roles[r].error, STEPS)
+            if r in first:
+                own = clocks[first.index(r)]
+                scale = tables.keys[0]
+                least = min(scale.whole(c.resources.of(scale.name)) for c in own)
+                here = Stairs(here.amount + float(least), here.error)
+            self.steps.insert(0, here.beside(self.steps[0], STEPS))
+
+
+def _after(least: list[Any], zero: float) -> list[Any]:
     """For each role the sum of what the later roles add at least."""
     out = [zero]
     for value in reversed(least[1:]):

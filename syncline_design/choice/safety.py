@@ -8,6 +8,7 @@ rate * tau - limit * e still leaves it true.
 
 from __future__ import annotations
 
+import copy
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,16 +21,26 @@ from syncline_design.choice.table import Pair
 
 @dataclass(frozen=True, slots=True)
 class TimingClass:
-    """Options of a reference role that share tau and timeline; role None: no reference."""
+    """Options of a reference role that share a timeline, and tau where single; role None: none.
+
+    tau_s: the least of their bounds [s].
+    """
 
     role: int | None
     tau_s: float
     host: bool
     rows: Indices
+    single: bool = True
+
+    def met(self, labels: Labels, role: int) -> Floats:
+        """Largest pair bound of each label [s], as the reference at best completes it."""
+        if self.role is None or role >= self.role:
+            return labels.bound
+        return np.maximum(labels.bound, labels.meets + self.tau_s)
 
 
 class Safety:
-    """Thresholds of the system's sync constraint for one combination of clocks."""
+    """Thresholds of the system's sync constraint; offsets: the largest of each vehicle's clocks."""
 
     def __init__(self, tables: Tables, offsets: tuple[float, ...]) -> None:
         problem = tables.problem
@@ -43,19 +54,25 @@ class Safety:
             float((self.rate * role.tau - self.limit * role.noise).max()) for role in tables.roles
         ]
 
-    def least_error(self, labels: Labels) -> Floats:
-        """The sensor error that a label's largest bound already demands [m]."""
-        return np.asarray(self.rate * labels.bound / self.limit * (1.0 - MARGIN))
+    def at(self, vehicle: int, offset_s: float) -> Safety:
+        """The same once the clock of a vehicle is chosen."""
+        out = copy.copy(self)
+        out.offsets = (*self.offsets[:vehicle], offset_s, *self.offsets[vehicle + 1 :])
+        return out
 
-    def can_reach(self, labels: Labels, role: int) -> Bools:
+    def least_error(self, bound: Floats) -> Floats:
+        """The sensor error that a largest bound already demands [m]."""
+        return np.asarray(self.rate * bound / self.limit * (1.0 - MARGIN))
+
+    def can_reach(self, labels: Labels, bound: Floats, role: int) -> Bools:
         """Labels that some completion could still lead above the bound."""
         most = labels.noise + self.most_after[role]
-        return np.asarray(self.limit * most * (1.0 + MARGIN) > self.rate * labels.bound)
+        return np.asarray(self.limit * most * (1.0 + MARGIN) > self.rate * bound)
 
-    def safe(self, labels: Labels, role: int, timing: TimingClass) -> Bools:
+    def safe(self, labels: Labels, bound: Floats, role: int, timing: TimingClass) -> Bools:
         """Labels that satisfy the constraint whatever follows."""
         ends = labels.noise + self.least_after[role]
-        own = self.limit * ends * (1.0 - MARGIN) > self.rate * labels.bound
+        own = self.limit * ends * (1.0 - MARGIN) > self.rate * bound
         return np.asarray(own & (labels.noise > self.threshold(role, timing)))
 
     def threshold(self, role: int, timing: TimingClass) -> float:
