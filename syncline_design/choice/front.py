@@ -19,6 +19,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import partial
 
 import numpy as np
 
@@ -32,13 +33,15 @@ from syncline_design.choice.evaluate import (
     total_error_m,
 )
 from syncline_design.choice.labels import Labels, total_m
-from syncline_design.choice.merge import Ceiling, Merge
+from syncline_design.choice.merge import Ceiling, Merge, lowered
 from syncline_design.choice.narrowed import says_all, stated
 from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, ResourceName
 from syncline_design.choice.outcome import Deadline, FrontPoint, PriceStep, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.table import ClockOption, Design, Problem, is_empty
 from syncline_design.machine.deadline import in_force, within
+
+ROUGH = 100  # partial designs that a first pass goes on with, to know what the others must beat
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,17 +172,28 @@ def _merge_all(
 ) -> _Finished:
     """Complete designs with every clock that may matter, the front of them."""
     useful = tuple(useful_clocks(tables.problem))
-    merge = Merge(tables, useful, accuracy=accuracy, guarded=guarded, ceiling=ceiling)
-    labels = merge.run(deadline)
-    if labels is None or not len(labels):
-        return _Finished(_no_labels(len(tables.keys)), np.zeros(0), useful)
-    finished = _Finished(labels, total_m(tables.problem, labels), useful)
-    if guarded:
-        finished = finished.take(np.flatnonzero(_hold_sync(tables, finished)))
+    merge = partial(Merge, tables, useful, accuracy=accuracy, guarded=guarded)
+    if guarded or len(merge(ceiling=None).stages) > 2 or any(len(own) > 1 for own in useful):
+        rough = _complete(tables, useful, merge(ceiling=ceiling, most=ROUGH).run(deadline), guarded)
+        if len(rough.total):
+            ceiling = lowered(ceiling, rough.labels, rough.total)
+    finished = _complete(tables, useful, merge(ceiling=ceiling).run(deadline), guarded)
+    if not len(finished.total):
+        return finished
     labels, total = finished.labels, finished.total
     ties = tie_order(tables, labels.resources, labels.ties)
     finished = finished.take(undominated(Columns((labels.resources[0], total), tie=ties)))
     return finished.take(np.argsort(-finished.total, kind="stable"))
+
+
+def _complete(
+    tables: Tables, useful: tuple[tuple[int, ...], ...], labels: Labels | None, guarded: bool
+) -> _Finished:
+    """Complete designs with their totals; guarded: those that keep the system's sync limit."""
+    if labels is None:
+        return _Finished(_no_labels(len(tables.keys)), np.zeros(0), useful)
+    finished = _Finished(labels, total_m(tables.problem, labels), useful)
+    return finished.take(np.flatnonzero(_hold_sync(tables, finished))) if guarded else finished
 
 
 def _no_labels(keys: int) -> Labels:

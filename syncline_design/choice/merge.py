@@ -23,7 +23,7 @@ from syncline_design.choice.safety import Safety, TimingClass
 from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
 from syncline_design.choice.table import ClockOption, Problem, VehicleTable
 
-STEPS = 24  # of the staircases that bound what is still to come
+STEPS = 64  # of the staircases that bound what is still to come
 FEW = 64  # partial designs that are not worth comparing with one another
 
 
@@ -88,7 +88,9 @@ def stage_roles(problem: Problem) -> tuple[StageRoles, ...]:
 class Merge:
     """Merging of all roles; `run` gives the complete designs that remain.
 
-    useful: the clocks of each vehicle that no other one of it replaces, by place.
+    useful: the clocks of each vehicle that no other one of it replaces, by place.  most: partial
+    designs that are gone on with after each step, spread over their amounts; then what remains are
+    designs, but not the best ones.
     """
 
     def __init__(
@@ -99,7 +101,9 @@ class Merge:
         accuracy: bool,
         guarded: bool,
         ceiling: Ceiling | None,
+        most: int | None = None,
     ) -> None:
+        self.most = most
         self.tables, self.problem, self.ceiling = tables, tables.problem, ceiling
         vehicles = self.problem.vehicles
         self.clocks = [[v.clocks[i] for i in own] for v, own in zip(vehicles, useful, strict=True)]
@@ -129,15 +133,29 @@ class Merge:
             vehicle = self.problem.vehicles[stage.vehicle]
             if self.problem.roles[stage.last].stage == max(vehicle.stages):
                 labels = self._buy(labels, stage.vehicle)
+                if number < len(self.stages) - 1 and len(parts) > 1:
+                    labels = self._left_behind(labels, stage)
         mask = self._within_budgets(labels, len(self.problem.roles) - 1)
         return labels.take(mask)
+
+    def _left_behind(self, labels: Labels, stage: StageRoles) -> Labels:
+        """Labels whose vehicle no later stage is on: only how far its reference is off UTC counts.
+
+        To the other vehicles' timelines the offset of its clock is as good as timestamp error.
+        """
+        own = labels.clocks[:, stage.vehicle]
+        offsets = np.array([c.offset_bound_s for c in self.clocks[stage.vehicle]])[own]
+        tau = labels.reference_tau + np.where(labels.reference_host, offsets, 0.0)
+        labels = replace(labels, reference_tau=tau, reference_host=np.zeros(len(tau), dtype=bool))
+        timing = TimingClass(stage.last, 0.0, False, np.zeros(0, dtype=np.intp), single=False)
+        return labels.take(self._keep(labels, role=stage.last, timing=timing))
 
     def _ways(self, labels: Labels, number: int, deadline: Deadline) -> Iterator[Labels]:
         """Labels after one stage, for each clock of its vehicle and timing of its reference."""
         stage = self.stages[number]
         safety = self.safety
         for place, clock in enumerate(self.clocks[stage.vehicle]):
-            group = self._on_clock(labels, number, place, clock)
+            group = self._on_clock(labels, number, place)
             offset = clock.offset_bound_s
             self.offsets = (
                 *self.offsets[: stage.vehicle], offset, *self.offsets[stage.vehicle + 1 :]
@@ -145,18 +163,27 @@ class Merge:
             self.safety = None if safety is None else safety.at(stage.vehicle, offset)
             for timing in self._classes(stage, group):
                 deadline.check()
-                done = self._stage(group, number, timing)
+                done = self._stage(group, number, timing, clock)
                 if len(done):
                     yield done
         self.safety = safety
 
-    def _on_clock(self, labels: Labels, number: int, place: int, clock: ClockOption) -> Labels:
+    def _on_clock(self, labels: Labels, number: int, place: int) -> Labels:
         """Labels whose vehicle has a clock: chosen now where this is the vehicle's first stage."""
         vehicle = self.stages[number].vehicle
-        if any(stage.vehicle == vehicle for stage in self.stages[:number]):
+        if not self._is_first(number):
             return labels.take(labels.clocks[:, vehicle] == place)
         clocks = labels.clocks.copy()
         clocks[:, vehicle] = place
+        return replace(labels, clocks=clocks)
+
+    def _is_first(self, number: int) -> bool:
+        """Whether a stage is the first of its vehicle."""
+        before = [stage.vehicle for stage in self.stages[:number]]
+        return self.stages[number].vehicle not in before
+
+    def _with_clock(self, labels: Labels, vehicle: int, clock: ClockOption) -> Labels:
+        """Labels with what a vehicle's clock takes."""
         keys = self._charged(labels.resources, self.tables.keys, clock)
         ties = self._charged(labels.ties, self.tables.ties, clock)
         used = list(labels.used)
@@ -164,7 +191,7 @@ class Merge:
             at = vehicle * len(self.tables.tracked) + k
             name = self.problem.infrastructure[item].id
             used[at] = used[at] + sum(n for one, n in clock.requires if one == name)
-        return replace(labels, resources=keys, ties=ties, used=tuple(used), clocks=clocks)
+        return replace(labels, resources=keys, ties=ties, used=tuple(used))
 
     def _charged(
         self, sums: tuple[Column, ...], scales: tuple[Scaled, ...], clock: ClockOption
@@ -203,11 +230,15 @@ class Merge:
             rows = np.flatnonzero((role.tau == tau) & (role.host == host))
             yield TimingClass(stage.reference, tau, host, rows)
 
-    def _stage(self, labels: Labels, number: int, timing: TimingClass) -> Labels:
+    def _stage(
+        self, labels: Labels, number: int, timing: TimingClass, clock: ClockOption
+    ) -> Labels:
         """Labels after one stage whose reference has this timing."""
         stage, before = self.stages[number], self.stages[number - 1] if number else None
         if before is not None and before.reference is not None:
             labels = self._chain(labels, before, stage, timing)
+        if self._is_first(number):
+            labels = self._with_clock(labels, stage.vehicle, clock)
         for role in stage.leaves:
             keep = partial(self._keep, role=role, timing=timing)
             labels = extend(labels, self._leaf(role, stage, timing), keep)
@@ -292,7 +323,12 @@ class Merge:
             return rows
         if len(rows) < len(labels):
             labels, bound = labels.take(rows), bound[rows]
-        return rows[undominated(self._columns(labels, bound, role, timing))]
+        kept = undominated(self._columns(labels, bound, role, timing))
+        if self.most is not None and len(kept) > self.most:
+            kept = kept[np.argsort(labels.resources[0][kept], kind="stable")]
+            spread = np.linspace(0, len(kept) - 1, self.most).astype(np.intp)
+            kept = np.sort(kept[spread])
+        return rows[kept]
 
     def _columns(self, labels: Labels, bound: Floats, role: int, timing: TimingClass) -> Columns:
         total = labels.error + (labels.sync if self.per_sensor else self.rate * bound)
@@ -387,12 +423,11 @@ class Remaining:
         self.systematic = _after([(role.error - role.noise).min() for role in roles], 0.0)
         self.steps = [NO_ROLES]
         for r in range(len(roles) - 1, 0, -1):
-            amount = roles[r].resources[0].astype(np.float64)
-            here = stairs(amount, roles[r].error, STEPS)
+            here = stairs(roles[r].resources[0].astype(np.float64), roles[r].error, STEPS)
             if r in first:
-                own = clocks[first.index(r)]
                 scale = tables.keys[0]
-                least = min(scale.whole(c.resources.of(scale.name)) for c in own)
+                offered = clocks[first.index(r)]
+                least = min(scale.whole(c.resources.of(scale.name)) for c in offered)
                 here = Stairs(here.amount + float(least), here.error)
             self.steps.insert(0, here.beside(self.steps[0], STEPS))
 
