@@ -16,7 +16,7 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choice.evaluate import broken, evaluate, known_or_more
-from syncline_design.choice.narrowed import Narrowed, narrowed
+from syncline_design.choice.narrowed import Narrowed, narrowed, whole_of
 from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, Options, ResourceName
 from syncline_design.choice.partition import best_of
 from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
@@ -162,8 +162,7 @@ def best_from(problem: Problem, design: Design | None, beside: Beside) -> Design
     in_force().check()
     known = None if design is None else Known.of(problem, design)
     if known is None:
-        whole = [np.arange(len(table.options)) for table in problem.roles]
-        return best_of(narrowed(problem, whole, _every_clock(problem)), in_force())
+        return best_of(whole_of(problem), in_force())
     left = core(problem, known, beside)
     if left.problem.combinations == 1:
         return known.design

@@ -117,7 +117,7 @@ def best_by_front(problem: Problem, deadline: Deadline) -> Design | None:
     points = merged_front(problem, resource, accuracy=True, deadline=deadline)
     if not points:
         return None
-    ordered = points[::-1] if problem.objective == "error" else points
+    ordered = reversed(points) if problem.objective == "error" else points
     picked = next(
         (p.design for p in ordered if not broken(problem, evaluate(problem, p.design))), None
     )

@@ -20,6 +20,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import partial
+from typing import overload
 
 import numpy as np
 
@@ -34,13 +35,14 @@ from syncline_design.choice.evaluate import (
 )
 from syncline_design.choice.labels import Labels, total_m
 from syncline_design.choice.merge import Ceiling, Merge, lowered
-from syncline_design.choice.narrowed import says_all, stated
-from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, ResourceName
+from syncline_design.choice.narrowed import Narrowed, says_all, stated, whole_of
+from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices, ResourceName
 from syncline_design.choice.outcome import Deadline, FrontPoint, PriceStep, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.table import ClockOption, Design, Problem, is_empty
 from syncline_design.machine.deadline import in_force, within
 
+APART = 3e-11  # errors that differ by a larger share differ in their 12 figures
 ROUGH = 100  # partial designs that a first pass goes on with, to know what the others must beat
 
 
@@ -57,7 +59,7 @@ class _Finished:
         return _Finished(self.labels.take(rows), self.total[rows], self.clocks)
 
 
-def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint, ...]:
+def front(problem: Problem, resource: ResourceName = "cost") -> Sequence[FrontPoint]:
     """The exact front of a resource against error, over designs that meet all but accuracy.
 
     By rising amount and falling error; errors that agree to 12 figures count as equal.  What does
@@ -71,6 +73,8 @@ def front(problem: Problem, resource: ResourceName = "cost") -> tuple[FrontPoint
         from syncline_design.choice.simulated_front import accepted_front
 
         points = accepted_front(priced.problem, resource, points)
+    if isinstance(points, Points):
+        return replace(points, part=priced)
     return tuple(replace(point, design=priced.whole(point.design)) for point in points)
 
 
@@ -100,7 +104,7 @@ def merged_front(
     *,
     accuracy: bool,
     deadline: Deadline | None = None,
-) -> tuple[FrontPoint, ...]:
+) -> Sequence[FrontPoint]:
     """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12)."""
     demand_structure(problem)
     if is_empty(problem):
@@ -111,19 +115,19 @@ def merged_front(
 
 def _merged(
     problem: Problem, resource: ResourceName, accuracy: bool, end: Deadline
-) -> tuple[FrontPoint, ...]:
+) -> Sequence[FrontPoint]:
     tables = _one_timeline(tabulate(problem, resource))
     relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=None)
     holds = _hold_sync(tables, relaxed)
-    points = _points(tables, relaxed, holds)
+    held = relaxed.take(np.flatnonzero(holds))
     if bool(holds.all()):
-        return points
+        return _points(tables, [held]) if len(held.total) else ()
     ceiling = None
     if bool(holds.any()):
-        ceiling = Ceiling(relaxed.labels.resources[0][holds], relaxed.total[holds])
+        ceiling = lowered(None, held.labels, held.total)
     guarded = _merge_all(tables, accuracy, end, guarded=True, ceiling=ceiling)
-    found = _points(tables, guarded, np.ones(len(guarded.total), dtype=bool))
-    return _joined([*points, *found], problem)
+    parts = [part for part in (held, guarded) if len(part.total)]
+    return _points(tables, parts) if parts else ()
 
 
 def _reduced(tables: Tables) -> Tables:
@@ -263,17 +267,69 @@ def _replaces(one: ClockOption, other: ClockOption, earlier: bool, known: bool) 
     return (known and ours != theirs) or earlier
 
 
-def _points(tables: Tables, finished: _Finished, rows: Bools) -> tuple[FrontPoint, ...]:
-    """Front points of complete designs, by rising amount; errors exact, rounded once."""
-    kept = np.flatnonzero(rows)
-    designs = _designs(tables, finished, kept)
-    errors = [total_error_m(tables.problem, design) for design in designs]
-    bottom = tables.keys[0].denominator
-    amounts = [
-        a if math.isinf(a) else Fraction(a, bottom)
-        for a in finished.labels.resources[0][kept].tolist()
-    ]
-    return _joined(list(map(FrontPoint, amounts, errors, designs)), tables.problem)
+@dataclass(frozen=True, slots=True, eq=False)
+class Points(Sequence[FrontPoint]):
+    """A front by columns; a point, its error exact and rounded once, where it is asked for.
+
+    part: what the columns' places refer to.
+    """
+
+    part: Narrowed
+    amount: Column
+    denominator: int
+    options: Column
+    clocks: Column
+
+    def __len__(self) -> int:
+        return len(self.amount)
+
+    @overload
+    def __getitem__(self, place: int) -> FrontPoint: ...
+    @overload
+    def __getitem__(self, place: slice) -> tuple[FrontPoint, ...]: ...
+    def __getitem__(self, place: int | slice) -> FrontPoint | tuple[FrontPoint, ...]:
+        if isinstance(place, slice):
+            return tuple(self[i] for i in range(*place.indices(len(self))))
+        if not -len(self) <= place < len(self):
+            raise IndexError(place)
+        amount = self.amount[place]
+        design = Design(tuple(self.options[place].tolist()), tuple(self.clocks[place].tolist()))
+        error = total_error_m(self.part.problem, design)
+        exact = math.inf if amount == math.inf else Fraction(int(amount), self.denominator)
+        return FrontPoint(exact, error, self.part.whole(design))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and tuple(self) == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+
+def _points(tables: Tables, parts: Sequence[_Finished]) -> Sequence[FrontPoint]:
+    """Complete designs as one front, by rising amount and falling error.
+
+    Where two of them come so close that floats do not tell which is the better, all are compared
+    exactly.
+    """
+    labels = [part.labels for part in parts]
+    amount = np.concatenate([one.resources[0] for one in labels])
+    total = np.concatenate([part.total for part in parts])
+    places = np.concatenate([one.choice for one in labels])
+    options = np.column_stack([order[places[:, r]] for r, order in enumerate(tables.order)])
+    chosen = np.concatenate([one.clocks for one in labels])
+    clocks = np.column_stack([np.array(own)[chosen[:, v]] for v, own in enumerate(parts[0].clocks)])
+    if len(parts) > 1:  # both may have found the same
+        _, rows = np.unique(np.column_stack([options, clocks]), axis=0, return_index=True)
+    else:
+        rows = np.arange(len(total))
+    rows = rows[np.lexsort((total[rows], amount[rows]))]
+    lowest = np.append(np.inf, np.minimum.accumulate(total[rows])[:-1])
+    lower, higher = (total[rows] < lowest * (1.0 - APART), total[rows] > lowest * (1.0 + APART))
+    clear = bool(np.all(lower | higher))
+    rows = rows[lower] if clear else rows
+    whole = whole_of(tables.problem)
+    points = Points(whole, amount[rows], tables.keys[0].denominator, options[rows], clocks[rows])
+    return points if clear else _joined(list(points), tables.problem)
 
 
 def _joined(points: list[FrontPoint], problem: Problem) -> tuple[FrontPoint, ...]:

@@ -49,6 +49,15 @@ def narrowed(
     return Narrowed(smaller, tuple(options), tuple(map(tuple, clocks)))
 
 
+def whole_of(problem: Problem) -> Narrowed:
+    """The whole problem."""
+    return narrowed(
+        problem,
+        [np.arange(len(table.options)) for table in problem.roles],
+        [range(len(table.clocks)) for table in problem.vehicles],
+    )
+
+
 def _part(table: RoleTable, places: Indices) -> RoleTable:
     return replace(table, options=table.options.take(places))
 

@@ -73,10 +73,8 @@ def best_of(part: Narrowed, deadline: Deadline) -> Design | None:
         return None
     problem = part.problem
     resource: ResourceName = "cost" if problem.objective == "error" else problem.objective
-    points = list(merged_front(problem, resource, accuracy=True, deadline=deadline))
-    if problem.objective == "error":
-        points.reverse()
-    for point in points:
+    points = merged_front(problem, resource, accuracy=True, deadline=deadline)
+    for point in reversed(points) if problem.objective == "error" else points:
         if not broken(problem, evaluate(problem, point.design)):
             return part.whole(point.design)
     return None

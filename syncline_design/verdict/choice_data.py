@@ -52,7 +52,7 @@ def choice_of(
         return (d for d in best(problem, NEXT_BEST + 1, every=every) if d != chosen)
 
     if points is None:
-        points = pieces.made("front", lambda: front(problem), nothing)
+        points = pieces.made("front", lambda: tuple(front(problem)), nothing)
     following = pieces.listed("next best designs", lambda: others(every=False))
     ranked = pieces.listed("next best of every design", lambda: others(every=True))
     excluded, count = ruled_out(problem)

@@ -261,7 +261,7 @@ def _points(problem: Problem, settings: OptimizeSettings, pieces: Pieces) -> tup
     nothing: tuple[FrontPoint, ...] = ()
     if not settings.pareto:
         return nothing
-    return pieces.made("front", lambda: front(problem, settings.resource), nothing)
+    return pieces.made("front", lambda: tuple(front(problem, settings.resource)), nothing)
 
 
 def _front(
