@@ -121,7 +121,7 @@ def simulate(
 
 def diagnose(
     spec: SpecOrPath, logs: str | Path | Sequence[str | Path] = (), *, seed: int = 0,
-    false_alarm_rate: float = 0.05, max_effects: int = 4, time_limit_s: float | None = None,
+    false_alarm_rate: float = 0.05, max_effects: int = 8, time_limit_s: float | None = None,
 ) -> DiagnosisAndDesign:  # fmt: skip
     """Where measured logs disagree with a spec, what is missing in it, what that means for it.
 

@@ -286,7 +286,7 @@ def test_splines_stop_at_gaps_and_hold_beyond_ends() -> None:
     time_s = np.concatenate([np.arange(0, 5, 0.1), np.arange(20, 25, 0.1)])
     series = np.stack([np.sin(time_s), np.cos(time_s), time_s], axis=1)
     made = pieces(time_s, series)
-    assert len(made.splines) == 2
+    assert len(made.starts) == 2
     inside = made.integral(time_s[5:40], time_s[5:40] + 0.25, time_s[5:40])
     exact = np.cos(time_s[5:40]) - np.cos(time_s[5:40] + 0.25)
     assert inside[:, 0] == pytest.approx(exact, abs=1e-6)

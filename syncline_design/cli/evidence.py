@@ -90,7 +90,7 @@ def diagnose(
     ] = 0.05,
     max_effects: Annotated[
         int, typer.Option(min=0, max=MOST_EFFECTS, help="Effects named at most.")
-    ] = 4,
+    ] = 8,
     time_limit: TimeLimitOption = None,
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""

@@ -66,10 +66,10 @@ class Precision:
         weighted: Array = self.white_inverse @ series
         if self.loading.shape[2] == 0:
             return weighted
-        inside: Array = self.loading @ self._states(weighted)
+        inside: Array = self.loading @ self.states(weighted)
         return weighted - self.white_inverse @ inside
 
-    def _states(self, weighted: Array) -> Array:
+    def states(self, weighted: Array) -> Array:
         """P^-1 B' Sigma^-1 Y at every row, (n, m, c)."""
         m, c = self.loading.shape[2], weighted.shape[2]
         right = np.swapaxes(self.loading, 1, 2) @ weighted
@@ -83,7 +83,7 @@ class Precision:
         """B x of the lasting processes, x their posterior mean given the series (n, 3); (n, 3)."""
         if not np.any(self.slow):
             return np.zeros_like(error)
-        states = self._states(self.white_inverse @ error[:, :, None])
+        states = self.states(self.white_inverse @ error[:, :, None])
         slow: Array = (self.loading[:, :, self.slow] @ states[:, self.slow])[:, :, 0]
         return slow
 

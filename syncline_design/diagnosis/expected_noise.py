@@ -47,8 +47,7 @@ def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
             covariance = loading @ np.swapaxes(loading, 1, 2)
             white.append(White((stage.name, role), covariance, None if own else loading))
             stamped += _timing_scatter(rows, role, sensor)
-            if role != "ranging":
-                slow.append(Slow((stage.name, role), slopes * wandering, True))
+            slow.append(Slow((stage.name, role), slopes * wandering, True))
     stamped += _known_scatter(view)
     kept = tuple(s for s in slow if _matters(s, white))
     common, negligible = _split_small(stamped, white)
@@ -182,3 +181,21 @@ def _unknown(view: Scene) -> Array:
     """Components without a known truth count for nothing."""
     variance = np.where(np.isnan(view.log.truth_m), UNKNOWN_VARIANCE_M2, 0.0)
     return variance[:, :, None] * np.eye(3)
+
+
+def channels(view: Scene) -> list[tuple[tuple[str, str], Array]]:
+    """What one standard deviation of every reading does to the error [m], (n, 3, 3) a sensor."""
+    found = []
+    for index, stage in enumerate(view.system.stages):
+        rows = view.rows[index]
+        parts = {
+            "position": (stage.position, _position(rows)),
+            "attitude": (stage.attitude, _attitude(rows)),
+            "ranging": (stage.ranging, _ranging(rows)),
+        }
+        for role, (sensor, slopes) in parts.items():
+            if sensor is None or (role != "position" and view.log.kind == "position"):
+                continue
+            _, wandering = _sizes(view, index, role, sensor)
+            found.append(((stage.name, role), slopes * wandering))
+    return found

@@ -8,26 +8,39 @@ from dataclasses import replace
 
 import numpy as np
 
+from syncline_design.diagnosis.consequence import Weights, rms_m
 from syncline_design.diagnosis.fitting import Data, Model, Opened
 from syncline_design.diagnosis.gross import Gross
 from syncline_design.diagnosis.identify import Alias, Comparison
-from syncline_design.diagnosis.noise import NoiseLevel, precision
+from syncline_design.diagnosis.noise import (
+    NoiseLevel,
+    clipped,
+    marginal_variance,
+    precision,
+    spec_bounds,
+)
 from syncline_design.diagnosis.result import Estimate, Finding, Rival
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.effects.record import Effect
+from syncline_design.model.known import EffectEntry
 from syncline_design.model.quantity import format_estimate
 
 Label = tuple[str, str, int]
 Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
+MOST_NATS = 300.0
 NOT_SEEN = "(not seen)"
 
 
 def estimate(
-    value: float | str, spread: float | None = None, unit: str = "", seen: bool = True
+    value: float | str,
+    spread: float | None = None,
+    unit: str = "",
+    seen: bool = True,
+    interval95: tuple[float, float] | None = None,
 ) -> Estimate:
     """A parameter with the text that every output prints."""
     text = (
@@ -37,7 +50,7 @@ def estimate(
         if seen
         else NOT_SEEN
     )
-    return Estimate(value, spread, unit, seen, text)
+    return Estimate(value, spread, unit, seen, text, interval95)
 
 
 def finding(
@@ -49,6 +62,8 @@ def finding(
     gain_nat: float,
     log10_p: float | None = None,
     rivals: Rivals = ((), (), ()),
+    material: bool = True,
+    size_m: float | None = None,
 ) -> Finding:
     """A missing effect in words; rivals: aliases, lookalikes, excluded."""
     shown = {name: one.text for name, one in parameters.items()}
@@ -66,15 +81,51 @@ def finding(
         confused_with=effect.confused_with,
         separated_by=effect.separated_by,
         source=effect.source,
+        kind="noise" if is_noise(effect) else "cause",
+        material=material,
+        size_m=size_m,
+        probability=_probability(rivals[0]) if rivals[0] else None,
     )
 
 
-def findings(final: Settled, gross: Sequence[Gross]) -> tuple[Finding, ...]:
-    """All findings, gross faults first, then by what leaving them out would cost."""
-    found = [_deterministic(final, k) for k in _single(final.model)]
-    found += [_stochastic(final, o) for o in final.model.opened]
-    found.sort(key=lambda f: -f.gain_nat)
+def is_noise(effect: Effect) -> bool:
+    """Whether an effect says how a sensor's own noise differs from the spec's."""
+    return effect.kind == "stochastic" and effect.opens != "size"
+
+
+def _probability(aliases: Sequence[Rival]) -> float:
+    return 1.0 / (1.0 + sum(_odds(one) for one in aliases))
+
+
+def _odds(alias: Rival) -> float:
+    """Posterior odds of an alias against the named effect, by what each fits and pays."""
+    return math.exp(-min(max(alias.nats_worse, -MOST_NATS), MOST_NATS))
+
+
+def findings(
+    final: Settled, gross: Sequence[Gross], weights: Weights, refuted: bool = False
+) -> tuple[Finding, ...]:
+    """All findings: gross faults, material ones, causes before noise, by what they explain.
+
+    refuted: what is left is no noise, so no chance is stated: it would rest on that noise.
+    """
+    found = [_deterministic(final, k, weights) for k in _single(final.model)]
+    found += [_stochastic(final, o, weights) for o in final.model.opened]
+    if refuted:
+        found = [_without_chance(one) for one in found]
+    found.sort(key=lambda f: (not f.material, f.kind == "noise", -f.gain_nat))
     return (*(_gross(final.data.view, g) for g in gross), *found)
+
+
+def _without_chance(one: Finding) -> Finding:
+    words = f"leaving it out costs {one.gain_nat:.1f} nat"
+    return replace(one, evidence=words, log10_p=None)
+
+
+def entry_of(one: Finding) -> EffectEntry:
+    """The finding as an effect of a system."""
+    values = tuple((name, e.value) for name, e in one.parameters.items())
+    return EffectEntry(one.effect, one.sensor, one.stage, values)
 
 
 def _single(model: Model) -> list[int]:
@@ -83,23 +134,35 @@ def _single(model: Model) -> list[int]:
     return [k for k, a in enumerate(model.acting) if a.label not in opened]
 
 
-def _deterministic(final: Settled, index: int) -> Finding:
+def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
     model = final.model
     one = model.acting[index]
     at = sum(len(a.effect.slopes()) for a in model.acting[:index])
     found: dict[str, Estimate] = {}
+    judged = final.judged[one.label]
+    spreads = iter(judged.spread)
     for p in one.effect.parameters:
-        spread, seen = None, True
+        spread, seen, value = None, True, float(one.values[p.name])
+        interval = None
         if p in one.effect.slopes():
-            seen = bool(model.covariance[at, at] > 0.0)
-            spread = float(np.sqrt(model.covariance[at, at])) if seen else math.inf
+            seen, spread = bool(model.covariance[at, at] > 0.0), float(next(spreads))
+            spread = spread if seen else math.inf
+            half = judged.coverage * spread
+            interval = (value - half, value + half) if seen else None
             at += 1
-        found[p.name] = estimate(float(one.values[p.name]), spread, p.unit, seen)
-    return _finding(final, one.effect, one.label, found)
+        found[p.name] = estimate(value, spread, p.unit, seen, interval)
+    others = tuple(a for a in model.acting if a.label != one.label)
+    size_m = rms_m(final.data, final.data.error(others) - model.error)
+    return _finding(final, one.effect, one.label, found, size_m, weights)
 
 
 def _finding(
-    final: Settled, effect: Effect, label: Label, found: Mapping[str, Estimate]
+    final: Settled,
+    effect: Effect,
+    label: Label,
+    found: Mapping[str, Estimate],
+    size_m: float,
+    weights: Weights,
 ) -> Finding:
     view, evidence = final.data.view, final.evidence[label]
     compared = final.classes.get(label, Comparison())
@@ -111,8 +174,14 @@ def _finding(
     lists = (compared.aliases, compared.lookalikes, compared.excluded[:MOST_EXCLUDED])
     aliases, lookalikes, excluded = (tuple(_rival(view, a) for a in own) for own in lists)
     where = view.system.stages[label[2]].name
+    total = 1.0 + sum(_odds(one) for one in aliases)
+    aliases = tuple(replace(one, probability=_odds(one) / total) for one in aliases)
     rivals = (aliases, lookalikes, excluded)
-    return finding(effect, label[1], where, found, words, evidence.gain, log10_p, rivals)
+    values = tuple((name, e.value) for name, e in found.items())
+    material = weights.material(size_m, EffectEntry(effect.name, label[1], where, values))
+    return finding(
+        effect, label[1], where, found, words, evidence.gain, log10_p, rivals, material, size_m
+    )
 
 
 def _rival(view: Scene, alias: Alias) -> Rival:
@@ -130,7 +199,7 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     return finding(effect, label[1], stage, found, words, gain)
 
 
-def _stochastic(final: Settled, opened: Opened) -> Finding:
+def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:
     """Values of a stochastic effect from the fitted noise; uncertainty from the likelihood."""
     data, model = final.data, final.model
     effect, label = opened.candidate.effect, opened.candidate.label
@@ -157,7 +226,15 @@ def _stochastic(final: Settled, opened: Opened) -> Finding:
     shown = {
         p.name: estimate(v, s, p.unit) for p, (v, s) in zip(effect.parameters, figures, strict=True)
     }
-    return _finding(final, effect, label, shown)
+    return _finding(final, effect, label, shown, _noise_size(data, model), weights)
+
+
+def _noise_size(data: Data, model: Model) -> float:
+    """RMS [m] of what the fitted noise has beyond the spec's."""
+    within = clipped(model.level, spec_bounds(data.structure))
+    levels = [marginal_variance(data.structure, level) for level in (model.level, within)]
+    visible = np.isfinite(data.view.log.truth_m)
+    return float(np.sqrt(max(np.mean(np.sum((levels[0] - levels[1]) * visible, axis=1)), 0.0)))
 
 
 def _wander(

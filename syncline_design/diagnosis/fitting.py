@@ -33,6 +33,7 @@ POLISH_ROWS = 3000
 STRETCH = 80
 WINDOW = 500
 FIRST_TIMES_S = (None, 3.0, 30.0)
+FAR = 3.0  # standard uncertainties of a step after which slopes are found anew
 LONG, SHORT = 25, 10  # iterations of a noise fit from scratch, and from a good start
 
 
@@ -144,10 +145,8 @@ def fit(
             for s in starts
         ]
         level, _ = min(fits, key=lambda found: found[1])
-    if now:
-        now, error, _ = adjusted(data, now, precision(data.structure, level), error)
     factored = precision(data.structure, level)
-    _, _, covariance = adjusted(data, now, factored, error, steps=0)
+    now, error, covariance = adjusted(data, now, factored, error)
     nll = factored.negative_log_likelihood(error)
     return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
 
@@ -190,15 +189,17 @@ def adjusted(
     """Parameters of least e' C^-1 e at a known C; (effects, their error, covariance (P, P))."""
     if not acting:
         return acting, error, np.zeros((0, 0))
+    columns = np.nan_to_num(slopes(data.view, acting))
     for _ in range(steps):
-        columns = np.nan_to_num(slopes(data.view, acting))
         weighted = known.solve(columns)
         normal, right = inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0]
         change = solve_scaled(normal, right)
         acting, error, moved = _stepped(data, acting, change, known, error)
-        if moved * moved * float(change @ normal @ change) < 1e-4:
+        size2 = moved * moved * float(change @ normal @ change)
+        if size2 < 1e-4:
             break
-    columns = np.nan_to_num(slopes(data.view, acting))
+        if size2 > FAR**2:  # the slopes of the old place may not hold in the new one
+            columns = np.nan_to_num(slopes(data.view, acting))
     return acting, error, inverse_scaled(inner(columns, known.solve(columns)))
 
 

@@ -7,13 +7,13 @@ is a finding.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import LinAlgError
 
 from syncline_design.diagnosis.covariance import Precision, factored
+from syncline_design.diagnosis.noise_slopes import noise_slopes, summed_over
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import Rows
 from syncline_design.logs.stamps import repeated
@@ -54,11 +54,15 @@ class White:
 
 @dataclass(frozen=True, slots=True)
 class Slow:
-    """Gauss-Markov noise of one sensor: loading (n, 3, m) [m] per unit of the spec's std."""
+    """Gauss-Markov noise of one sensor: loading (n, 3, m) [m] per unit of the spec's std.
+
+    limits: most that each variance may be over the spec's without being a finding.
+    """
 
     sensor: Sensor
     loading: Array
     shared_time: bool  # one time constant for all columns
+    limits: tuple[float, ...] = (SLOW_LIMIT,) * 3
 
     @property
     def columns(self) -> int:
@@ -102,7 +106,7 @@ class Structure:
         return Structure(
             self.time_s[index],
             tuple(w.rows(index) for w in self.white),
-            tuple(Slow(s.sensor, s.loading[index], s.shared_time) for s in self.slow),
+            tuple(replace(s, loading=s.loading[index]) for s in self.slow),
             self.fixed[index],
             tuple(Directed(d.key, d.direction[index]) for d in self.directed),
             None if self.stamped is None else self.stamped[index],
@@ -155,7 +159,7 @@ def spec_bounds(structure: Structure) -> Bounds:
     """What the spec allows."""
     return Bounds(
         tuple(FACTOR_LIMIT for _ in structure.white),
-        tuple(tuple(SLOW_LIMIT for _ in range(s.columns)) for s in structure.slow),
+        tuple(s.limits for s in structure.slow),
     )
 
 
@@ -313,6 +317,69 @@ class _Packing:
             size[i] = value
         return NoiseLevel(factor, tuple(slow), tuple(times), tuple(size))
 
+    def slopes(self, level: NoiseLevel, known: Precision, error: Array) -> Array:
+        """Slopes of the NLL and the prior by the packed logarithms."""
+        structure = self.structure
+        _, times = loadings(structure, level)
+        count = known.loading.shape[2] - times.shape[0]
+        found = noise_slopes(
+            known, error, structure.time_s, np.concatenate([times, np.zeros(count)])
+        )
+        column, time = found.column, found.time
+        own = np.cumsum([0, *(part.columns for part in structure.slow)])
+        factor = np.array(
+            [
+                2.0 * f**2 * summed_over(found, w.covariance)
+                if not structure.shared or w.loading is None
+                else 0.0
+                for w, f in zip(structure.white, level.factor, strict=True)
+            ]
+        )
+        slow, constants = [], []
+        for k, part in enumerate(structure.slow):
+            mine = column[own[k] : own[k + 1]]
+            slow += [0.5 * float(value) for value in mine]
+            held = time[own[k] : own[k + 1]]
+            constants += [float(np.sum(held))] if part.shared_time else [float(v) for v in held]
+            index = [w.sensor for w in structure.white].index(part.sensor)
+            if level.factor[index] > 1.0:
+                factor[index] += float(np.sum(mine))
+        sizes = self._shared(level, column[own[-1] :], factor)
+        if not structure.shared:
+            parts = [structure.directed[i].direction for i in self.free_sizes]
+            sizes = [
+                2.0 * level.size[i] ** 2 * summed_over(found, d @ np.swapaxes(d, 1, 2))
+                for i, d in zip(self.free_sizes, parts, strict=True)
+            ]
+        inside = np.array(level.factor) < FACTOR_LIMIT
+        factor += np.where(inside, np.log(level.factor), 0.0) / FACTOR_SPREAD**2
+        usual = [
+            np.log(t / TIME_USUAL_S) / TIME_SPREAD**2
+            for part, chosen in zip(structure.slow, level.time_constant_s, strict=True)
+            for t in (chosen[:1] if part.shared_time else chosen)
+        ]
+        return np.concatenate([factor, slow, np.array(constants) + usual, sizes])
+
+    def _shared(self, level: NoiseLevel, column: Array, factor: Array) -> list[float]:
+        """Slopes by the columns that rows of a stamp share: added to the factors; by the sizes."""
+        structure, at = self.structure, 0
+        sizes = dict.fromkeys(self.free_sizes, 0.0)
+        if not structure.shared:
+            return list(sizes.values())
+        at += 0 if structure.stamped is None else structure.stamped.shape[2]
+        for k, part in enumerate(structure.white):
+            if part.loading is not None:
+                width = part.loading.shape[2]
+                factor[k] += float(np.sum(column[at : at + width]))
+                at += width
+        for i, (directed, size) in enumerate(zip(structure.directed, level.size, strict=True)):
+            if size > 0.0:
+                width = directed.direction.shape[2]
+                if i in sizes:
+                    sizes[i] = float(np.sum(column[at : at + width]))
+                at += width
+        return list(sizes.values())
+
     def prior(self, level: NoiseLevel) -> float:
         """Weak prior [nat]: where the log does not tell, factors are 1 and time constants usual."""
         logs = [np.log(min(f, FACTOR_LIMIT)) for f in level.factor]
@@ -339,40 +406,23 @@ def fit_noise(
 
     packing = _Packing(structure, bounds, free_sizes)
 
-    def cost(vector: Array) -> float:
+    def cost(vector: Array) -> tuple[float, Array]:
         level = packing.unpack(vector)
         try:
-            found = precision(structure, level).negative_log_likelihood(error)
+            known = precision(structure, level)
         except LinAlgError:
-            return 1e15
-        return found + packing.prior(level)
+            return 1e15, np.zeros_like(vector)
+        total = known.negative_log_likelihood(error) + packing.prior(level)
+        return total, packing.slopes(level, known, error)
 
     limits = packing.limits()
     result = minimize(
         cost,
         packing.pack(start),
-        jac=_forward_slopes(cost, limits),
+        jac=True,
         method="L-BFGS-B",
         bounds=limits,
         options={"maxiter": iterations, "ftol": 5e-6, "gtol": 0.05, "maxls": 10},
     )
     level = packing.unpack(result.x)
     return level, float(result.fun) - packing.prior(level)
-
-
-def _forward_slopes(
-    cost: Callable[[Array], float], limits: list[tuple[float, float]]
-) -> Callable[[Array], Array]:
-    """One-sided slopes that stay within the limits; pinned coordinates keep their slope."""
-
-    def slopes(vector: Array) -> Array:
-        base = cost(vector)
-        result = np.empty_like(vector)
-        for k, (_, high) in enumerate(limits):
-            step = 1e-4 if vector[k] + 1e-4 <= high else -1e-4
-            moved = vector.copy()
-            moved[k] += step
-            result[k] = (cost(moved) - base) / step
-        return result
-
-    return slopes

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
 from syncline_design.diagnosis.candidates import slopes
+from syncline_design.diagnosis.consequence import rms_m
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled, thinned
 from syncline_design.diagnosis.regimes import covariates, level_axes
 from syncline_design.diagnosis.scene import Scene
@@ -37,19 +38,22 @@ LOST = 1e-6  # share of a regressor's information below which the model's effect
 # Slow attitude noise follows the geometry, so that shifted against it it is larger than in place:
 # a shift is no fair comparison then, and its say is limited.
 MOST_INFLATION = 1.3
+STRETCHES, FOLDS = 40, 5  # of the log; hands that they are dealt out to
 CELLS = 4  # regimes per covariate in which a named effect must have the same parameters
 
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
     """p_regimes, p_motion, p_constant: of the energy on the three families (p_constant 1 when
-    nothing is named); p_peak: of the largest single regressor of the first two.
+    nothing is named); p_peak: of the largest single regressor of the first two.  size_m: RMS of the
+    structure, the largest of the families.
     """
 
     p_regimes: float
     p_motion: float
     p_constant: float
     p_peak: float
+    size_m: float = 0.0
 
     @property
     def p(self) -> float:
@@ -73,7 +77,8 @@ def remainder(data: Data, model: Model, rng: np.random.Generator) -> Remainder:
     if model.acting:
         tested.append(_energy(data, model, _constancy_columns(data, model), residual, shifts))
         p_constant = tested[-1].p
-    return Remainder(tested[0].p, tested[1].p, p_constant, p_peak)
+    size_m = min(max(t.size_m for t in tested), rms_m(data, model.error))
+    return Remainder(tested[0].p, tested[1].p, p_constant, p_peak, size_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +86,7 @@ class _Tested:
     p: float
     peak: float
     freedom: int
+    size_m: float
 
 
 def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Shifts) -> _Tested:
@@ -101,10 +107,38 @@ def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Sh
         turned = root.T @ (projector @ inner(columns, rolled[:, :, None])[:, 0])
         energies.append(float(turned @ turned))
     freedom = root.shape[1]
-    inflation = float(np.clip(np.median(energies) / max(freedom, 1), 1.0, MOST_INFLATION))
+    grown = float(np.median(energies)) / max(freedom, 1)
+    inflation = float(np.clip(grown, 1.0, MOST_INFLATION))
     peak = float(np.max((score * single) ** 2, initial=0.0)) / inflation
     p = float(chi2.sf(float(seen @ seen) / inflation, max(freedom, 1)))
-    return _Tested(p, peak, freedom)
+    return _Tested(p, peak, freedom, _predicted_m(data, model, columns, residual, own.shape[2]))
+
+
+def _predicted_m(data: Data, model: Model, columns: Array, residual: Array, width: int) -> float:
+    """RMS [m] of the structure: by how much the regressors bring down errors they have not seen.
+
+    Stretches of the log are dealt out to FOLDS hands, and each hand is predicted from the others,
+    the regressors' scores shrunk by what noise has of their energy (James and Stein 1961).
+    """
+    n = len(data.view)
+    hand = (np.arange(n) * STRETCHES // max(n, 1)) % FOLDS
+    weighted = model.precision.solve(columns)
+    normals = [inner(columns[hand == k], weighted[hand == k]) for k in range(FOLDS)]
+    scores = [
+        inner(columns[hand == k], residual[hand == k][:, :, None])[:, 0] for k in range(FOLDS)
+    ]
+    visible = np.isfinite(data.view.log.truth_m)
+    lowered = 0.0
+    for k in range(FOLDS):
+        projector, root, _ = _freed(sum(normals) - normals[k], width)
+        seen = root.T @ (projector @ (sum(scores) - scores[k]))
+        energy, freedom = float(seen @ seen), root.shape[1]
+        share = max(1.0 - freedom / max(energy, 1e-300), 0.0)
+        held = hand == k
+        shape = columns[held] @ (projector.T @ (root @ (share * seen)))
+        error = model.error[held]
+        lowered += float(np.sum((error**2 - (error - shape) ** 2) * visible[held]))
+    return float(np.sqrt(max(lowered, 0.0) / max(n, 1)))
 
 
 def _regime_columns(view: Scene) -> Array:

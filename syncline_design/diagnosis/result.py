@@ -12,6 +12,7 @@ from syncline_design.spec.effects_listed import EffectChoice
 
 SCHEMA: Final = "syncline-design/diagnosis/v1"
 LogOutcome = Literal["agrees", "explained", "unexplained"]
+Kind = Literal["cause", "noise", "stand_in"]
 Severity = Literal["contradiction", "caution"]
 EXIT_CODES: Final[Mapping[LogOutcome, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
 LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
@@ -43,6 +44,7 @@ class Estimate(Record):
     standard_uncertainty: None where nothing bounds it, as where the log says nothing of it.
     seen: whether the log does; a lever arm has no seen down part in a planar log.
     text: as every output prints it.
+    interval95: the interval to rely on, also in noise that is not the model's.
     """
 
     value: float | str
@@ -50,6 +52,7 @@ class Estimate(Record):
     unit: str
     seen: bool
     text: str
+    interval95: tuple[float, float] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,7 @@ class Rival(Record):
 
     possible: whether it fits with values that the effect can have.  refitted: with noise fitted
     anew, as the evidence is; otherwise to first order with the named effect's noise.
+    probability: posterior odds inside the class, of an alias.
     """
 
     effect: str
@@ -67,6 +71,7 @@ class Rival(Record):
     nats_worse: float
     possible: bool = True
     refitted: bool = True
+    probability: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +80,10 @@ class Finding(Record):
 
     aliases: what this log cannot tell it from.  lookalikes: of the same signature, or as good in
     its place, but not it.  excluded: told apart on this log.
+    kind: a cause deserves its name; noise is what the noise does otherwise than the spec says; a
+    stand-in is the best word for something that the dictionary does not hold.
+    material: whether it matters, by its own RMS size_m on this log or by what it does to the
+    requirements.  probability: posterior odds inside the class with its aliases.
     """
 
     effect: str
@@ -91,6 +100,10 @@ class Finding(Record):
     confused_with: str
     separated_by: str
     source: str
+    kind: Kind = "cause"
+    material: bool = True
+    size_m: float | None = optional()
+    probability: float | None = optional()
 
     def as_entry(self) -> EffectChoice:
         """The finding as an entry of a spec's `effects:`."""
@@ -188,13 +201,57 @@ class Regime(Record):
 
 @dataclass(frozen=True, slots=True)
 class Remaining(Record):
-    """What is left when everything named is in; p: chance that noise alone leaves it."""
+    """What is left when everything named is in; p: chance that noise alone leaves it.
+
+    size_m: RMS of what is left beyond the model; spec_m: the RMS that the spec's noise expects.
+    material: whether it matters; what does not is left unnamed and changes no verdict.  p is null
+    where the test fails: it rests on a model that was just refuted.
+    """
 
     unexplained: bool
     spec_m: float | None
     beyond_noise: bool
-    p: float
+    p: float | None
     where: tuple[Regime, ...]
+    size_m: float | None = None
+    material: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Smallest(Record):
+    """The SI value of a parameter at which half of such logs would have shown the effect.
+
+    None: no value that the effect can have.
+    """
+
+    effect: str
+    sensor: str
+    stage: str
+    parameter: str
+    value: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class BlindSpot(Record):
+    """An effect that the log may hide although it would turn a requirement.
+
+    smallest_seen: of the parameter, as in `Smallest`; turns_at: the least value that does.
+    """
+
+    effect: str
+    sensor: str
+    stage: str
+    parameter: str
+    smallest_seen: float | None
+    turns_at: float
+
+
+@dataclass(frozen=True, slots=True)
+class Informative(Record):
+    """Whether the log could have shown whatever would turn the verdict on the spec."""
+
+    ok: bool
+    blind_to: tuple[BlindSpot, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -332,7 +389,7 @@ class Diagnosis(Record):
 
     sound: whether the log contradicts neither itself nor the limits of the spec's platform.
     where: the regimes that disagreed most before anything was named.  steps: the gap after each
-    addition.  unseen: what this log could not show.
+    addition.  unseen: what this log could not show.  smallest_seen: what it would have shown.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
@@ -352,6 +409,8 @@ class Diagnosis(Record):
     spec: SpecRead | None
     log_files: tuple[str, ...]
     provenance: Provenance
+    informative: Informative = Informative(True)
+    smallest_seen: tuple[Smallest, ...] = ()
 
     @property
     def exit_code(self) -> int:

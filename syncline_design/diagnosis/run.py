@@ -12,17 +12,20 @@ from syncline_design import __version__
 from syncline_design.diagnosis.axes import without_still_axes
 from syncline_design.diagnosis.candidates import candidates, directed_parts, noise_of_heading
 from syncline_design.diagnosis.checks import log_checks
+from syncline_design.diagnosis.consequence import promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.findings import findings
-from syncline_design.diagnosis.fitting import WINDOW, Data, data_of, windows
+from syncline_design.diagnosis.findings import entry_of, findings
+from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
 from syncline_design.diagnosis.gap import block_folds, gap, regime_fold
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
+from syncline_design.diagnosis.noise import SLOW_LEAST, SLOW_LIMIT, as_specified
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import covariates, first_disagreement_s, strongest, where_map
 from syncline_design.diagnosis.remainder import remainder
 from syncline_design.diagnosis.result import (
     Diagnosis,
+    Finding,
     Gap,
     Likelihoods,
     LogOutcome,
@@ -44,6 +47,8 @@ from syncline_design.diagnosis.search import (
     silent,
     start_search,
 )
+from syncline_design.diagnosis.sight import informative, smallest_seen
+from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.effects.acting import Acting
 from syncline_design.logs.log import Log
@@ -53,6 +58,8 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import load
 
 MOST_ROWS = 20_000  # of a longer log, windows spread over it are worked on
+COURSES = 4.0  # variance of all courses of a channel over that of its first
+NAMED_SHARE = 0.9
 REMAINDER_SHARE = 0.2  # of the false-alarm rate: for the test of what remains
 
 
@@ -111,22 +118,35 @@ def diagnose_measured(
     progress("testing what remains", 0.7)
     rest = remainder(data, result.model, search.rng)
     left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
+    promise = None if case is None else promise_of(case)
+    weights = weighed(promise, data)
+    named = findings(result.final, faults, weights, left)
+    causes = [entry_of(one) for one in named if one.kind != "noise" and one.material]
+    material = left and weights.left(rest.size_m, causes)
+    if material:
+        named = stand_ins(named, data, result.model, rest.size_m)
     checks = log_checks(view)
     sound = all(c.severity != "contradiction" for c in checks)
-    verdict: LogOutcome = "unexplained"
-    if sound and not left:
-        verdict = "explained" if result.model.labels or faults else "agrees"
+    verdict = outcome(named, sound and not material)
+    shown = smallest_seen(search, result)
     progress("measuring the gap", 0.8)
     cells = where_map(view, result.base.error, result.model.precision)
     after = where_map(view, result.model.error, result.model.precision)
     whole = _whole_gap(data, search, result)
-    unexplained = verdict == "unexplained"
     return Diagnosis(
         verdict=verdict,
         sound=sound,
         checks=checks,
-        findings=findings(result.final, faults),
-        remaining=Remaining(unexplained, whole.expected_rms_m, left, rest.p, strongest(after)),
+        findings=named,
+        remaining=Remaining(
+            unexplained=verdict == "unexplained",
+            spec_m=weights.spec_m,
+            beyond_noise=left,
+            p=None if left else rest.p,
+            where=strongest(after),
+            size_m=rest.size_m,
+            material=material,
+        ),
         where=strongest(cells),
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
         gap=whole,
@@ -138,6 +158,31 @@ def diagnose_measured(
         spec=None if case is None else SpecRead(case.spec.name, str(case.path)),
         log_files=tuple(inputs.files),
         provenance=_provenance(settings, case),
+        informative=informative(promise, shown),
+        smallest_seen=tuple(one.record for one in shown),
+    )
+
+
+def outcome(named: Sequence[Finding], settled: bool) -> LogOutcome:
+    """Explained where something material was found; settled: nothing material is left unnamed."""
+    if not settled:
+        return "unexplained"
+    return "explained" if any(one.material for one in named) else "agrees"
+
+
+def stand_ins(
+    named: Sequence[Finding], data: Data, model: Model, left_m: float
+) -> tuple[Finding, ...]:
+    """Causes that leave too much are words for something else, not causes.
+
+    The named set has to make up nine tenths of what it and the rest make up together, in squares.
+    """
+    made_m = rms_m(data, data.error(()) - model.error)
+    if made_m**2 >= NAMED_SHARE * (made_m**2 + left_m**2):
+        return tuple(named)
+    return tuple(
+        replace(one, kind="stand_in") if one.kind == "cause" and one.size_m is not None else one
+        for one in named
     )
 
 
@@ -150,10 +195,25 @@ def _searched(
     log = without_still_axes(inputs.system, log, inputs.known, plain)
     view = scene(inputs.system, log, inputs.known)
     parts = directed_parts(view, candidates(view, settings.exclude_effects))
-    data = data_of(view, structure_of(view, parts))
+    data = with_shown_ranging(data_of(view, structure_of(view, parts)))
     progress("searching", 0.15)
     search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
     return data, search, search.run()
+
+
+def with_shown_ranging(data: Data) -> Data:
+    """The data with slow ranging noise as far as the log's own slow courses show it, within sigma.
+
+    A sensor that shows none has none that could pass for a bias.
+    """
+    shown = slow_states(data).sizes(as_specified(data.structure), data.error(()))
+    found = []
+    for part in data.structure.slow:
+        own = [COURSES * shown.get((part.sensor, k), 0.0) for k in range(part.columns)]
+        limits = tuple(float(np.clip(v, 10.0 * SLOW_LEAST, SLOW_LIMIT)) for v in own)
+        found.append(replace(part, limits=limits) if part.sensor[1] == "ranging" else part)
+    slow = tuple(found)
+    return data_of(data.view, replace(data.structure, slow=slow))
 
 
 def _slip(result: SearchResult) -> Acting | None:

@@ -2,17 +2,21 @@
 
 Each candidate is scored as a whole (all its parameters at once) under a ladder of noise models, the
 best few are fitted with the noise fitted anew, and the best of these is accepted if it beats what
-the largest of all candidates' scores reaches by chance on this very trajectory.
+the largest of all candidates' scores reaches by chance on this very trajectory.  An effect that
+moves the mean must stand up in slow noise that is not the model's as well (`slow_states`), and goes
+before any noise: a noise that wanders takes the shape of whatever is missing.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from syncline_design.diagnosis.candidates import (
+    STEP_TIMES,
     Candidate,
     Signature,
     candidates,
@@ -21,16 +25,9 @@ from syncline_design.diagnosis.candidates import (
 )
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
-from syncline_design.diagnosis.scores import (
-    Gram,
-    clean_least,
-    clean_threshold,
-    gram,
-    log_p_of,
-    possible,
-    refit_factor,
-)
+from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settling import Settled, settle
+from syncline_design.diagnosis.slow_states import Judged, States, slow_states
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import (
     freedom_of,
@@ -39,6 +36,7 @@ from syncline_design.diagnosis.trials import (
     scatter_candidates,
     with_effect,
 )
+from syncline_design.effects.record import Effect
 from syncline_design.machine.deadline import in_force
 
 TRIED = 4  # candidates fitted with their own noise per step
@@ -49,11 +47,10 @@ WANDER_NATS = (
     15.0  # slow noise can take the shape of anything slow, so it has to be that much better
 )
 TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
-NEAR = 2.0  # log p within this factor of the threshold is checked on simulated logs
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
-SCATTER_WITHIN = 0.15  # share of the best mean effect's gain that makes a scatter worth a fit
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
+Label = tuple[str, str, int]
 Progress = Callable[[str, float], None]  # (what is being done, share done 0..1)
 
 
@@ -70,7 +67,7 @@ class DiagnosisSettings:
 
     seed: int = 0
     false_alarm_rate: float = 0.05
-    max_effects: int = 4
+    max_effects: int = 8
     exclude_effects: tuple[str, ...] = ()
 
 
@@ -113,6 +110,7 @@ class Search:
     rng: np.random.Generator
     candidates: tuple[Candidate, ...]
     signatures: tuple[Signature, ...]
+    states: States
     progress: Callable[[float], None]
 
     def run(self) -> SearchResult:
@@ -122,13 +120,9 @@ class Search:
         while len(model.labels) < self.settings.max_effects:
             scores = gram(self.data, model, self.free_signatures(model), model.level)
             threshold = self.threshold(scores)
-            trial = self.best(model, scores)
-            if trial is None or trial.log_p > threshold:
+            trial = self.best(model, scores, threshold)
+            if trial is None:
                 break
-            if trial.log_p > NEAR * threshold:
-                threshold *= self.refit_factor(model, scores)
-                if trial.log_p > threshold:
-                    break
             model = self.exchanged(trial.model)
             in_force().doing("searching beyond " + ", ".join(name for name, *_ in model.labels))
             self.progress(len(model.labels) / self.settings.max_effects)
@@ -142,42 +136,60 @@ class Search:
         def threshold(less: Model) -> float:
             return self.threshold(gram(fine, less, self.free_signatures(less), less.level))
 
-        return settle(fine, start, self.signatures, threshold)
+        def standing(one: Judged, effect: Effect) -> bool:
+            charge = math.log(STEP_TIMES) if any(p.located for p in effect.parameters) else 0.0
+            return one.log_p + charge < self.chance(len(labels))
+
+        labels = {s.candidate.label for s in self.signatures}
+        return settle(fine, start, self.signatures, threshold, self.states, standing)
 
     def threshold(self, scores: Gram) -> float:
         """log p that the best candidate of a clean log falls below at the stated rate."""
         return clean_threshold(scores, MEAN_SHARE * self.settings.false_alarm_rate, self.rng)
 
-    def refit_factor(self, model: Model, scores: Gram) -> float:
-        """By how much refitted noise moves the threshold, from simulated clean logs."""
-        free = self.free_signatures(model)
-
-        def gains(clean: Model) -> list[float]:
-            return [g for g, _ in gram(self.data, clean, free, clean.level).gains()]
-
-        expected = float(np.mean(clean_least(scores, self.rng)))
-        return refit_factor(self.data, model, free, self.rng, gains, log_p_of, expected)
-
     def free_signatures(self, model: Model) -> list[Signature]:
         """Signatures of what the model does not hold yet."""
         return [s for s in self.signatures if s.candidate.label not in model.labels]
 
-    def best(self, model: Model, scores: Gram) -> Trial | None:
-        """The candidate that best explains what is left, its noise fitted anew."""
-        trials = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
-        most = max((t.gain for t in trials), default=0.0)
-        trials += self.scatter_trials(model, SCATTER_WITHIN * most)
-        kept = [t for t in trials if plausible(t.model)]
+    def best(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
+        """The candidate that best explains what is left, its noise fitted anew; none beats chance.
+
+        Effects that move the mean go first.
+        """
+        moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
+        kept = [t for t in moving if t.log_p <= threshold and plausible(t.model)]
+        if not kept:
+            scattering = [t for t in self.scatter_trials(model) if plausible(t.model)]
+            kept = [t for t in scattering if t.log_p <= threshold]
         return preferred(kept)
+
+    def standing(self, model: Model, free: Sequence[Signature]) -> dict[Label, float]:
+        """Effects that noise of another kind would not show by chance, with how sure that is.
+
+        Each pays for the number of candidates, a step for its places (Bonferroni).
+        """
+        found: dict[Label, float] = {}
+        judged = self.states.judged(model, [s.columns for s in free]) if free else []
+        limit = self.chance(len({s.candidate.label for s in free}))
+        for s, one in zip(free, judged, strict=True):
+            log_p = one.log_p + (math.log(STEP_TIMES) if s.at else 0.0)
+            if log_p < limit:
+                found[s.candidate.label] = min(log_p, found.get(s.candidate.label, 0.0))
+        return found
+
+    def chance(self, candidates: int) -> float:
+        """log p that one of so many candidates falls below at the stated rate, at most."""
+        return math.log(MEAN_SHARE * self.settings.false_alarm_rate / max(candidates, 1))
 
     def screened(self, model: Model, scores: Gram) -> list[tuple[Signature, NoiseLevel]]:
         """Signatures that gain most under any noise of the ladder, one per candidate."""
         free = self.free_signatures(model)
+        standing = self.standing(model, free)
         best: dict[tuple[str, str, int], tuple[float, Signature, NoiseLevel]] = {}
         for level in ladder(self.data, model):
             seen = scores if level is model.level else gram(self.data, model, free, level)
             for s, (gain, values) in zip(free, seen.gains(), strict=True):
-                if not possible(s, values):
+                if s.candidate.label not in standing or not possible(s, values):
                     continue
                 total = gain - seen.nll - 2.0 * s.columns.shape[2] - 4.0 * len(s.at)
                 known = best.get(s.candidate.label)
@@ -196,10 +208,10 @@ class Search:
         freedom = freedom_of(found.candidate.effect)
         return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
 
-    def scatter_trials(self, model: Model, least: float) -> list[Trial]:
-        """Candidates that only change the covariance, if a rough guess gains `least` [nat]."""
+    def scatter_trials(self, model: Model) -> list[Trial]:
+        """Candidates that only change the covariance, if a rough guess gains anything."""
         trials = []
-        for one, level in scatter_candidates(self.data, self.candidates, model, least):
+        for one, level in scatter_candidates(self.data, self.candidates, model, 1.0):
             fitted = fit(self.data, model.acting, (*model.opened, one), start=level)
             gain = model.nll - fitted.nll
             if gain > 2.0:
@@ -230,7 +242,9 @@ class Search:
             without = fit(self.data, rest, model.opened, start=model.level)
             scores = gram(self.data, without, self.free_signatures(without), without.level)
             for s, level in self.screened(without, scores):
-                if s.candidate.label == one.label or s.candidate.effect.kind == "stochastic":
+                if s.candidate.label == one.label:
+                    break  # what gains less to first order is no better
+                if s.candidate.effect.kind == "stochastic":
                     continue
                 trial = self.trial(without, s, level)
                 if plausible(trial.model) and clearly_better(trial.model, model):
@@ -278,4 +292,4 @@ def start_search(
     found = candidates(data.view, settings.exclude_effects)
     rng = np.random.Generator(np.random.Philox(settings.seed))
     shown = signatures(data.view, found)
-    return Search(data, settings, rng, found, shown, progress)
+    return Search(data, settings, rng, found, shown, slow_states(data), progress)

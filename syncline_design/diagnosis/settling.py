@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from syncline_design.diagnosis.candidates import Signature
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.identify import Comparison, Label, competed, effect_of, without
+from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, names_of
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance
+from syncline_design.effects.record import Effect
 
+APART = 2.0  # standard uncertainties between the values by two noise models
 ROUNDS = 3  # in which exchanging one effect may make another one of its class the better one
 
 
@@ -29,6 +34,7 @@ class Evidence:
 class Settled:
     """The final model on its data, with the evidence of each effect and the rest of its class.
 
+    judged: what noise that is not the model's lets be said of each effect that moves the mean.
     stairs: the model with the strongest effect alone, the strongest two, ... , all of them.
     """
 
@@ -36,19 +42,31 @@ class Settled:
     model: Model
     evidence: Mapping[Label, Evidence]
     classes: Mapping[Label, Comparison]
+    judged: Mapping[Label, Judged]
     stairs: tuple[tuple[Label, Model], ...]
 
 
 def settle(
-    data: Data, model: Model, others: Sequence[Signature], threshold: Callable[[Model], float]
+    data: Data,
+    model: Model,
+    others: Sequence[Signature],
+    threshold: Callable[[Model], float],
+    states: States,
+    standing: Callable[[Judged, Effect], bool],
 ) -> Settled:
     """Let every class compete, then drop the weakest effect while chance does as well.
 
     threshold: log p that the best candidate of a clean log falls below at the stated rate, given
-    the model without the effect.
+    the model without the effect.  standing: whether an effect stands up in noise of another kind.
     """
     while True:
+        model = _standing(data, model, states, standing)
+        known = set(model.labels)
         model, classes = _decided(data, model, others)
+        if set(model.labels) != known and set(model.labels) != set(
+            _standing(data, model, states, standing).labels
+        ):
+            continue
         less = {label: refitted_without(data, model, label) for label in model.labels}
         evidence = {label: _evidence(data, model, label, one) for label, one in less.items()}
         weakest = max(evidence, key=lambda label: (evidence[label].log_p, label), default=None)
@@ -57,7 +75,46 @@ def settle(
         if evidence[weakest].log_p <= threshold(less[weakest]):
             break
         model = less[weakest]
-    return Settled(data, model, evidence, classes, _stairs(data, model, evidence))
+    model, own = _valued(data, model, states)
+    judged = dict(zip((a.label for a in model.acting), own, strict=True))
+    return Settled(data, model, evidence, classes, judged, _stairs(data, model, evidence))
+
+
+def _valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judged]]:
+    """The model with the values to report, and what is said of them.
+
+    Where a value by the fitted noise is further from the robust one than noise of the model's kind
+    would put it, the noise is of another kind, and all values are the robust ones.
+    """
+    own = states.own(model)
+    for _ in range(ROUNDS):
+        off = [np.abs(one.values - fitted_of(a)) for a, one in zip(model.acting, own, strict=True)]
+        if not any(np.any(o > APART * j.spread) for o, j in zip(off, own, strict=True)):
+            break
+        moved = tuple(
+            replace(
+                a, values={**a.values, **dict(zip(names_of(a), map(float, j.values), strict=True))}
+            )
+            for a, j in zip(model.acting, own, strict=True)
+        )
+        error = data.error(moved)
+        nll = model.precision.negative_log_likelihood(error)
+        model = replace(model, acting=moved, error=error, nll=nll)
+        own = states.own(model)
+    return model, own
+
+
+def _standing(
+    data: Data, model: Model, states: States, standing: Callable[[Judged, Effect], bool]
+) -> Model:
+    """The model without the effects that noise of another kind shows as well, weakest first."""
+    while model.acting:
+        judged = zip(model.acting, states.own(model), strict=True)
+        fallen = [(one.log_p, a.label) for a, one in judged if not standing(one, a.effect)]
+        if not fallen:
+            break
+        model = refitted_without(data, model, max(fallen)[1])
+    return model
 
 
 def _decided(

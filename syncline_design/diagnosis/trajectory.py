@@ -12,12 +12,14 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.logs.stamps import per_stamp
 from syncline_design.simulation.chain import rotation_exp
 
+Index = NDArray[np.int64]
 FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
 
 
@@ -25,44 +27,55 @@ FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
 class SplinePieces:
     """Cubic splines of a series (n, k), one per stretch without a gap.
 
-    Beyond a stretch's ends the values there are held.
+    Beyond a stretch's ends the values there are held.  All stretches are one table of polynomials
+    in (t - knot): coefficients (4, m, k) and those of the antiderivative (5, m, k), highest power
+    first; first, last: intervals of each stretch.
     """
 
     starts: Array  # first stamp of each stretch
     ends: Array
+    first: Index
+    last: Index
+    knots_s: Array
+    values: Array
+    integrals: Array
     splines: tuple[Any, ...]
-    integrals: tuple[Any, ...]
 
     def value(self, at_s: Array, home_s: Array) -> Array:
         """Series at times at_s (n,), each in the stretch of its home stamp."""
-        return self._piecewise(at_s, home_s, self._held)
+        stretch = self._stretch(home_s)
+        inside = np.clip(at_s, self.starts[stretch], self.ends[stretch])
+        return self._evaluated(self.values, inside, stretch)
 
     def integral(self, from_s: Array, to_s: Array, home_s: Array) -> Array:
         """Integral of the series from from_s to to_s, in the stretch of the home stamp."""
-        upper = self._piecewise(to_s, home_s, self._summed)
-        return upper - self._piecewise(from_s, home_s, self._summed)
+        stretch = self._stretch(home_s)
+        return self._summed(to_s, stretch) - self._summed(from_s, stretch)
 
     def slope(self, at_s: Array, home_s: Array) -> Array:
         """First derivative of the series."""
-        return self._piecewise(at_s, home_s, lambda k, at: self.splines[k](at, 1))
+        slopes = self.values[:-1] * np.arange(len(self.values) - 1, 0, -1)[:, None, None]
+        return self._evaluated(slopes, at_s, self._stretch(home_s))
 
-    def _held(self, piece: int, at_s: Array) -> Array:
-        held: Array = self.splines[piece](np.clip(at_s, self.starts[piece], self.ends[piece]))
-        return held
+    def _stretch(self, home_s: Array) -> Index:
+        return np.maximum(np.searchsorted(self.starts, home_s, side="right") - 1, 0)
 
-    def _summed(self, piece: int, at_s: Array) -> Array:
-        inside = np.clip(at_s, self.starts[piece], self.ends[piece])
-        beyond = (at_s - inside)[:, None] * self.splines[piece](inside)
-        total: Array = self.integrals[piece](inside) + beyond
+    def _summed(self, at_s: Array, stretch: Index) -> Array:
+        inside = np.clip(at_s, self.starts[stretch], self.ends[stretch])
+        total = self._evaluated(self.integrals, inside, stretch)
+        beyond = at_s - inside
+        if np.any(beyond):
+            total += beyond[:, None] * self._evaluated(self.values, inside, stretch)
         return total
 
-    def _piecewise(self, at_s: Array, home_s: Array, rule: Any) -> Array:
-        if len(self.splines) == 1:
-            return np.asarray(rule(0, at_s))
-        first = np.searchsorted(home_s, self.starts[1:])  # homes rise: every stretch is a slice
-        bounds = [0, *first.tolist(), home_s.shape[0]]
-        parts = [rule(k, at_s[a:b]) for k, (a, b) in enumerate(pairwise(bounds)) if b > a]
-        return np.concatenate(parts)
+    def _evaluated(self, coefficients: Array, at_s: Array, stretch: Index) -> Array:
+        found = np.searchsorted(self.knots_s, at_s, side="right") - 1
+        interval = np.clip(found, self.first[stretch], self.last[stretch])
+        off = (at_s - self.knots_s[interval])[:, None]
+        total: Array = coefficients[0, interval]
+        for power in coefficients[1:]:
+            total = total * off + power[interval]
+        return total
 
 
 def pieces(time_s: Array, series: Array) -> SplinePieces:
@@ -82,8 +95,17 @@ def pieces(time_s: Array, series: Array) -> SplinePieces:
         splines.append(CubicSpline(times, values, bc_type="not-a-knot" if b - a > 3 else "natural"))
         starts.append(time_s[a])
         ends.append(time_s[b - 1])
-    integrals = tuple(s.antiderivative() for s in splines)
-    return SplinePieces(np.array(starts), np.array(ends), tuple(splines), integrals)
+    counts = np.cumsum([0, *(s.c.shape[1] for s in splines)])
+    return SplinePieces(
+        np.array(starts),
+        np.array(ends),
+        counts[:-1],
+        counts[1:] - 1,
+        np.concatenate([s.x[:-1] for s in splines]),
+        np.concatenate([s.c for s in splines], axis=1),
+        np.concatenate([s.antiderivative().c for s in splines], axis=1),
+        tuple(splines),
+    )
 
 
 @dataclass(frozen=True, slots=True)

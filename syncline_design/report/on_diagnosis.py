@@ -17,6 +17,7 @@ from syncline_design.diagnosis.result import (
     LogRead,
     Plots,
     Regime,
+    Remaining,
     Rival,
 )
 from syncline_design.machine.records import with_texts
@@ -118,11 +119,62 @@ def sentence_text(found: Diagnosis) -> str:
 
 
 def _found_text(found: Diagnosis) -> str:
-    if found.findings:
-        return " ".join(_full_stop(one.sentence) for one in found.findings)
-    if found.remaining.beyond_noise:
-        return "No effect of the dictionary explains what differs."
-    return "Nothing beyond the spec's own noise was found."
+    """What is sure, then the noise, then what is left."""
+    named = [one for one in found.findings if one.material and one.kind != "noise"]
+    said = [_full_stop(_called(one)) for one in named]
+    said += [_full_stop(line) for line in noise_lines(found.findings)]
+    if not said and not found.remaining.material:
+        said = ["Nothing beyond the spec's own noise was found."]
+    if not named and found.remaining.material:
+        said.append("No effect of the dictionary explains what differs.")
+    return " ".join([*said, left_text(found.remaining)]).strip()
+
+
+def _called(one: Finding) -> str:
+    """The sentence of a cause; of a stand-in, that it is none."""
+    text = one.sentence
+    return text if one.kind == "cause" else f"Not as a cause, as the nearest word for it: {text}"
+
+
+def noise_lines(findings: Sequence[Finding]) -> list[str]:
+    """What the noise does otherwise than the spec says, one line a sensor."""
+    lines: dict[tuple[str, str], list[str]] = {}
+    for one in findings:
+        if one.kind == "noise" and one.material:
+            lines.setdefault((one.stage, one.sensor), []).append(_noise_words(one))
+    return [
+        f"Noise of {sensor} ({stage}): {', '.join(parts)}"
+        for (stage, sensor), parts in lines.items()
+    ]
+
+
+def _noise_words(one: Finding) -> str:
+    texts = {name: estimate.text for name, estimate in one.parameters.items()}
+    match one.effect:
+        case "noise_understated":
+            return f"{texts['factor']} times the spec's"
+        case "correlated_noise" | "height_drift":
+            what = "slow" if one.effect == "correlated_noise" else "slow in height"
+            return f"{what}, {texts['std_m']} over {texts['time_constant_s']}"
+        case "heavy_tails":
+            rate = one.parameters["outlier_rate"].value
+            struck = (
+                f", {numbers.percent(rate)} outliers" if isinstance(rate, float) and rate else ""
+            )
+            return f"heavy tails ({texts['degrees_of_freedom']} degrees of freedom){struck}"
+        case _:
+            return _spaced(one.effect)
+
+
+def left_text(remaining: Remaining) -> str:
+    """What nobody can name, in metres of what the spec's noise makes."""
+    if not remaining.beyond_noise or not remaining.size_m or not remaining.spec_m:
+        return ""
+    size, allowed = _length(remaining.size_m), _length(remaining.spec_m)
+    words = (
+        "Structure that nobody can name" if remaining.material else "Structure that is immaterial"
+    )
+    return f"{words}: {size}, where the spec's noise makes {allowed}."
 
 
 def _facts(found: Diagnosis) -> list[tuple[str, str]]:
@@ -141,14 +193,46 @@ def _facts(found: Diagnosis) -> list[tuple[str, str]]:
 
 
 def _findings(found: Diagnosis) -> list[Node]:
-    nodes: list[Node] = [_finding(one) for one in found.findings]
+    """Material causes each at length, then the noise, what is immaterial, and what is left."""
+    nodes: list[Node] = [
+        _finding(one) for one in found.findings if one.material and one.kind != "noise"
+    ]
+    if lines := noise_lines(found.findings):
+        nodes.append(Items(tuple(lines)))
+    slight = [
+        f"{_effect_of(one)}: {_figures_of(one)}" for one in found.findings if not one.material
+    ]
+    if slight:
+        nodes.append(Text(f"Seen, immaterial: {'; '.join(slight)}.", quiet=True))
     remaining = found.remaining
-    if remaining.beyond_noise:
+    if remaining.material:
         where = "; ".join(_regime_text(one) for one in remaining.where)
-        chance = f"Chance that noise does this: {remaining.p:.1g}."
-        words = f"Unexplained and still there: {where or NOWHERE}. {chance}"
+        words = f"Unexplained and still there: {where or NOWHERE}. {left_text(remaining)}"
         nodes.append(Text(words, mark="?", tone="bad"))
+    elif left := left_text(remaining):
+        nodes.append(Text(left, quiet=True))
+    nodes += _blind(found)
     return nodes
+
+
+def _blind(found: Diagnosis) -> list[Node]:
+    """What would turn a requirement and would not have been seen."""
+    if found.informative.ok or found.verdict != "agrees":
+        return []
+    names = sorted({f"{_spaced(one.effect)} ({one.sensor})" for one in found.informative.blind_to})
+    words = (
+        "This log could not have shown everything that would turn a requirement: "
+        f"it is blind to {sentence_list(names)}."
+    )
+    return [Text(words, mark="!", tone="warn")]
+
+
+def _effect_of(one: Finding) -> str:
+    return f"{_spaced(one.effect)} ({one.sensor})"
+
+
+def _figures_of(one: Finding) -> str:
+    return ", ".join(estimate.text for estimate in one.parameters.values())
 
 
 def _finding(found: Finding) -> Node:
@@ -156,12 +240,12 @@ def _finding(found: Finding) -> Node:
     facts = [(_spaced(split_suffix(n)[0]), _parameter_text(p)) for n, p in found.parameters.items()]
     nodes: list[Node] = [
         Heading(given(_spaced(found.effect)), given(f"{found.sensor}, {found.stage}")),
-        Text(_full_stop(found.sentence), reach="page"),
+        Text(_full_stop(_called(found)), reach="page"),
         Facts(tuple(facts)),
         Text(f"Evidence: {_full_stop(found.evidence)}"),
     ]
     if found.aliases:
-        names = sentence_list([_effect_text(one) for one in found.aliases])
+        names = sentence_list([_alias_text(one) for one in found.aliases])
         apart = f"To separate them: {found.separated_by}."
         words = f"This log cannot tell it apart from {names}. {apart}"
         nodes.append(Text(words, mark="!", tone="warn"))
@@ -185,6 +269,13 @@ def _full_stop(text: str) -> str:
 def _effect_text(one: Rival) -> str:
     """`lever arm (position)`."""
     return f"{_spaced(one.effect)} ({one.sensor})"
+
+
+def _alias_text(one: Rival) -> str:
+    """Name, and how likely it is in place of the named one."""
+    if one.probability is None:
+        return _effect_text(one)
+    return f"{_effect_text(one)}, probability {numbers.number(one.probability, 2)}"
 
 
 def rival_text(one: Rival, *, alike: bool = False) -> str:

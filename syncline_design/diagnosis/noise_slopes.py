@@ -1,0 +1,96 @@
+"""Slopes of the likelihood of the noise, all at once and exact, in O(n).
+
+With C = Sigma + B K B', a = C^-1 e, x = P^-1 B' Sigma^-1 e the processes' posterior means and
+S = P^-1 their covariance (only its blocks of one stamp and of two neighbours are needed), for
+NLL = (e' C^-1 e + log|C|) / 2:
+    d NLL = 1/2 sum_i <D_i - a_i a_i', dSigma_i>,
+    D_i = Sigma_i^-1 - Sigma_i^-1 B_i S B_i' Sigma_i^-1,
+    d NLL / d log b_c = sum [S (B' Sigma^-1 B)]_cc - a' B_c x_c,   b_c the scale of column c of B
+    d NLL / d log T_c = 1/2 (tr((S + x x') dQ_c) - d log|Q_c|),   Q = K^-1
+Blocks of S run backwards along the factor P = L L': S_ii = L_ii^-T L_ii^-1 + G' S_i+1,i+1 G,
+S_i+1,i = -S_i+1,i+1 G, G = L_i+1,i L_ii^-1.
+Source: Takahashi et al. (1973), as in Rue and Held, Gaussian Markov Random Fields (2005), ch. 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.diagnosis.covariance import Precision
+from syncline_design.effects.record import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Slopes:
+    """Of the NLL [nat].
+
+    white (n, 3, 3): to be summed against the slope of each row's white covariance.  column (m,): by
+    the logarithm of each column's scale.  time (m,): by the logarithm of each time constant.
+    """
+
+    white: Array
+    column: Array
+    time: Array
+
+
+def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Array) -> Slopes:
+    """Slopes at one noise level, error (n, 3) [m]."""
+    loading, inverse = known.loading, known.white_inverse
+    m = loading.shape[2]
+    weighted = inverse @ error[:, :, None]
+    if m == 0:
+        own = weighted[:, :, 0]
+        return Slopes(0.5 * (inverse - own[:, :, None] * own[:, None, :]), np.zeros(0), np.zeros(0))
+    states = known.states(weighted)[:, :, 0]  # at every row
+    left = weighted[:, :, 0] - (inverse @ (loading @ states[:, :, None]))[:, :, 0]
+    same, next_same = _blocks(known.factor, m)
+    at_rows = same if known.group is None else same[known.group]
+    seen = inverse @ loading
+    white = inverse - seen @ at_rows @ np.swapaxes(seen, 1, 2) - left[:, :, None] * left[:, None, :]
+    inner = np.swapaxes(loading, 1, 2) @ seen
+    column = np.einsum("nab,nba->a", at_rows, inner)
+    column -= np.einsum("ni,nic,nc->c", left, loading, states)
+    if known.first is not None:
+        time_s, states = time_s[known.first], states[known.first]
+    return Slopes(0.5 * white, column, _times(same, next_same, states, time_s, constants_s))
+
+
+def _blocks(factor: Array, m: int) -> tuple[Array, Array]:
+    """Blocks of S: of one stamp (n, m, m), and the diagonals of those of neighbours (n - 1, m)."""
+    n = factor.shape[1] // m
+    a, b = np.indices((m, m))
+    columns = np.arange(n)[:, None, None] * m + b
+    diagonal = np.where(a >= b, factor[np.where(a >= b, a - b, 0), columns], 0.0)
+    below = np.where(a <= b, factor[np.where(a <= b, m + a - b, 0), columns[:-1]], 0.0)
+    inverse = np.linalg.inv(diagonal)
+    own = np.swapaxes(inverse, 1, 2) @ inverse
+    carry = below @ inverse[:-1]
+    back = np.ascontiguousarray(np.swapaxes(carry, 1, 2))
+    for i in range(n - 2, -1, -1):
+        own[i] += back[i] @ own[i + 1] @ carry[i]
+    following = -np.einsum("nab,nba->na", own[1:], carry)
+    return own, following
+
+
+def _times(
+    same: Array, following: Array, states: Array, time_s: Array, constants_s: Array
+) -> Array:
+    """By the logarithms of the time constants; zero for noise that is new at every stamp."""
+    slow = constants_s > 0.0
+    ratio = np.diff(time_s)[:, None] / np.where(slow, constants_s, 1.0)
+    ratio = np.where(slow, np.maximum(ratio, 1e-9), 50.0)
+    phi, fresh = np.exp(-ratio), -np.expm1(-2.0 * ratio)
+    turned = 2.0 * phi**2 * ratio / fresh**2  # d (1 / fresh)
+    square = np.einsum("naa->na", same) + states**2
+    cross = following + states[1:] * states[:-1]
+    off = -(phi * ratio / fresh + phi * turned)
+    total: Array = np.sum(turned * (square[1:] + square[:-1] - fresh), axis=0)
+    total += 2.0 * np.sum(off * cross, axis=0)
+    return np.where(slow, 0.5 * total, 0.0)
+
+
+def summed_over(slopes: Slopes, covariance: Array) -> float:
+    """<slope, dSigma> for the slope of the white covariance of all rows."""
+    return float(np.sum(slopes.white * covariance))

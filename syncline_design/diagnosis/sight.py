@@ -1,0 +1,101 @@
+"""What a log would have shown: the smallest effect it would name, and where it is blind."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2, f
+
+from syncline_design.diagnosis.candidates import Signature, zero_values
+from syncline_design.diagnosis.consequence import Promise, blind_spots
+from syncline_design.diagnosis.result import BlindSpot, Informative, Smallest
+from syncline_design.diagnosis.search import Search, SearchResult
+from syncline_design.diagnosis.slow_states import Judged
+from syncline_design.effects.record import Array
+from syncline_design.model.known import EffectEntry
+
+
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """The smallest value of one parameter that is seen, at most `most`; entry: all at zero."""
+
+    entry: EffectEntry
+    parameter: str
+    smallest: float
+    most: float
+
+    @property
+    def record(self) -> Smallest:
+        """As it is written; no value where even the largest would not be seen."""
+        e, value = self.entry, self.smallest if self.smallest <= self.most else None
+        return Smallest(e.effect, e.sensor, e.stage, self.parameter, value)
+
+
+def smallest_seen(search: Search, result: SearchResult) -> tuple[Seen, ...]:
+    """Of every effect that moves the mean, is not named and no other name's double, by parameter.
+
+    Half of the logs with a true value v beat the threshold T of the statistic v^2 / V where
+    v^2 = T V; V is the parameter's variance with the effect's others at zero.
+    """
+    model = result.model
+    doubles = {
+        one.candidate.label
+        for compared in result.final.classes.values()
+        for one in (*compared.aliases, *compared.lookalikes)
+    }
+    free = [
+        s for s in search.free_signatures(model) if not s.at and s.candidate.label not in doubles
+    ]
+    judged = search.states.judged(model, [s.columns for s in free]) if free else []
+    log_p = search.chance(len({s.candidate.label for s in search.signatures}))
+    found: list[Seen] = []
+    for s, one in zip(free, judged, strict=True):
+        found += _of(search, s, one, log_p)
+    return tuple(found)
+
+
+def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
+    effect, stage = s.candidate.effect, search.data.view.system.stages[s.candidate.stage]
+    entry = EffectEntry(
+        effect.name, s.candidate.sensor, stage.name, tuple(zero_values(effect).items())
+    )
+    size = np.maximum(_alone(one.model, log_p), 0.0)
+    if one.blocks is not None:
+        size = np.maximum(size, _alone(one.blocks, log_p, one.count))
+    seen = np.diag(one.model) > 0.0
+    values = [float(v) if ok else math.inf for v, ok in zip(size, seen, strict=True)]
+    return [
+        Seen(entry, p.name, value, p.high) for p, value in zip(effect.slopes(), values, strict=True)
+    ]
+
+
+def _alone(covariance: Array, log_p: float, count: int = 0) -> Array:
+    """Value of each parameter alone at which the statistic is at its threshold."""
+    freedom = max(int(np.sum(np.diag(covariance) > 0.0)), 1)
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    inverse = np.linalg.pinv(covariance / scale[:, None] / scale, rcond=1e-10)
+    alone = np.diag(inverse) / scale**2
+    chance = math.exp(log_p)
+    if count:
+        own = count - freedom
+        limit = float(f.isf(chance, freedom, own)) * freedom * (count - 1) / own
+    else:
+        limit = float(chi2.isf(chance, freedom))
+    sizes: Array = np.sqrt(limit / np.maximum(alone, 1e-300))
+    return sizes
+
+
+def informative(promise: Promise | None, shown: Sequence[Seen]) -> Informative:
+    """Whether every effect that would turn a requirement would have been seen."""
+    asked = [(one.entry, one.parameter, one.smallest, one.most) for one in shown]
+    most = {(one.entry, one.parameter): one.most for one in shown}
+    blind = tuple(
+        BlindSpot(
+            e.effect, e.sensor, e.stage, name, smallest if smallest <= most[e, name] else None, at
+        )
+        for e, name, smallest, at in blind_spots(promise, asked)
+    )
+    return Informative(not blind, blind)

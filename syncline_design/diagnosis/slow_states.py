@@ -1,0 +1,325 @@
+"""Errors of parameters that hold in noise that is not the model's.
+
+The Gauss-Markov likelihood gives good values; its curvature gives no good errors where the noise is
+of another kind.  Here every channel of every sensor (north, roll, range, ...) is given an unknown
+slow course beside white noise, and what the log's own blocks say is heard as well:
+    e = X b + sum_c B_c sum_k a_ck cos(pi k t / T) + w,   a_ck ~ N(0, s_c^2 max(k, 1)^-1),
+B_c the channel's effect on the error [m per standard deviation of the spec], T the length of the
+log, w the white noise of the spec with a free scale and Huber weights.  s_c is found from the
+log's own slow courses (k >= 1) by expectation and maximisation, up to the spec's figure.  The error
+of b is the larger of this model's and of the delete-a-block jackknife over BLOCKS stretches.
+Sources: Laird and Ware, Biometrics 38 (1982) for random effects; Huber, Robust Statistics (1981),
+ch. 7; Efron and Stein, Annals of Statistics 9 (1981) for the jackknife, its F as in Hotelling's T2.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2, f, t
+
+from syncline_design.diagnosis.candidates import slopes
+from syncline_design.diagnosis.expected_noise import channels
+from syncline_design.diagnosis.fitting import Data, Model
+from syncline_design.diagnosis.noise import NoiseLevel, Sensor, white_covariance
+from syncline_design.effects.acting import Acting
+from syncline_design.effects.record import Array
+
+Channel = tuple[Sensor, int]
+WAVES = 8  # cosines a channel; the constant comes on top
+BLOCKS = 16
+LEAST_BLOCKS = 5
+LEAST_ROWS = 8  # of a block
+HUBER = 1.345  # standard deviations from where on a component counts less
+REWEIGHTED = 3
+STEPS = 15  # of expectation and maximisation
+LEAST = 1e-2  # of the spec's sigma: slow courses smaller than this do not matter
+MATTERS = 1e-3  # of a row's white standard deviation: channels below have no say
+FLAT = 1e6  # prior variance of a constant while the sizes are found
+SCALE_LEAST = 0.02
+STEADY = 1e-2  # of the model's variance: blocks of an axis without noise agree by far better
+LOST = 1e-7  # share of a column's information below which others hold it all
+LEAST_LOG_P = -700.0
+NORMAL_95 = 1.959963984540054
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """Parameters of one group of columns as these states see them.
+
+    values: what they are by the states.  model, blocks: covariance by the states, and by the
+    jackknife (None of a log too short for blocks); no variance of what is not seen at all.
+    count: of the blocks.
+    """
+
+    values: Array
+    model: Array
+    blocks: Array | None
+    count: int
+
+    @property
+    def spread(self) -> Array:
+        """Standard uncertainty, the larger of both."""
+        variance = np.diag(self.model)
+        if self.blocks is not None:
+            variance = np.maximum(variance, np.diag(self.blocks))
+        return np.sqrt(np.maximum(variance, 0.0))
+
+    @property
+    def coverage(self) -> float:
+        """Standard uncertainties that a 95 % interval spans to either side."""
+        return float(t.isf(0.025, self.count - 1)) if self.count else NORMAL_95
+
+    @property
+    def log_p(self) -> float:
+        """log of the chance that noise alone makes values at least as large, the larger of both."""
+        seen = np.diag(self.model) > 0.0
+        size = int(np.sum(seen))
+        if size == 0:
+            return 0.0
+        values = self.values[seen]
+        found = float(chi2.logsf(_square(values, self.model[seen][:, seen]), size))
+        if self.blocks is not None:
+            own = self.count - size
+            share = _square(values, self.blocks[seen][:, seen]) * own / (size * (self.count - 1))
+            found = max(found, float(f.logsf(share, size, own)))
+        return found if math.isfinite(found) else LEAST_LOG_P
+
+
+def _square(values: Array, covariance: Array) -> float:
+    scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    inverse = np.linalg.pinv(covariance / scale[:, None] / scale, rcond=1e-10)
+    scaled = values / scale
+    return float(scaled @ inverse @ scaled)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sums:
+    """X'X (G, m, m) and X'e (G, m) of every block, whitened and weighted."""
+
+    normal: Array
+    score: Array
+
+
+@dataclass(frozen=True, slots=True)
+class States:
+    """The slow states of one log: courses (n, 3, q) [m], each one's channel and share."""
+
+    data: Data
+    courses: Array
+    channel: Array  # (q,) which channel a course belongs to
+    wave: Array  # (q,) k
+    block: Array  # (n,) stretch of every row
+    roles: tuple[Channel, ...]  # sensor of every channel, and which of its readings
+
+    @property
+    def count(self) -> int:
+        return int(self.block[-1]) + 1
+
+    def judged(
+        self, model: Model, groups: Sequence[Array], own: Array | None = None
+    ) -> list[Judged]:
+        """Each group of columns (n, 3, p) alone beside the model's own effects."""
+        own = np.nan_to_num(slopes(self.data.view, model.acting)) if own is None else own
+        width = own.shape[2]
+        every = [own, *(np.nan_to_num(g) for g in groups)]
+        ends = np.cumsum([g.shape[2] for g in every])
+        sums, prior = self._sums(
+            model.level, model.error, np.concatenate([*every, self.courses], axis=2), width
+        )
+        nuisance = np.r_[np.arange(width), np.arange(ends[-1], ends[-1] + self.courses.shape[2])]
+        prior = np.concatenate([np.zeros(width), prior])
+        wanted = np.arange(width, ends[-1])
+        normal, score = sums.normal.sum(0), sums.score.sum(0)
+        whole = _freed(normal, score, nuisance, wanted, prior)
+        seen = np.diag(whole[0]) > LOST * np.diag(normal)[wanted]
+        less = []
+        if self.count >= LEAST_BLOCKS:
+            less = [
+                _freed(normal - n, score - s, nuisance, wanted, prior)
+                for n, s in zip(sums.normal, sums.score, strict=True)
+            ]
+        places = [slice(a - width, b - width) for a, b in itertools.pairwise(ends)]
+        return [self._one(place, whole, less, seen[place]) for place in places]
+
+    def own(self, model: Model) -> list[Judged]:
+        """The model's own effects, all together: one entry for each, marginal over the others."""
+        columns = np.nan_to_num(slopes(self.data.view, model.acting))
+        none = np.zeros((*columns.shape[:2], 0))
+        [found] = self.judged(model, [columns], none)
+        at, result = 0, []
+        for one in model.acting:
+            part = slice(at, at + len(one.effect.slopes()))
+            blocks = None if found.blocks is None else found.blocks[part, part]
+            values = fitted_of(one) + found.values[part]
+            result.append(Judged(values, found.model[part, part], blocks, found.count))
+            at = part.stop
+        return result
+
+    def _one(
+        self,
+        place: slice,
+        whole: tuple[Array, Array],
+        less: Sequence[tuple[Array, Array]],
+        seen: NDArray[np.bool_],
+    ) -> Judged:
+        values, covariance = _solved(whole, place, seen)
+        if not less:
+            return Judged(values, covariance, None, 0)
+        off = np.array([_solved(one, place, seen)[0] for one in less])
+        off -= off.mean(axis=0)
+        count = len(less)
+        blocks = (count - 1) / count * off.T @ off
+        least = STEADY * np.diag(covariance) - np.diag(blocks)
+        return Judged(values, covariance, blocks + np.diag(np.maximum(least, 0.0)), count)
+
+    def sizes(self, level: NoiseLevel, error: Array) -> dict[Channel, float]:
+        """Variance of the slow courses of each sensor's channel over the spec's."""
+        _, prior = self._sums(level, error, self.courses, 0)
+        return {self.roles[c]: float(1.0 / prior[self.channel == c][1]) for c in set(self.channel)}
+
+    def _sums(
+        self, level: NoiseLevel, remaining: Array, columns: Array, width: int
+    ) -> tuple[_Sums, Array]:
+        """Sums over blocks at the final weights and scale, and the prior precision of courses."""
+        axes = [k for k in range(3) if np.any(np.isfinite(self.data.view.log.truth_m[:, k]))]
+        known = np.isfinite(self.data.view.log.truth_m)[:, axes]
+        judged = known & np.isin(axes, self.data.axes)  # an axis that never varies has no noise
+        covariance = white_covariance(self.data.structure, level)[:, axes][:, :, axes]
+        root = np.linalg.inv(np.linalg.cholesky(covariance)) * known[:, :, None]
+        white = (root @ columns[:, axes]).reshape(-1, columns.shape[2])
+        error = (root @ remaining[:, axes, None]).ravel()
+        block = np.repeat(self.block, len(axes))
+        q = self.courses.shape[2]
+        fixed = np.r_[np.arange(width), np.arange(white.shape[1] - q, white.shape[1])]
+        part, weight, scale2 = white[:, fixed], known.ravel().astype(float), 1.0
+        size2 = np.full(len(self.roles), 0.1)
+        limit = self._limits(level)
+        for _ in range(REWEIGHTED):
+            normal = part.T @ (weight[:, None] * part) / scale2
+            score = part.T @ (weight * error) / scale2
+            size2, values, freedom = self._sized(normal, score, width, size2, limit)
+            left = error - part @ values
+            scale2 = _scale2(left[judged.ravel()], freedom)
+            far = np.abs(left) / math.sqrt(scale2)
+            weight = known.ravel() * np.minimum(1.0, HUBER / np.maximum(far, HUBER))
+        weight = weight / scale2
+        ends = np.searchsorted(block, np.arange(self.count + 1))
+        normals, scores = [], []
+        for a, b in itertools.pairwise(ends):
+            own = white[a:b]
+            normals.append(own.T @ (weight[a:b, None] * own))
+            scores.append(own.T @ (weight[a:b] * error[a:b]))
+        prior = 1.0 / (size2[self.channel] / np.maximum(self.wave, 1))
+        return _Sums(np.array(normals), np.array(scores)), prior
+
+    def _limits(self, level: NoiseLevel) -> Array:
+        """Most that a channel's variance may be, over the spec's."""
+        structure = self.data.structure
+        most = {
+            w.sensor: max(x, 1.0) ** 2 for w, x in zip(structure.white, level.factor, strict=True)
+        }
+        for part, slow in zip(structure.slow, level.slow, strict=True):
+            most[part.sensor] *= max(1.0, *slow)
+        return np.array([most[sensor] for sensor, _ in self.roles])
+
+    def _sized(
+        self, normal: Array, score: Array, width: int, size2: Array, limit: Array
+    ) -> tuple[Array, Array, float]:
+        """Variances of the channels, the states' values, and the freedom they take."""
+        keep = np.diag(normal) > 0.0
+        share = 1.0 / np.maximum(self.wave, 1)
+        moving = self.wave > 0
+        values = np.zeros(score.shape[0])
+        inverse = np.zeros_like(normal)
+        for _ in range(STEPS):
+            variance = np.where(moving, size2[self.channel] * share, FLAT)
+            prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
+            scale = np.sqrt(np.diag(normal) + prior)
+            whole = (normal + np.diag(prior)) / scale[:, None] / scale
+            inverse = np.linalg.pinv(whole, rcond=1e-12) / scale[:, None] / scale
+            values = inverse @ score
+            energy = (values[width:] ** 2 + np.diag(inverse)[width:]) / share
+            for c in range(size2.shape[0]):
+                own = (self.channel == c) & moving
+                size2[c] = np.clip(np.mean(energy[own]), LEAST**2, limit[c])
+        return size2, values * keep, float(np.sum(inverse * normal))
+
+
+def names_of(one: Acting) -> list[str]:
+    """The parameters of an effect that are fitted."""
+    return [p.name for p in one.effect.slopes()]
+
+
+def fitted_of(one: Acting) -> Array:
+    """Their values."""
+    return np.array([float(one.values[name]) for name in names_of(one)])
+
+
+def slow_states(data: Data) -> States:
+    """The slow states of all channels that matter on the axes compared."""
+    view, axes = data.view, list(data.axes)
+    time_s = view.log.time_s
+    phase = np.pi * (time_s - time_s[0]) / max(float(time_s[-1] - time_s[0]), 1e-9)
+    waves = np.cos(phase[:, None] * np.arange(WAVES + 1))
+    white = sum(np.einsum("nii->ni", w.covariance) for w in data.structure.white)
+    total = np.median(np.sum(np.asarray(white)[:, axes], axis=1))
+    courses: list[Array] = []
+    channel: list[int] = []
+    wave: list[int] = []
+    roles: list[Channel] = []
+    for sensor, loading in channels(view):
+        for k in range(loading.shape[2]):
+            own = loading[:, :, k]
+            if np.median(np.sum(own[:, axes] ** 2, axis=1)) < MATTERS**2 * total:
+                continue
+            courses.append(own[:, :, None] * waves[:, None, :])
+            channel += [len(roles)] * (WAVES + 1)
+            wave += list(range(WAVES + 1))
+            roles.append((sensor, k))
+    count = int(np.clip(len(view) // LEAST_ROWS, 1, BLOCKS))
+    block = np.minimum(np.arange(len(view)) * count // max(len(view), 1), count - 1)
+    whole = np.concatenate(courses, axis=2) if courses else np.zeros((len(view), 3, 0))
+    return States(data, whole, np.array(channel, int), np.array(wave, int), block, tuple(roles))
+
+
+def _scale2(left: Array, freedom: float) -> float:
+    """Robust variance of the whitened remainder, for the freedom that the fit took."""
+    rows = max(left.shape[0], 1)
+    square = (1.4826 * float(np.median(np.abs(left)))) ** 2 if left.size else 1.0
+    return float(max(square * rows / max(rows - freedom, 1.0), SCALE_LEAST**2))
+
+
+def _freed(
+    normal: Array, score: Array, nuisance: Array, wanted: Array, prior: Array
+) -> tuple[Array, Array]:
+    """Normal matrix and score of the wanted columns, freed of the nuisance with its prior."""
+    inner = normal[np.ix_(nuisance, nuisance)] + np.diag(prior)
+    scale = np.sqrt(np.maximum(np.diag(inner), 0.0))
+    scale[scale == 0.0] = 1.0
+    cross = normal[np.ix_(nuisance, wanted)]
+    right = np.concatenate([cross, score[nuisance, None]], axis=1) / scale[:, None]
+    solved = np.linalg.lstsq(inner / scale[:, None] / scale, right, rcond=1e-12)[0]
+    solved = solved / scale[:, None]
+    return (
+        normal[np.ix_(wanted, wanted)] - cross.T @ solved[:, :-1],
+        score[wanted] - cross.T @ solved[:, -1],
+    )
+
+
+def _solved(
+    whole: tuple[Array, Array], place: slice, seen: NDArray[np.bool_]
+) -> tuple[Array, Array]:
+    """Values and covariance of some columns; zero for those that are not seen."""
+    both = seen[:, None] & seen
+    normal, score = np.where(both, whole[0][place, place], 0.0), whole[1][place] * seen
+    scale = np.sqrt(np.maximum(np.diag(normal), 0.0))
+    scale[scale == 0.0] = 1.0
+    inverse = np.linalg.pinv(normal / scale[:, None] / scale, rcond=1e-10)
+    inverse = inverse / scale[:, None] / scale
+    return inverse @ score, inverse
