@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -19,10 +20,11 @@ from syncline_design.diagnosis.noise import (
     precision,
     spec_bounds,
 )
-from syncline_design.diagnosis.result import Estimate, Finding, Rival
+from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.tails import tails_in
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.quantity import format_estimate
@@ -31,6 +33,8 @@ Label = tuple[str, str, int]
 Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]
 WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "target": "target"}
 MOST_EXCLUDED = 4
+ONE_VALUE = 0.001  # chance below which a parameter is not one value along the log
+VARIES = 0.1  # of its value, by which it has to vary to be said to
 MOST_NATS = 300.0
 NOT_SEEN = "(not seen)"
 
@@ -153,7 +157,25 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
         found[p.name] = estimate(value, spread, p.unit, seen, interval)
     others = tuple(a for a in model.acting if a.label != one.label)
     size_m = rms_m(final.data, final.data.error(others) - model.error)
-    return _finding(final, one.effect, one.label, found, size_m, weights)
+    named = _finding(final, one.effect, one.label, found, size_m, weights)
+    return replace(named, varying=_varying(final, one))
+
+
+def _varying(final: Settled, one: Acting) -> tuple[Stretch, ...] | None:
+    """The quarters of a log in which a parameter is not one value."""
+    course = final.courses.get(one.label)
+    names = [p for p in one.effect.parameters if p in one.effect.slopes()]
+    if course is None or course.log_p > math.log(ONE_VALUE):
+        return None
+    whole = float(one.values[names[0].name])
+    if np.std(course.values) < VARIES * abs(whole):
+        return None
+    time_s = final.data.view.log.time_s
+    ends = time_s[np.linspace(0, len(time_s) - 1, len(course.values) + 1).astype(int)]
+    return tuple(
+        Stretch(float(a), float(b), value, format_estimate(value, None, names[0].unit))
+        for (a, b), value in zip(pairwise(ends), course.values, strict=True)
+    )
 
 
 def _finding(

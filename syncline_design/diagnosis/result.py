@@ -75,6 +75,16 @@ class Rival(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Stretch(Record):
+    """A stretch of the log and the value of a parameter in it, in SI and as outputs print it."""
+
+    from_s: float
+    to_s: float
+    value: float
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Finding(Record):
     """One missing effect: what is wrong, with figures, and how sure this is.
 
@@ -84,6 +94,7 @@ class Finding(Record):
     stand-in is the best word for something that the dictionary does not hold.
     material: whether it matters, by its own RMS size_m on this log or by what it does to the
     requirements.  probability: posterior odds inside the class with its aliases.
+    varying: its one parameter in four quarters of the log, where it is not one value.
     """
 
     effect: str
@@ -104,6 +115,7 @@ class Finding(Record):
     material: bool = True
     size_m: float | None = optional()
     probability: float | None = optional()
+    varying: tuple[Stretch, ...] | None = optional()
 
     def as_entry(self) -> EffectChoice:
         """The finding as an entry of a spec's `effects:`."""

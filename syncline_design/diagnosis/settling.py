@@ -10,7 +10,7 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Signature
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.identify import Comparison, Label, competed, effect_of, without
-from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, names_of
+from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted_of, names_of
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance
 from syncline_design.effects.record import Effect
@@ -35,7 +35,8 @@ class Settled:
     """The final model on its data, with the evidence of each effect and the rest of its class.
 
     judged: what noise that is not the model's lets be said of each effect that moves the mean.
-    stairs: the model with the strongest effect alone, the strongest two, ... , all of them.
+    courses: how it runs along the log.  stairs: the model with the strongest effect alone, the
+    strongest two, ... , all of them.
     """
 
     data: Data
@@ -43,6 +44,7 @@ class Settled:
     evidence: Mapping[Label, Evidence]
     classes: Mapping[Label, Comparison]
     judged: Mapping[Label, Judged]
+    courses: Mapping[Label, Course | None]
     stairs: tuple[tuple[Label, Model], ...]
 
 
@@ -77,7 +79,9 @@ def settle(
         model = less[weakest]
     model, own = _valued(data, model, states)
     judged = dict(zip((a.label for a in model.acting), own, strict=True))
-    return Settled(data, model, evidence, classes, judged, _stairs(data, model, evidence))
+    ran = zip((a.label for a in model.acting), states.courses_of(model), strict=True)
+    stairs = _stairs(data, model, evidence)
+    return Settled(data, model, evidence, classes, judged, dict(ran), stairs)
 
 
 def _valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judged]]:

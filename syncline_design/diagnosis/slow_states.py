@@ -33,6 +33,7 @@ from syncline_design.effects.record import Array
 Channel = tuple[Sensor, int]
 WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
+QUARTERS = 4
 LEAST_BLOCKS = 5
 LEAST_ROWS = 8  # of a block
 HUBER = 1.345  # standard deviations from where on a component counts less
@@ -99,6 +100,29 @@ def _square(values: Array, covariance: Array) -> float:
 
 
 @dataclass(frozen=True, slots=True)
+class Course:
+    """A parameter in the quarters of a log: values, and the log of the chance that it is one."""
+
+    values: tuple[float, ...]
+    log_p: float
+
+
+def _course(own: Array, weight: Array) -> Course:
+    """Weighted one-way analysis of variance of the blocks' values over QUARTERS of the blocks."""
+    groups = np.arange(own.shape[0]) * QUARTERS // own.shape[0]
+    total = np.array([np.sum(weight[groups == q]) for q in range(QUARTERS)])
+    if np.any(total <= 0.0):
+        return Course((), 0.0)
+    parts = [np.sum((weight * own)[groups == q]) / total[q] for q in range(QUARTERS)]
+    means = np.array(parts)
+    whole = float(np.sum(total * means) / np.sum(total))
+    between = float(np.sum(total * (means - whole) ** 2)) / (QUARTERS - 1)
+    inside = float(np.sum(weight * (own - means[groups]) ** 2)) / (own.shape[0] - QUARTERS)
+    log_p = float(f.logsf(between / max(inside, 1e-300), QUARTERS - 1, own.shape[0] - QUARTERS))
+    return Course(tuple(float(v) for v in means), log_p)
+
+
+@dataclass(frozen=True, slots=True)
 class _Sums:
     """X'X (G, m, m) and X'e (G, m) of every block, whitened and weighted."""
 
@@ -160,6 +184,34 @@ class States:
             result.append(Judged(values, found.model[part, part], blocks, found.count))
             at = part.stop
         return result
+
+    def courses_of(self, model: Model) -> list[Course | None]:
+        """How each of the model's effects of one parameter runs along the log; None of others.
+
+        In every block the parameter is what the block itself says, all else as in the whole log;
+        quarters of the blocks are held against the scatter inside them (one-way F test).
+        """
+        columns = np.nan_to_num(slopes(self.data.view, model.acting))
+        width = columns.shape[2]
+        if self.count < BLOCKS or width == 0:
+            return [None for _ in model.acting]
+        every = np.concatenate([columns, self.courses], axis=2)
+        sums, prior = self._sums(model.level, model.error, every, width)
+        known = sums.normal.sum(0) + np.diag(np.concatenate([np.zeros(width), prior]))
+        scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
+        values = np.linalg.pinv(known / scale[:, None] / scale, rcond=1e-12) @ (
+            sums.score.sum(0) / scale
+        )
+        left = sums.score - sums.normal @ (values / scale)
+        at, found = 0, []
+        for one in model.acting:
+            names = names_of(one)
+            weight = sums.normal[:, at, at]
+            whole = float(one.values[names[0]]) + values[at] / scale[at] if names else 0.0
+            own = whole + left[:, at] / np.where(weight > 0.0, weight, 1.0) if names else weight
+            found.append(_course(own, weight) if len(names) == 1 else None)
+            at += len(names)
+        return found
 
     def _one(
         self,

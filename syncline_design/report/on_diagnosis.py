@@ -244,6 +244,9 @@ def _finding(found: Finding) -> Node:
         Facts(tuple(facts)),
         Text(f"Evidence: {_full_stop(found.evidence)}"),
     ]
+    if found.varying:
+        values = sentence_list([one.text for one in found.varying])
+        nodes.append(Text(f"It varies along the log: {values} in its quarters.", mark="!"))
     if found.aliases:
         names = sentence_list([_alias_text(one) for one in found.aliases])
         apart = f"To separate them: {found.separated_by}."
