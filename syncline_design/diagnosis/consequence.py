@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import design_budget
-from syncline_design.choice.problem import build_problem, sole_design, system_of
+from syncline_design.choice.problem import build_problem, sole_design
 from syncline_design.diagnosis.fitting import Data
 from syncline_design.diagnosis.noise import as_specified, marginal_variance
 from syncline_design.effects import registry
