@@ -170,7 +170,7 @@ def left_text(remaining: Remaining) -> str:
     """What nobody can name, in metres of what the spec's noise makes."""
     if not remaining.beyond_noise or not remaining.size_m or not remaining.spec_m:
         return ""
-    size, allowed = rms_length(remaining.size_m), _length(remaining.spec_m)
+    size, allowed = rms_length(remaining.size_m), rms_length(remaining.spec_m)
     words = (
         "Structure that nobody can name" if remaining.material else "Structure that is immaterial"
     )
