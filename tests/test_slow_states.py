@@ -109,8 +109,9 @@ def test_the_jackknife_is_that_of_fits_without_a_block(tmp_path: Path) -> None:
         x, y = scaled[kept].ravel(), error[kept].ravel()
         values.append(float(x @ y / (x @ x)))
     own = np.sqrt((states.count - 1) / states.count * np.sum((values - np.mean(values)) ** 2))
-    assert found.blocks is not None
-    assert float(np.sqrt(found.blocks[0, 0])) == pytest.approx(own, rel=0.3)
+    [(covariance, count)] = found.jackknives
+    assert count == states.count
+    assert float(np.sqrt(covariance[0, 0])) == pytest.approx(own, rel=0.3)
 
 
 def log_velocity(log: WorldLog) -> np.ndarray:
@@ -166,11 +167,11 @@ def test_a_constant_within_slow_noise_is_not_sure(tmp_path: Path) -> None:
 def test_what_is_judged_takes_the_less_sure_of_both() -> None:
     narrow, wide = np.eye(2), 9.0 * np.eye(2)
     values = np.array([6.0, 0.0])
-    one, other = Judged(values, narrow, wide, 16), Judged(values, wide, narrow, 16)
+    one, other = Judged(values, narrow, ((wide, 16),)), Judged(values, wide, ((narrow, 16),))
     assert one.spread == pytest.approx([3.0, 3.0])
     assert other.spread == pytest.approx([3.0, 3.0])
-    assert Judged(values, wide, wide, 16).log_p == pytest.approx(one.log_p)
-    assert one.log_p > Judged(values, narrow, narrow, 16).log_p
+    assert Judged(values, wide, ((wide, 16),)).log_p == pytest.approx(one.log_p)
+    assert one.log_p > Judged(values, narrow, ((narrow, 16),)).log_p
 
 
 def test_an_immaterial_finding_changes_no_verdict() -> None:

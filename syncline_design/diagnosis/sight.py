@@ -63,8 +63,8 @@ def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
         effect.name, s.candidate.sensor, stage.name, tuple(zero_values(effect).items())
     )
     size = np.maximum(_alone(one.model, log_p), 0.0)
-    if one.blocks is not None:
-        size = np.maximum(size, _alone(one.blocks, log_p, one.count))
+    for covariance, count in one.jackknives:
+        size = np.maximum(size, _alone(covariance, log_p, count))
     seen = np.diag(one.model) > 0.0
     values = [float(v) if ok else math.inf for v, ok in zip(size, seen, strict=True)]
     return [

@@ -34,6 +34,7 @@ Channel = tuple[Sensor, int]
 WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
 QUARTERS = 4
+FEW = 8, 64  # targets, to be left out one group after the other
 LEAST_BLOCKS = 5
 LEAST_ROWS = 8  # of a block
 HUBER = 1.345  # standard deviations from where on a component counts less
@@ -53,41 +54,41 @@ NORMAL_95 = 1.959963984540054
 class Judged:
     """Parameters of one group of columns as these states see them.
 
-    values: what they are by the states.  model, blocks: covariance by the states, and by the
-    jackknife (None of a log too short for blocks); no variance of what is not seen at all.
-    count: of the blocks.
+    values: what they are by the states.  model: their covariance by the states.  jackknives:
+    covariance by leaving out one part of the log after the other, and the number of parts: of
+    stretches of time, and of targets where they are few.  No variance of what is not seen at all.
     """
 
     values: Array
     model: Array
-    blocks: Array | None
-    count: int
+    jackknives: tuple[tuple[Array, int], ...] = ()
 
     @property
     def spread(self) -> Array:
-        """Standard uncertainty, the larger of both."""
+        """Standard uncertainty, the largest of all."""
         variance = np.diag(self.model)
-        if self.blocks is not None:
-            variance = np.maximum(variance, np.diag(self.blocks))
+        for covariance, _ in self.jackknives:
+            variance = np.maximum(variance, np.diag(covariance))
         return np.sqrt(np.maximum(variance, 0.0))
 
     @property
     def coverage(self) -> float:
         """Standard uncertainties that a 95 % interval spans to either side."""
-        return float(t.isf(0.025, self.count - 1)) if self.count else NORMAL_95
+        counts = [count for _, count in self.jackknives]
+        return float(t.isf(0.025, min(counts) - 1)) if counts else NORMAL_95
 
     @property
     def log_p(self) -> float:
-        """log of the chance that noise alone makes values at least as large, the larger of both."""
+        """log of the chance that noise alone makes values at least as large, the largest."""
         seen = np.diag(self.model) > 0.0
         size = int(np.sum(seen))
         if size == 0:
             return 0.0
         values = self.values[seen]
         found = float(chi2.logsf(_square(values, self.model[seen][:, seen]), size))
-        if self.blocks is not None:
-            own = self.count - size
-            share = _square(values, self.blocks[seen][:, seen]) * own / (size * (self.count - 1))
+        for covariance, count in self.jackknives:
+            own = count - size
+            share = _square(values, covariance[seen][:, seen]) * own / (size * (count - 1))
             found = max(found, float(f.logsf(share, size, own)))
         return found if math.isfinite(found) else LEAST_LOG_P
 
@@ -124,7 +125,7 @@ def _course(own: Array, weight: Array) -> Course:
 
 @dataclass(frozen=True, slots=True)
 class _Sums:
-    """X'X (G, m, m) and X'e (G, m) of every block, whitened and weighted."""
+    """X'X (G, m, m) and X'e (G, m) of every part of the log, whitened and weighted."""
 
     normal: Array
     score: Array
@@ -138,7 +139,8 @@ class States:
     courses: Array
     channel: Array  # (q,) which channel a course belongs to
     wave: Array  # (q,) k
-    block: Array  # (n,) stretch of every row
+    block: NDArray[np.int64]  # (n,) stretch of every row
+    seen: NDArray[np.int64] | None  # (n,) group of targets of every row, where they are few
     roles: tuple[Channel, ...]  # sensor of every channel, and which of its readings
 
     @property
@@ -153,23 +155,24 @@ class States:
         width = own.shape[2]
         every = [own, *(np.nan_to_num(g) for g in groups)]
         ends = np.cumsum([g.shape[2] for g in every])
-        sums, prior = self._sums(
-            model.level, model.error, np.concatenate([*every, self.courses], axis=2), width
-        )
+        columns = np.concatenate([*every, self.courses], axis=2)
+        parts, prior = self._sums(model.level, model.error, columns, width)
         nuisance = np.r_[np.arange(width), np.arange(ends[-1], ends[-1] + self.courses.shape[2])]
         prior = np.concatenate([np.zeros(width), prior])
         wanted = np.arange(width, ends[-1])
-        normal, score = sums.normal.sum(0), sums.score.sum(0)
+        normal, score = parts[0].normal.sum(0), parts[0].score.sum(0)
         whole = _freed(normal, score, nuisance, wanted, prior)
         seen = np.diag(whole[0]) > LOST * np.diag(normal)[wanted]
-        less = []
-        if self.count >= LEAST_BLOCKS:
-            less = [
+        less = [
+            [
                 _freed(normal - n, score - s, nuisance, wanted, prior)
-                for n, s in zip(sums.normal, sums.score, strict=True)
+                for n, s in zip(part.normal, part.score, strict=True)
             ]
+            for part in parts
+            if len(part.normal) >= LEAST_BLOCKS
+        ]
         places = [slice(a - width, b - width) for a, b in itertools.pairwise(ends)]
-        return [self._one(place, whole, less, seen[place]) for place in places]
+        return [_one(place, whole, less, seen[place]) for place in places]
 
     def own(self, model: Model) -> list[Judged]:
         """The model's own effects, all together: one entry for each, marginal over the others."""
@@ -179,9 +182,9 @@ class States:
         at, result = 0, []
         for one in model.acting:
             part = slice(at, at + len(one.effect.slopes()))
-            blocks = None if found.blocks is None else found.blocks[part, part]
+            own = tuple((c[part, part], count) for c, count in found.jackknives)
             values = fitted_of(one) + found.values[part]
-            result.append(Judged(values, found.model[part, part], blocks, found.count))
+            result.append(Judged(values, found.model[part, part], own))
             at = part.stop
         return result
 
@@ -196,7 +199,7 @@ class States:
         if self.count < BLOCKS or width == 0:
             return [None for _ in model.acting]
         every = np.concatenate([columns, self.courses], axis=2)
-        sums, prior = self._sums(model.level, model.error, every, width)
+        (sums, *_), prior = self._sums(model.level, model.error, every, width)
         known = sums.normal.sum(0) + np.diag(np.concatenate([np.zeros(width), prior]))
         scale = np.sqrt(np.maximum(np.diag(known), 1e-300))
         values = np.linalg.pinv(known / scale[:, None] / scale, rcond=1e-12) @ (
@@ -213,23 +216,6 @@ class States:
             at += len(names)
         return found
 
-    def _one(
-        self,
-        place: slice,
-        whole: tuple[Array, Array],
-        less: Sequence[tuple[Array, Array]],
-        seen: NDArray[np.bool_],
-    ) -> Judged:
-        values, covariance = _solved(whole, place, seen)
-        if not less:
-            return Judged(values, covariance, None, 0)
-        off = np.array([_solved(one, place, seen)[0] for one in less])
-        off -= off.mean(axis=0)
-        count = len(less)
-        blocks = (count - 1) / count * off.T @ off
-        least = STEADY * np.diag(covariance) - np.diag(blocks)
-        return Judged(values, covariance, blocks + np.diag(np.maximum(least, 0.0)), count)
-
     def sizes(self, level: NoiseLevel, error: Array) -> dict[Channel, float]:
         """Variance of the slow courses of each sensor's channel over the spec's."""
         _, prior = self._sums(level, error, self.courses, 0)
@@ -237,8 +223,8 @@ class States:
 
     def _sums(
         self, level: NoiseLevel, remaining: Array, columns: Array, width: int
-    ) -> tuple[_Sums, Array]:
-        """Sums over blocks at the final weights and scale, and the prior precision of courses."""
+    ) -> tuple[list[_Sums], Array]:
+        """Sums over parts at the final weights and scale, and the prior precision of courses."""
         axes = [k for k in range(3) if np.any(np.isfinite(self.data.view.log.truth_m[:, k]))]
         known = np.isfinite(self.data.view.log.truth_m)[:, axes]
         judged = known & np.isin(axes, self.data.axes)  # an axis that never varies has no noise
@@ -246,7 +232,6 @@ class States:
         root = np.linalg.inv(np.linalg.cholesky(covariance)) * known[:, :, None]
         white = (root @ columns[:, axes]).reshape(-1, columns.shape[2])
         error = (root @ remaining[:, axes, None]).ravel()
-        block = np.repeat(self.block, len(axes))
         q = self.courses.shape[2]
         fixed = np.r_[np.arange(width), np.arange(white.shape[1] - q, white.shape[1])]
         part, weight, scale2 = white[:, fixed], known.ravel().astype(float), 1.0
@@ -261,14 +246,10 @@ class States:
             far = np.abs(left) / math.sqrt(scale2)
             weight = known.ravel() * np.minimum(1.0, HUBER / np.maximum(far, HUBER))
         weight = weight / scale2
-        ends = np.searchsorted(block, np.arange(self.count + 1))
-        normals, scores = [], []
-        for a, b in itertools.pairwise(ends):
-            own = white[a:b]
-            normals.append(own.T @ (weight[a:b, None] * own))
-            scores.append(own.T @ (weight[a:b] * error[a:b]))
+        groupings = [self.block] if self.seen is None else [self.block, self.seen]
+        parts = [_parted(np.repeat(g, len(axes)), white, weight, error) for g in groupings]
         prior = 1.0 / (size2[self.channel] / np.maximum(self.wave, 1))
-        return _Sums(np.array(normals), np.array(scores)), prior
+        return parts, prior
 
     def _limits(self, level: NoiseLevel) -> Array:
         """Most that a channel's variance may be, over the spec's."""
@@ -301,6 +282,48 @@ class States:
                 own = (self.channel == c) & moving
                 size2[c] = np.clip(np.mean(energy[own]), LEAST**2, limit[c])
         return size2, values * keep, float(np.sum(inverse * normal))
+
+
+def _parted(part: NDArray[np.int64], columns: Array, weight: Array, error: Array) -> _Sums:
+    """Sums over each part of the log."""
+    order = np.argsort(part, kind="stable")
+    ends = np.searchsorted(part[order], np.arange(int(part.max()) + 2))
+    normals, scores = [], []
+    for a, b in itertools.pairwise(ends):
+        rows = slice(a, b) if np.all(order == np.arange(order.size)) else order[a:b]
+        own = columns[rows]
+        normals.append(own.T @ (weight[rows, None] * own))
+        scores.append(own.T @ (weight[rows] * error[rows]))
+    return _Sums(np.array(normals), np.array(scores))
+
+
+def _one(
+    place: slice,
+    whole: tuple[Array, Array],
+    less: Sequence[Sequence[tuple[Array, Array]]],
+    seen: NDArray[np.bool_],
+) -> Judged:
+    """One group of columns: its values, and what the log less each part makes of them."""
+    values, covariance = _solved(whole, place, seen)
+    jackknives = []
+    for parts in less:
+        off = np.array([_solved(one, place, seen)[0] for one in parts])
+        off -= off.mean(axis=0)
+        count = len(parts)
+        spread = (count - 1) / count * off.T @ off
+        least = np.maximum(STEADY * np.diag(covariance) - np.diag(spread), 0.0)
+        jackknives.append((spread + np.diag(least), count))
+    return Judged(values, covariance, tuple(jackknives))
+
+
+def _few_targets(data: Data) -> NDArray[np.int64] | None:
+    """Groups of targets where they are few: an error of a target's survey is in all its rows."""
+    log = data.view.log
+    if log.kind == "position":
+        return None
+    _, index = np.unique(np.nan_to_num(log.truth_m), axis=0, return_inverse=True)
+    count = int(index.max()) + 1
+    return index.ravel() % BLOCKS if FEW[0] <= count <= FEW[1] else None
 
 
 def names_of(one: Acting) -> list[str]:
@@ -337,7 +360,8 @@ def slow_states(data: Data) -> States:
     count = int(np.clip(len(view) // LEAST_ROWS, 1, BLOCKS))
     block = np.minimum(np.arange(len(view)) * count // max(len(view), 1), count - 1)
     whole = np.concatenate(courses, axis=2) if courses else np.zeros((len(view), 3, 0))
-    return States(data, whole, np.array(channel, int), np.array(wave, int), block, tuple(roles))
+    channels_of, waves_of = np.array(channel, int), np.array(wave, int)
+    return States(data, whole, channels_of, waves_of, block, _few_targets(data), tuple(roles))
 
 
 def _scale2(left: Array, freedom: float) -> float:
