@@ -18,15 +18,19 @@ from syncline_design.diagnosis.findings import estimate, finding
 from syncline_design.diagnosis.result import Motion, Rival, WholeGap
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
+from syncline_design.model.known import EffectEntry
 from syncline_design.paper.figures import SimulatedPoint
 from syncline_design.paper.reproduce import reproduce
 from syncline_design.report import numbers
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_paper import on_paper
+from syncline_design.report.on_simulation import on_simulation
 from syncline_design.report.render_console import console
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
 from syncline_design.report.text import visible
+from syncline_design.simulation import SimulationSettings, simulate
+from tests.simulation_systems import fixed_wing
 
 
 def hostile(text: str) -> DiagnosisAndDesign:
@@ -283,3 +287,16 @@ def test_a_page_and_the_console_say_alike_what_a_log_varied() -> None:
     wanted = "speed 0.818 to 7.83 m/s, turn rate \u221223.6 to 23.4 deg/s"
     for text in (Page(html(document)).text, console(document), markdown(document)):
         assert wanted in " ".join(text.replace("\u00a0", " ").split())
+
+
+def test_the_tau_of_stamps_is_not_called_the_systems_where_a_latency_adds_to_it() -> None:
+    """`check` tells 10.02 ms as the system's tau where `simulate` named 24.16 us so."""
+    plain = fixed_wing()
+    late = replace(
+        plain, effects=(EffectEntry("latency", "position", "uav", (("latency_s", 0.01),)),)
+    )
+    for system, words in ((plain, "At the system's own"), (late, "known effects besides")):
+        result = simulate(system, SimulationSettings(samples=40, tau_grid_s=(1e-3,)))
+        text = " ".join(console(on_simulation(result, system)).split())
+        assert words in text
+        assert ("system's own" in text) == (system is plain)
