@@ -499,6 +499,25 @@ def test_an_entry_has_its_own_id_and_the_spec_s_currency(tmp_path: Path) -> None
     assert check_loaded(load(spec), CheckSettings(monte_carlo=False)).verdict == "meets"
 
 
+def test_what_a_session_remembers_is_held_against_its_length(tmp_path: Path) -> None:
+    paths = []
+    for k in range(5):
+        times = START + 86400.0 * k + 10.0 * np.arange(400)
+        late = 1e-5 * np.cumsum(np.random.default_rng(k).normal(size=400))
+        paths.append(write(tmp_path / f"walk{k}.csv", made.csv_lines(times, late)))
+    notes = study_logs(paths, TimingSettings()).timing.notes
+    assert any("shorter than ten times what they remember" in note for note in notes)
+    noise = study_logs(sessions_csv(tmp_path, [1e-5] * 5), TimingSettings()).timing.notes
+    assert not any("remember" in note for note in noise)
+
+
+def test_a_session_a_row_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("syncline_design.clocks.study.MOST_SESSIONS", 100)
+    done = run("timing", *sessions_csv(tmp_path, [1e-5]), "--session", "5 s")
+    assert done.exit_code == 2
+    assert "is --session shorter" in done.stderr
+
+
 def test_sessions_of_different_length_are_said(tmp_path: Path) -> None:
     paths = []
     for k, count in enumerate((100, 100, 100, 100, 400)):

@@ -100,6 +100,20 @@ def test_summaries_give_their_maximum_as_one_sample(tmp_path: Path) -> None:
     assert series.offset_s.tolist() == pytest.approx([1e-9 * (16 + k) for k in range(30)])
 
 
+def test_an_older_phc2sys_names_the_system_clock_by_silence(tmp_path: Path) -> None:
+    lines = [f"phc2sys[{100 + k}.000]: phc offset {500 + k:9d} s2 freq  +2748 delay  500"
+             for k in range(30)]  # fmt: skip
+    (series,) = read_logs([write(tmp_path / "phc.log", lines)]).series
+    assert series.kind.name == "phc2sys CLOCK_REALTIME"
+    assert series.offset_s[0] == pytest.approx(5e-7)
+
+
+def test_times_may_be_unix_seconds_under_any_name_of_a_time(tmp_path: Path) -> None:
+    rows = ["timestamp,offset_ns", f"{START},5", f"{START + 1.5},-5"]
+    (series,) = read_logs([write(tmp_path / "a.csv", rows)]).series
+    assert series.time_s.tolist() == [START, START + 1.5]
+
+
 def test_lines_of_a_journal_are_found_among_others(tmp_path: Path) -> None:
     lines = ["-- Journal begins at Mon --", "Nov 22 03:00:00 host systemd[1]: Started thing."]
     for k in range(30):

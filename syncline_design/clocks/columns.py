@@ -114,6 +114,15 @@ def _demand(file: LogFile, found: dict[str, int], names: Sequence[str], line: in
                       expected="a column time_s, or time in ISO 8601")  # fmt: skip
 
 
+def _unix(text: str) -> float | None:
+    """Unix seconds where a column of times holds numbers."""
+    try:
+        value = float(text)
+    except ValueError:
+        return None
+    return value if _EARLIEST_UTC < value < 1e11 else None
+
+
 class _Cells:
     """One row of a table."""
 
@@ -164,6 +173,9 @@ class _Cells:
         try:
             read_as = datetime.fromisoformat(text)
         except ValueError:
+            seconds = _unix(text)
+            if seconds is not None:
+                return seconds
             raise refused(self.file.path, "no time", line=self.line,
                           column=self.columns["stamp"] + 1, expected="ISO 8601, or time_s",
                           found=repr(text[:40])) from None  # fmt: skip

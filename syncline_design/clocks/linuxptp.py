@@ -93,6 +93,8 @@ class Reader:
         what = ((found or summary) or found)["what"]  # type: ignore[index]
         offset_s = 1e-9 * int(offset)
         hard = abs(offset_s) + 1e-9 * abs(int(delay or 0)) * (0.5 if key[0] == "phc2sys" else 1.0)
+        if key[0] == "phc2sys" and (what or "phc").strip() == "phc":
+            what = "CLOCK_REALTIME"  # older versions name only the side that they compare with
         kind = _kind(key, what, time_s)
         self.last[key] = kind
         restart = key in self.began

@@ -87,6 +87,9 @@ def _ranked(usable: Sequence[Series], series: Sequence[Series]) -> Selection:
         names.sort(key=lambda name: -largest[name])
         notes.append(f"of {len(names)} sources alike, {names[0]} has the largest offsets and is "
                      "used; --source NAME takes another")  # fmt: skip
+    if names[0].startswith("phc2sys"):
+        notes.append("phc2sys compares the system clock with the card: how far the card is from "
+                     "the reference (ptp4l, ts2phc) is not in these logs")  # fmt: skip
     kept = {s.kind.name: s for s in usable}
     series = [replace(s, kind=kept[s.kind.name].kind) if s.kind.name in kept else s for s in series]
     return _split(series, names[0], tuple(notes))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.clocks.series import Array, Flags, Series
 
@@ -85,12 +86,21 @@ def sessions_of(series: Series, gap_s: float) -> list[ClockSession]:
     """A log cut at restarts, at gaps longer than `gap_s`, and where stamps begin anew."""
     if not len(series):
         return []
-    steps = np.diff(series.time_s)
-    begun = series.restart[1:] & ~series.restart[:-1]  # several such lines are one start
-    cuts = np.flatnonzero((steps > gap_s) | (steps < -1.0) | begun) + 1
-    ends = [0, *cuts.tolist(), len(series)]
+    ends = [0, *_cuts(series, gap_s).tolist(), len(series)]
     parts = [series.part(slice(a, b)) for a, b in itertools.pairwise(ends)]
     return [_session(part) for part in parts]
+
+
+def count_of(series: Series, gap_s: float) -> int:
+    """How many sessions there would be."""
+    return int(_cuts(series, gap_s).shape[0]) + 1
+
+
+def _cuts(series: Series, gap_s: float) -> NDArray[np.int64]:
+    """The first rows of all sessions but the first."""
+    steps = np.diff(series.time_s)
+    begun = series.restart[1:] & ~series.restart[:-1]  # several such lines are one start
+    return np.flatnonzero((steps > gap_s) | (steps < -1.0) | begun) + 1
 
 
 def went_back(series: Series) -> list[tuple[float, float]]:

@@ -13,6 +13,7 @@ import numpy as np
 from syncline_design import __version__
 from syncline_design.clocks import stability
 from syncline_design.clocks.doubts import doubts
+from syncline_design.clocks.files import refused
 from syncline_design.clocks.reading import read_logs
 from syncline_design.clocks.result import (
     EntryKind,
@@ -28,7 +29,7 @@ from syncline_design.clocks.result import (
 )
 from syncline_design.clocks.selection import Selection, select, sign_of
 from syncline_design.clocks.series import Array
-from syncline_design.clocks.sessions import ClockSession, sessions_of, weighted_quantile
+from syncline_design.clocks.sessions import ClockSession, count_of, sessions_of, weighted_quantile
 from syncline_design.clocks.times import moment
 from syncline_design.clocks.tolerance import (
     LEAST_SESSIONS,
@@ -40,6 +41,8 @@ from syncline_design.model.quantity import format_duration
 
 MOST_EVENTS: Final = 1000
 MOST_BINS: Final = 1500
+MOST_SESSIONS: Final = 20_000
+LONG_ENOUGH: Final = 10.0  # times what a session remembers
 VALUES: Final = 999  # quantiles that stand for the distribution in a catalog
 _HOLDOVERS_S: Final = (60.0, 600.0, 3600.0, 14400.0)
 Use = Literal["larger", "statistical", "hard"]
@@ -79,6 +82,10 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     logs = read_logs(files)
     in_force().doing("cutting the logs into sessions")
     chosen = select(logs.series, settings.source, settings.kind, files[0])
+    count = sum(count_of(one, settings.gap_s) for one in (*chosen.used, *chosen.others))
+    if count > MOST_SESSIONS:
+        raise refused(files[0], f"{count} sessions", expected=f"at most {MOST_SESSIONS}",
+                      hint="is --session shorter than the time between samples?")  # fmt: skip
     sessions = [s for one in chosen.used for s in sessions_of(one, settings.gap_s)]
     sessions.sort(key=lambda s: (s.series.kind.stamps, s.series.time_s[0], s.series.files))
     doubted = doubts(chosen.used, sessions)
@@ -86,8 +93,9 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
     counted = [s for s in sessions if s.is_counted]
     figures = _figures(counted, sessions, settings)
     claim = _claim(counted, chosen, settings, figures, doubted)
+    results = tuple(_session(s, settings.coverage) for s in sessions)
     timing = Timing(
-        sessions=tuple(_session(s, settings.coverage) for s in sessions),
+        sessions=results,
         bound_s=figures.bound_s,
         event_bound_s=figures.event_s,
         statistical_bound_s=figures.statistical_s,
@@ -104,7 +112,7 @@ def study_logs(paths: Sequence[str | Path], settings: TimingSettings) -> TimingS
         conditions=settings.conditions,
         evidence=logs.files,
         doubts=doubted,
-        notes=(*logs.notes, *chosen.notes, *_notes(sessions, figures)),
+        notes=(*logs.notes, *chosen.notes, *_notes(sessions, results, figures)),
         version=__version__,
     )
     return TimingStudy(timing, _distribution(counted))
@@ -300,12 +308,23 @@ def _trace(sessions: Sequence[ClockSession]) -> tuple[TracePoint, ...]:
     return tuple(found)
 
 
-def _notes(sessions: Sequence[ClockSession], figures: _Figures) -> list[str]:
+def _notes(
+    sessions: Sequence[ClockSession], results: Sequence[SessionResult], figures: _Figures
+) -> list[str]:
     said = []
     short = sum(not s.is_counted for s in sessions)
     if short:
         said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
                     "(less than 20 samples in lock, or than 90 s)")  # fmt: skip
+    brief = sum(
+        one.counted
+        and one.autocorrelation_s is not None
+        and one.duration_s < LONG_ENOUGH * one.autocorrelation_s
+        for one in results
+    )
+    if brief:
+        said.append(f"{brief} of {len(results)} sessions are shorter than ten times what they "
+                    "remember: the claim is for sessions no longer than these")  # fmt: skip
     largest = float(np.max(figures.quantiles, initial=0.0))
     if figures.statistical_s is not None and figures.statistical_s > 3.0 * largest > 0.0:
         times = figures.statistical_s / largest
