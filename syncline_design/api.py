@@ -55,12 +55,14 @@ def _case(spec: SpecOrPath) -> Case:
     return spec if isinstance(spec, Case) else load(arguments.path("spec", spec))
 
 
-def _limited(seed: int, time_limit_s: float | None) -> AbstractContextManager[object]:
-    """The time limit in force, once it and the seed are such as the commands take."""
-    arguments.whole("seed", seed, 0)
-    if time_limit_s is not None:
-        arguments.amount("time_limit_s", time_limit_s, 0.0)
-    return within_s(time_limit_s)
+def _seed(seed: int) -> int:
+    return arguments.whole("seed", seed, 0)
+
+
+def _limited(time_limit_s: float | None) -> AbstractContextManager[object]:
+    """The time limit in force, once it is such as the commands take."""
+    given = time_limit_s is not None
+    return within_s(arguments.amount("time_limit_s", time_limit_s, 0.0) if given else None)
 
 
 def check(
@@ -77,8 +79,8 @@ def check(
 
     arguments.word("method", method, METHODS)
     arguments.day("today", today)
-    settings = CheckSettings(seed, method, monte_carlo=monte_carlo, today=today)
-    with _limited(seed, time_limit_s):
+    settings = CheckSettings(_seed(seed), method, monte_carlo=monte_carlo, today=today)
+    with _limited(time_limit_s):
         return check_loaded(_case(spec), settings)
 
 
@@ -96,11 +98,13 @@ def optimize(
     from syncline_design.choice.outcome import METHODS
     from syncline_design.verdict import optimise
 
-    arguments.whole("best", best, 1)
+    best = arguments.whole("best", best, 1)
     arguments.word("resource", resource, RESOURCES)
     arguments.word("method", method, METHODS)
-    settings = optimise.OptimizeSettings(best, pareto, resource, method, seed=seed, every=every)
-    with _limited(seed, time_limit_s):
+    settings = optimise.OptimizeSettings(
+        best, pareto, resource, method, seed=_seed(seed), every=every
+    )
+    with _limited(time_limit_s):
         return optimise.optimize(_case(spec), settings).result
 
 
@@ -112,11 +116,11 @@ def simulate(
     from syncline_design.verdict.simulated_spec import simulate_spec
 
     if samples is not None:
-        arguments.whole("samples", samples, 1)
+        samples = arguments.whole("samples", samples, 1)
     if workers is not None:
-        arguments.whole("workers", workers, 1)
-    with _limited(seed, time_limit_s):
-        return simulate_spec(_case(spec), seed, samples, workers).result
+        workers = arguments.whole("workers", workers, 1)
+    with _limited(time_limit_s):
+        return simulate_spec(_case(spec), _seed(seed), samples, workers).result
 
 
 def diagnose(
@@ -130,12 +134,13 @@ def diagnose(
     from syncline_design import diagnosis
     from syncline_design.comparison.meaning import as_measured, meaning, with_design
 
-    arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
-    arguments.whole("max_effects", max_effects, 0, arguments.MOST_EFFECTS)
+    seed = _seed(seed)
+    rate = arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
+    most = arguments.whole("max_effects", max_effects, 0, arguments.MOST_EFFECTS)
     named = [logs] if isinstance(logs, str | Path) else logs
     files = [arguments.path("logs", one) for one in named]
-    settings = diagnosis.DiagnosisSettings(seed, false_alarm_rate, max_effects)
-    with _limited(seed, time_limit_s):
+    settings = diagnosis.DiagnosisSettings(seed, rate, most)
+    with _limited(time_limit_s):
         case = _case(spec)
         found = diagnosis.diagnose(as_measured(case, seed), files, settings)
         means = meaning(case, found.effects_entries(), seed)
@@ -155,10 +160,10 @@ def study(
     from syncline_design import studies
 
     file = arguments.path("path", path)
-    arguments.whole("workers", workers, 1)
+    workers = arguments.whole("workers", workers, 1)
     arguments.day("today", today)
-    settings = studies.StudySettings(seed, workers, store, scheduler, dask, today, fresh)
-    with _limited(seed, time_limit_s):
+    settings = studies.StudySettings(_seed(seed), workers, store, scheduler, dask, today, fresh)
+    with _limited(time_limit_s):
         return studies.run_study(file, settings, progress)
 
 
@@ -170,8 +175,8 @@ def diff(
     from syncline_design.verdict.verify import CheckSettings
 
     files = arguments.path("old", old), arguments.path("new", new)
-    with _limited(seed, time_limit_s):
-        return comparison.diff(*files, CheckSettings(seed))
+    with _limited(time_limit_s):
+        return comparison.diff(*files, CheckSettings(_seed(seed)))
 
 
 def timing(
@@ -198,5 +203,5 @@ def reproduce(*, seed: int = 0, time_limit_s: float | None = None) -> Reproducti
     """Every table and figure of the paper computed anew, beside what is printed."""
     from syncline_design.paper import reproduce as paper
 
-    with _limited(seed, time_limit_s):
-        return paper.reproduce(seed=seed)
+    with _limited(time_limit_s):
+        return paper.reproduce(seed=_seed(seed))

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import syncline_design as sd
@@ -75,3 +76,10 @@ def test_bad_input_travels_between_processes() -> None:
         sd.check("there_is_none.yaml")
     again = pickle.loads(pickle.dumps(caught.value))
     assert (again.problems, str(again)) == (caught.value.problems, str(caught.value))
+
+
+def test_whole_numbers_of_arrays_are_whole_numbers() -> None:
+    """A notebook's `for seed in np.arange(3)`; what comes out is a plain number."""
+    verdict = sd.check(PINNED, seed=np.int64(3), monte_carlo=False, time_limit_s=np.float32(60.0))
+    assert type(verdict.provenance.seed) is int
+    assert verdict == sd.check(PINNED, seed=3, monte_carlo=False)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from datetime import date, datetime
+from numbers import Integral, Real
 from pathlib import Path
 from typing import Final, NoReturn
 
@@ -19,20 +20,21 @@ def _refuse(name: str, expected: str, found: object) -> NoReturn:
     raise ValueError(f"{name}: expected {expected}, found {found!r}")
 
 
-def whole(name: str, value: object, least: int, most: int | None = None) -> None:
-    """A whole number, `least` or more."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
+def whole(name: str, value: object, least: int, most: int | None = None) -> int:
+    """A whole number, `least` or more; one of an array's too."""
+    if isinstance(value, bool) or not isinstance(value, Integral) or int(value) < least:
         _refuse(name, f"a whole number of at least {least}", value)
-    elif most is not None and value > most:
+    if most is not None and int(value) > most:
         _refuse(name, f"a whole number of at most {most}", value)
+    return int(value)
 
 
-def amount(name: str, value: object, low: float, high: float = math.inf) -> None:
+def amount(name: str, value: object, low: float, high: float = math.inf) -> float:
     """A number between two others."""
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if not (number and low <= value <= high):  # type: ignore[operator]
+    if isinstance(value, bool) or not isinstance(value, Real) or not low <= float(value) <= high:
         ends = f"of at least {low:g}" if high == math.inf else f"from {low:g} to {high:g}"
         _refuse(name, f"a number {ends}", value)
+    return float(value)
 
 
 def word(name: str, value: object, words: Sequence[str]) -> None:
