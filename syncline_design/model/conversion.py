@@ -51,6 +51,7 @@ def circular(share: float) -> Conversion:
 
 # P(|r| <= k sigma) = 0.5 of three equal independent axes (Maxwell): k = sqrt(chi2^-1(0.5; 3)).
 _SPHERICAL_50 = 1.5381722544550522
+_HALF_NORMAL_50 = 0.6744897501960817  # Phi^-1(0.75)
 _HALF_POWER = 2.0 * math.sqrt(2.0 * math.log(2.0))
 
 _FIXED: Final[Mapping[str, Conversion]] = {
@@ -65,7 +66,9 @@ _FIXED: Final[Mapping[str, Conversion]] = {
     "sep50": Conversion(
         1.0 / _SPHERICAL_50, f"radius of a sphere that holds 50 %: / {_SPHERICAL_50:.4f}"
     ),
-    "median": within(0.5),
+    "median": Conversion(
+        1.0 / _HALF_NORMAL_50, f"half of all on one axis: / {_HALF_NORMAL_50:.4f}"
+    ),
     "max": Conversion(math.sqrt(1.0 / 3.0), "ends of a uniform error, +/- figure: / sqrt(3)"),
     "resolution": Conversion(math.sqrt(1.0 / 12.0), "step of a uniform error: / sqrt(12)"),
     "beam width": Conversion(
