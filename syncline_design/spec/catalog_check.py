@@ -20,6 +20,7 @@ from syncline_design.model.quantity import UnitError, format_like
 from syncline_design.spec.catalog import SECTIONS, Catalog, Entry, Product, SensorEntry
 from syncline_design.spec.facts import (
     AXES,
+    PARTS,
     SIGMA_DIMENSIONS,
     Lifecycle,
     PrintedFigure,
@@ -200,8 +201,7 @@ def _is_nothing(value: Any) -> bool:
 def _has_basis(entry: Entry, key: str) -> bool:
     if entry.basis_of(key) is not None:
         return True
-    parts = AXES.get(key, {})
-    return bool(parts) and any(entry.basis_of(f"{key}.{part}") for part in parts)
+    return any(entry.basis_of(f"{key}.{part}") for part in PARTS.get(key, ()))
 
 
 def _conversions(one: _Place) -> Iterator[CatalogFinding]:

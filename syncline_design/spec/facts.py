@@ -212,6 +212,10 @@ AXES: Final[Mapping[str, Mapping[str, tuple[int, ...]]]] = {
     "sigma_attitude": {"roll": (0,), "pitch": (1,), "yaw": (2,), "roll_pitch": (0, 1)},
     "sigma_bearing": {"azimuth": (0,), "elevation": (1,)},
 }  # fmt: skip
+PARTS: Final[Mapping[str, tuple[str, ...]]] = {
+    **{name: tuple(parts) for name, parts in AXES.items()},
+    "reach": ("min", "max"),
+}
 SIGMA_DIMENSIONS: Final[Mapping[str, Dimension]] = {
     "sigma_position": Dimension.LENGTH,
     "sigma_range": Dimension.LENGTH,
@@ -232,5 +236,5 @@ def unknown_figures(keys: Iterator[str], known: list[str]) -> Iterator[tuple[str
         name, part = split_figure(key)
         if name not in known:
             yield key, did_you_mean(name, known)
-        elif part and part not in AXES.get(name, {}):
-            yield key, did_you_mean(part, AXES.get(name, {})) or "no such part of this figure"
+        elif part and part not in PARTS.get(name, ()):
+            yield key, did_you_mean(part, PARTS.get(name, ())) or "no such part of this figure"

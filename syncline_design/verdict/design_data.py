@@ -15,7 +15,7 @@ from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import Entry
-from syncline_design.spec.facts import AXES, split_figure
+from syncline_design.spec.facts import AXES, Reach, split_figure
 from syncline_design.verdict.named import (
     HostClock,
     NamedDesign,
@@ -177,7 +177,9 @@ def _figure_text(entry: Entry, figure: str) -> str:
     """A figure of an entry, or the part of it that a name with a dot means."""
     name, part = split_figure(figure)
     value = getattr(entry, name, None)
-    if part and isinstance(value, tuple):
+    if isinstance(value, Reach):
+        value = getattr(value, part) if part else value
+    elif part and isinstance(value, tuple):
         value = tuple(value[axis] for axis in AXES[name][part])
         value = value[0] if len(set(value)) == 1 else value
     return figure_text(value)
