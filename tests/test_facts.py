@@ -127,8 +127,11 @@ def test_a_spec_that_draws_the_fault_in_is_refused_too(tmp_path: Path) -> None:
 
 
 def test_figures_may_be_given_by_part() -> None:
-    one = lidar(f"figures: {{sigma_range: {FIGURE}, sigma_bearing.azimuth: {FIGURE}}}")
-    assert list(one.figures) == ["sigma_range", "sigma_bearing.azimuth"]
+    named = ["sigma_range", "sigma_bearing.azimuth", "reach.min", "reach.max"]
+    one = lidar(f"figures: {{{', '.join(f'{key}: {FIGURE}' for key in named)}}}")
+    assert list(one.figures) == named
+    (line,) = complaints(f"figures: {{reach.far: {FIGURE}}}")
+    assert "figures.reach.far: no such figure" in line
 
 
 def test_a_basis_is_that_of_the_part_or_else_of_the_whole() -> None:
