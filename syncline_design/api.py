@@ -65,6 +65,12 @@ def _limited(time_limit_s: float | None) -> AbstractContextManager[object]:
     return within_s(arguments.amount("time_limit_s", time_limit_s, 0.0) if given else None)
 
 
+def _files(logs: str | Path | Sequence[str | Path]) -> list[Path]:
+    """One log or several, as paths."""
+    named = [logs] if isinstance(logs, str | Path) else logs
+    return [arguments.path("logs", one) for one in named]
+
+
 def check(
     spec: SpecOrPath, *, seed: int = 0, method: Road = "auto", time_limit_s: float | None = None,
     monte_carlo: bool = True, today: date | None = None,
@@ -137,8 +143,7 @@ def diagnose(
     seed = _seed(seed)
     rate = arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
     most = arguments.whole("max_effects", max_effects, 0, arguments.MOST_EFFECTS)
-    named = [logs] if isinstance(logs, str | Path) else logs
-    files = [arguments.path("logs", one) for one in named]
+    files = _files(logs)
     settings = diagnosis.DiagnosisSettings(seed, rate, most)
     with _limited(time_limit_s):
         case = _case(spec)
@@ -180,7 +185,7 @@ def diff(
 
 
 def timing(
-    logs: Sequence[str | Path], settings: TimingSettings | None = None, *,
+    logs: str | Path | Sequence[str | Path], settings: TimingSettings | None = None, *,
     spec: SpecOrPath | None = None, seed: int = 0, time_limit_s: float | None = None,
 ) -> TimingAndSpec:  # fmt: skip
     """What logs of a clock bear out of its error, over sessions, with a stated claim.
@@ -190,9 +195,9 @@ def timing(
     from syncline_design.clocks.study import TimingSettings, study_logs
     from syncline_design.comparison.clock_meaning import timing_meaning, with_spec
 
-    chosen = settings or TimingSettings()
-    with within_s(time_limit_s):
-        found = study_logs(logs, chosen)
+    chosen, seed, files = settings or TimingSettings(), _seed(seed), _files(logs)
+    with _limited(time_limit_s):
+        found = study_logs(files, chosen)
         if spec is None:
             return with_spec(found.timing, None)
         means = timing_meaning(_case(spec), found, chosen.kind, "measured", seed)
