@@ -17,19 +17,15 @@ from syncline_design.choice.variations import Build, with_methods
 from syncline_design.choice.written import in_unit_of, money, plain
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.spec.case import Case, usable_primitives
-from syncline_design.spec.spec import Requirement
+from syncline_design.spec.requirement import JUDGED_KINDS, LIMIT_DIMENSIONS, Requirement
 
 MOST_METHODS = 3
 TRIES = 6
 WIDENING = Fraction(1, 100)  # by which a simulated limit is widened when it does not hold yet
 IMPLIED = "SYNC"
-DIMENSIONS = {
-    "accuracy": Dimension.LENGTH,
-    "monte_carlo": Dimension.LENGTH,
-    "mass": Dimension.MASS,
-    "power": Dimension.POWER,
-}
-UNITS_OF = {"accuracy": "m", "monte_carlo": "m", "sync": "1", "mass": "kg", "power": "W"}
+UNITS_OF = {
+    "accuracy": "m", "sync": "1", "mass": "kg", "power": "W", **dict.fromkeys(JUDGED_KINDS, "m")
+}  # fmt: skip
 
 
 Move = tuple[Requirement | None, float, Quantity]  # requirement (None: implied), before, after
@@ -85,11 +81,18 @@ def _moves(case: Case, problem: Problem, part: Part, value: Fraction) -> Iterato
         yield None, problem.limits.sync, plain(value, up=True)
         return
     for requirement in case.spec.requirements:
-        if requirement.kind != part.kind or (part.kind == SIMULATED and requirement.id != part.id):
+        if not _is_of(requirement, part):
             continue
         before = case.limit(requirement)
         if before < value:
             yield requirement, float(before), _rounded_up(case, requirement, value)
+
+
+def _is_of(requirement: Requirement, part: Part) -> bool:
+    """Whether a requirement belongs to a part: to a kind of sums, or by its id."""
+    if part.kind == SIMULATED:
+        return requirement.id == part.id
+    return requirement.kind == part.kind
 
 
 def _rounded_up(case: Case, requirement: Requirement, value: Fraction) -> Quantity:
@@ -100,7 +103,9 @@ def _rounded_up(case: Case, requirement: Requirement, value: Fraction) -> Quanti
         currency = getattr(limit, "currency", None) or case.spec.currency
         rate = case.spec.in_currency(Quantity(Fraction(1), "", None, currency))
         return money(value, rate, currency)
-    return in_unit_of(getattr(limit, "text", ""), value, DIMENSIONS[requirement.kind], up=True)
+    return in_unit_of(
+        getattr(limit, "text", ""), value, LIMIT_DIMENSIONS[requirement.kind], up=True
+    )
 
 
 def with_moves(case: Case, moves: Sequence[Move]) -> Case:

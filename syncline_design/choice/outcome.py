@@ -14,7 +14,19 @@ from syncline_design.machine.records import Record
 
 Road = Literal["auto", "front", "milp", "enumerate"]
 FixKind = Literal[
-    "accuracy", "sync", "cost", "mass", "power", "monte_carlo", "platform", "timestamping"
+    "accuracy",
+    "sync",
+    "cost",
+    "mass",
+    "power",
+    "monte_carlo",
+    "platform",
+    "timestamping",
+    "worst_case",
+    "thu",
+    "tvu",
+    "rmse",
+    "quantile",
 ]
 METHODS: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
 # The roads in words, for every text that says how a design was proven best.

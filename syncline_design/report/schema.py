@@ -16,7 +16,7 @@ from syncline_design.model.quantity import Dimension
 from syncline_design.report.formats import FileName
 from syncline_design.report.key_glossary import KEYS, STUDY_KEYS
 from syncline_design.spec.fields import quantity_schema
-from syncline_design.spec.spec import LIMIT_DIMENSIONS
+from syncline_design.spec.requirement import KEYS_OF, LIMIT_DIMENSIONS, STATED_KINDS
 
 _TITLES: Final = {"spec": "system spec", "catalog": "catalog", "study": "trade study"}
 DRAFT = "http://json-schema.org/draft-07/schema#"
@@ -30,6 +30,7 @@ def json_schema(name: FileName) -> dict[str, Any]:
     definitions = raw.pop("$defs", {})
     if "Requirement" in definitions:
         _limit_by_kind(definitions["Requirement"])
+        definitions["DistanceLimit"] = _by_distance()
     quantities: dict[str, Any] = {}
     body = _draft_07(raw, quantities, words)
     parts = {key: _draft_07(value, quantities, words) for key, value in definitions.items()}
@@ -56,24 +57,45 @@ def schema_text(name: FileName) -> str:
 
 
 def _limit_by_kind(requirement: dict[str, Any]) -> None:
-    """The limit's dimension follows from the kind, a quantile goes with monte_carlo only."""
-    rules = []
-    for kind, dimension in LIMIT_DIMENSIONS.items():
-        number = {"type": "number", "exclusiveMinimum": 0}
-        limit = number if dimension is Dimension.DIMENSIONLESS else quantity_schema(dimension)
-        rules.append(
-            {
-                "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
-                "then": {"properties": {"limit": limit}},
-            }
-        )
-    quantile = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
-    requirement["properties"]["quantile"] = quantile
+    """The limit's dimension and the keys besides follow from the kind."""
+    share = {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}
+    for key in ("quantile", "confidence", "p"):
+        requirement["properties"][key] = share
     requirement["properties"]["limit"] = {}
-    requirement["allOf"] = rules
-    requirement["if"] = {"properties": {"kind": {"const": "monte_carlo"}}, "required": ["kind"]}
-    requirement["then"] = {"required": ["quantile"]}
-    requirement["else"] = {"not": {"required": ["quantile"]}}
+    requirement["allOf"] = [
+        {
+            "if": {"properties": {"kind": {"const": kind}}, "required": ["kind"]},
+            "then": _of_kind(kind, dimension),
+        }
+        for kind, dimension in LIMIT_DIMENSIONS.items()
+    ]
+
+
+def _of_kind(kind: str, dimension: Dimension) -> dict[str, Any]:
+    limit: dict[str, Any] = {"type": "number", "exclusiveMinimum": 0}
+    if dimension is not Dimension.DIMENSIONLESS:
+        limit = quantity_schema(dimension)
+    if kind in STATED_KINDS:
+        limit = {"anyOf": [limit, {"$ref": "#/definitions/DistanceLimit"}]}
+    own = KEYS_OF.get(kind, ())
+    due = [key.lower() for key in own if key.isupper()]
+    others = {key.lower() for keys in KEYS_OF.values() for key in keys}
+    refused = sorted(others - {key.lower() for key in own})
+    rule: dict[str, Any] = {"properties": {"limit": limit}}
+    if due:
+        rule["required"] = due
+    return {**rule, "not": {"anyOf": [{"required": [key]} for key in refused]}}
+
+
+def _by_distance() -> dict[str, Any]:
+    """`{a: 0.15 m, b: 0.0075, of: 40 m}`."""
+    length = quantity_schema(Dimension.LENGTH)
+    return {
+        "type": "object",
+        "properties": {"a": length, "b": {"type": "number", "minimum": 0}, "of": length},
+        "required": ["a", "b"],
+        "additionalProperties": False,
+    }
 
 
 def _draft_07(node: Any, quantities: dict[str, Any], words: Mapping[str, str]) -> Any:

@@ -11,6 +11,7 @@ from syncline_design.report import numbers
 from syncline_design.report.document import Inline, Items, Node, Outcome, code, given
 from syncline_design.report.text import visible
 from syncline_design.report.words import (
+    AXES,
     KINDS,
     OBJECTIVES,
     OUTCOMES,
@@ -87,13 +88,18 @@ def waiver_text(row: RequirementResult) -> str:
 
 def kind_text(row: RequirementResult) -> str:
     """What a requirement limits."""
-    return kind_words(row.kind, row.quantile)
+    return kind_words(row.kind, row.quantile, row.axis)
 
 
-def kind_words(kind: str, quantile: float | None = None) -> str:
+def kind_words(kind: str, quantile: float | None = None, axis: str | None = None) -> str:
     """What a kind of requirement limits."""
     if kind == "monte_carlo" and quantile is not None:
         return f"simulated error, {numbers.percent(quantile)} quantile"
+    if kind in ("thu", "tvu", "quantile") and quantile is not None:
+        error = {"thu": "horizontal", "tvu": "vertical"}.get(kind, axis or "3d")
+        return f"{numbers.percent(quantile)} of {AXES[error]} errors"
+    if kind == "rmse":
+        return f"RMS of {AXES[axis or '3d']} errors"
     return KINDS.get(kind, kind)
 
 

@@ -30,8 +30,14 @@ KINDS: Final[dict[str, str]] = {
     "mass": "mass",
     "power": "power",
     "monte_carlo": "simulated error, quantile",
+    "worst_case": "certified worst case",
+    "thu": "horizontal error, quantile (THU)",
+    "tvu": "vertical error, quantile (TVU)",
+    "rmse": "root mean square error",
+    "quantile": "error, quantile",
     "feasible": "entries that cannot work where they stand",
 }
+AXES: Final[dict[str, str]] = {"horizontal": "horizontal", "vertical": "vertical", "3d": "3D"}
 TERMS: Final[dict[str, str]] = {
     "sigma_p": "position noise \u03c3_p",
     "sigma_Theta*d": "attitude noise \u03c3_\u0398\u00b7d",

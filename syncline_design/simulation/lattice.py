@@ -48,6 +48,12 @@ def sphere_lattice(skipped: int, axes: int, count: int = POINTS) -> Array:
     return np.concatenate([circle * np.sqrt(1.0 - height * height), height[None]])
 
 
+@lru_cache(maxsize=64)
+def normal_row(row: int, count: int = POINTS) -> Array:
+    """Standard normal numbers (N,) of one of the lattice's dimensions."""
+    return normal_quantile(lattice(row + 1, count)[row])
+
+
 def normal_quantile(share: Array) -> Array:
     """Standard normal quantiles at shares in (0, 1), any shape (Wichura, AS 241, 1988)."""
     invert = NormalDist().inv_cdf

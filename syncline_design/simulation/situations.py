@@ -20,7 +20,6 @@ from syncline_design.simulation.ascent import FreeVector, Kind, at_length_one, c
 from syncline_design.simulation.chain import SensorSigma, noise_slopes
 from syncline_design.simulation.draws import Shifts, generator, lever_arms, stage_shifts
 from syncline_design.simulation.known_effects import Carried, departed_error
-from syncline_design.simulation.lattice import lattice
 from syncline_design.simulation.surroundings import leaning, moment_at, placed_rows
 from syncline_design.simulation.timing_variables import SystemTiming, timing_of
 
@@ -120,8 +119,7 @@ class Situations:
     def nodes(self, count: int) -> Array:
         """(free variables, count): equally likely values of them together [s]."""
         free = [self.timing.variables[k] for k in self.free]
-        shares = lattice(len(free), count)
-        found = [variable.at(share) for variable, share in zip(free, shares, strict=True)]
+        found = [variable.on_lattice(row, count) for row, variable in enumerate(free)]
         return np.array(found).reshape(len(free), count)
 
     def steps(self) -> Array:

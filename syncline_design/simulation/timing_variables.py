@@ -28,7 +28,7 @@ from syncline_design.model.timing import (
     mean,
 )
 from syncline_design.simulation.draws import entering
-from syncline_design.simulation.lattice import normal_quantile
+from syncline_design.simulation.lattice import lattice, normal_row
 
 Key = tuple[str, RoleName]  # of a sensor: stage and role
 
@@ -72,20 +72,23 @@ class TimingVariable:
             case Constant():
                 return 0.0, 0.0
 
-    def at(self, share: Array) -> Array:
-        """Its quantiles [s] at shares in (0, 1), any shape."""
+    def on_lattice(self, row: int, count: int) -> Array:
+        """Equally likely values [s] (count,), by one of the lattice's dimensions."""
+        share = lattice(row + 1, count)[row]
         match self.centred:
             case Uniform(low, high):
-                return low + (high - low) * share
+                spread: Array = low + (high - low) * share
+                return spread
             case Normal(_, std):
-                return std * normal_quantile(share)
+                normal: Array = std * normal_row(row, count)
+                return normal
             case Empirical(values):
                 ordered = np.sort(np.asarray(values, dtype=np.float64))
                 place = np.minimum((share * len(values)).astype(np.intp), len(values) - 1)
                 found: Array = ordered[place]
                 return found
             case Constant():
-                return np.zeros_like(share)
+                return np.zeros(count)
 
 
 @dataclass(frozen=True, slots=True)

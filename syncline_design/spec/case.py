@@ -36,6 +36,7 @@ from syncline_design.spec.choices import (
     RoleChoice,
     StageChoice,
 )
+from syncline_design.spec.requirement import DistanceLimit
 from syncline_design.spec.spec import Requirement, Spec
 from syncline_design.spec.yaml_text import KeyPath, TextPosition
 
@@ -118,6 +119,9 @@ class Case:
     def __post_init__(self) -> None:
         stages = tuple(_stage(self, index) for index in range(len(self.spec.stages)))
         object.__setattr__(self, "stages", stages)
+        object.__setattr__(
+            self, "spec", _limited(self.spec, float(stages[-1].platform.entry.distance))
+        )
         object.__setattr__(self, "hardware", _hardware(self, stages))
         object.__setattr__(self, "effects", _effects(self.spec))
 
@@ -141,6 +145,19 @@ class Case:
     def clock(self, vehicle: str, identity: str | None) -> ClockEntry | None:
         """A vehicle's clock of that id; None: its timelines are taken as common."""
         return _named(self.clocks(vehicle), identity)
+
+
+def _limited(spec: Spec, distance_m: float) -> Spec:
+    """The spec with limits that grow with distance at their value for the last stage's."""
+    if not any(isinstance(one.limit, DistanceLimit) for one in spec.requirements):
+        return spec
+    requirements = tuple(
+        one.model_copy(update={"limit": DistanceLimit.at(one.limit.rule, distance_m)})
+        if isinstance(one.limit, DistanceLimit)
+        else one
+        for one in spec.requirements
+    )
+    return spec.model_copy(update={"requirements": requirements})
 
 
 def _named(candidates: tuple[Candidate[E], ...], identity: str | None) -> E | None:

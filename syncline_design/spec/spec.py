@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from datetime import date
 from fractions import Fraction
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
-from pydantic import Field, ValidationInfo, model_validator
+from pydantic import Field, model_validator
 from pydantic import field_validator as reads_field
 from pydantic_core import PydanticCustomError
 
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
-from syncline_design.model.quantity import CURRENCIES, Dimension, Quantity
+from syncline_design.model.quantity import CURRENCIES, Quantity
 from syncline_design.spec.choices import MethodChoice, StageChoice, one_or_candidates
 from syncline_design.spec.effects_listed import EffectChoice as EffectChoice
 from syncline_design.spec.fields import (
@@ -25,88 +24,20 @@ from syncline_design.spec.fields import (
     PositiveNumber,
     Text,
     did_you_mean,
-    read_number,
-    read_quantity,
     refusal,
     refusals,
 )
 from syncline_design.spec.log_block import LogChoice as LogChoice
 from syncline_design.spec.log_block import split_column as split_column
+from syncline_design.spec.requirement import JUDGED_KINDS as JUDGED_KINDS
+from syncline_design.spec.requirement import STATED_KINDS as STATED_KINDS
+from syncline_design.spec.requirement import Requirement as Requirement
+from syncline_design.spec.requirement import Waiver as Waiver
 from syncline_design.spec.yaml_text import KeyPath
 
 MOST_REQUIREMENTS = 1_000
 MOST_STAGES = 32  # the work grows with the square of their number; chains have two or three
 MOST_EFFECTS = 1_000  # each acts on every simulated sample; a system is known by a few
-
-LIMIT_DIMENSIONS: dict[str, Dimension] = {
-    "accuracy": Dimension.LENGTH,
-    "sync": Dimension.DIMENSIONLESS,
-    "cost": Dimension.MONEY,
-    "mass": Dimension.MASS,
-    "power": Dimension.POWER,
-    "monte_carlo": Dimension.LENGTH,
-}
-
-
-class Waiver(FileRecord):
-    """Why a requirement may be missed, and until when."""
-
-    reason: Text
-    expires: str  # a date, 2027-01-31; the requirement counts again after it
-
-    @reads_field("expires", mode="after")
-    @classmethod
-    def _is_date(cls, value: str) -> str:
-        try:
-            date.fromisoformat(value)
-        except ValueError:
-            raise refusal("not a date", "a date such as 2027-01-31", repr(value)) from None
-        return value
-
-    def holds_on(self, day: date) -> bool:
-        """Whether the waiver still counts; its last day does."""
-        return day <= date.fromisoformat(self.expires)
-
-
-class Requirement(FileRecord):
-    """One requirement; limit is a Quantity of the kind's dimension (a bare number for sync)."""
-
-    id: Text
-    kind: Literal["accuracy", "sync", "cost", "mass", "power", "monte_carlo"]
-    limit: float
-    quantile: float | None = None
-    waiver: Waiver | None = None
-    note: str = ""
-
-    @reads_field("limit", mode="plain", json_schema_input_type=str | float)
-    @classmethod
-    def _read_limit(cls, value: Any, info: ValidationInfo) -> Any:
-        kind = info.data.get("kind")
-        if kind is None:  # its own error is enough
-            return value
-        if kind == "sync":
-            return read_number(value, 0.0, above=True)
-        above = kind in ("accuracy", "monte_carlo")
-        return read_quantity(value, LIMIT_DIMENSIONS[kind], 0.0, above)
-
-    @reads_field("quantile", mode="plain", json_schema_input_type=float)
-    @classmethod
-    def _read_quantile(cls, value: Any) -> Quantity | None:
-        if value is None:
-            return None
-        number = read_number(value)
-        if not 0.0 < number < 1.0:
-            raise refusal("out of range", "between 0 and 1, such as 0.95", number.text)
-        return number
-
-    @model_validator(mode="after")
-    def _quantile_fits_kind(self) -> Requirement:
-        if self.kind == "monte_carlo" and self.quantile is None:
-            raise refusals([(("quantile",), refusal("missing", "a quantile such as 0.95"))])
-        if self.kind != "monte_carlo" and self.quantile is not None:
-            message = f"a {self.kind} requirement takes no quantile"
-            raise refusals([(("quantile",), refusal(message, hint="delete it"))])
-        return self
 
 
 class Trajectory(FileRecord):

@@ -32,7 +32,8 @@ from syncline_design.simulation import Decision, SimulationError, SimulationSett
 from syncline_design.simulation.run import DEFAULT_CAP
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw
-from syncline_design.spec.spec import Requirement
+from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS, Requirement
+from syncline_design.verdict.stated import keeps, value_m, wanted_of
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
 WHAT_IF_CAP = 400_000  # samples after which a what-if is left open, and so not offered
@@ -68,10 +69,12 @@ class Simulations:
     """Decisions of one command, by what was simulated.
 
     today: the day on which waivers are judged; a waived requirement decides nothing.
+    kinds: of requirements that are judged design by design.
     """
 
     seed: int = 0
     today: date | None = None
+    kinds: tuple[str, ...] = JUDGED_KINDS
     most: int = MOST_SIMULATED
     known: dict[tuple[System, SimulationSettings, float, float], Decision] = field(
         default_factory=dict
@@ -97,21 +100,21 @@ class Simulations:
             return self.known[key]
         kept = self.guessed if what_if else self.known
         if key not in kept:
-            self._count(nameless)
+            self.count(nameless)
             cap = WHAT_IF_CAP if what_if or case is not self.asked else DEFAULT_CAP
             kept[key] = decide(*key, cap)
         return kept[key]
 
-    def _count(self, nameless: System) -> None:
-        """Unfinished once too many different systems were simulated."""
-        self.systems.add(nameless)
+    def count(self, system: System) -> None:
+        """One more system to simulate; Unfinished once there were too many."""
+        self.systems.add(_nameless(system))
         if len(self.systems) > self.most:
             self.refusals += 1
             raise Unfinished(f"the search stopped after {self.most} simulated designs")
 
     def problem_of(self, case: Case) -> Problem:
         """The design problem of a spec, its simulated requirements included."""
-        wanted = [r for r in case.spec.requirements if r.kind == "monte_carlo"]
+        wanted = [r for r in case.spec.requirements if r.kind in self.kinds]
         wanted = [r for r in wanted if not self._is_waived(r)]
         problem = problem_of(case)
         self.asked = self.asked or case
@@ -205,6 +208,12 @@ class _SpecJudge:
         return system, grown
 
     def _status(self, system: System, name: str, limit_m: float, *, what_if: bool) -> str:
+        requirement = self._requirement(name)
+        if requirement.kind in STATED_KINDS:
+            self.simulations.count(system)
+            wanted = wanted_of(requirement)
+            kept = keeps(_nameless(system), wanted, limit_m, self.simulations.seed)
+            return "pass" if kept else "fail"
         try:
             return self._decision(system, name, limit_m, what_if=what_if).status
         except SimulationError as error:
@@ -212,16 +221,23 @@ class _SpecJudge:
                 refuse_trajectory(self.case, str(error))
             return "indeterminate"
 
+    def _requirement(self, name: str) -> Requirement:
+        return next(one for one in self.requirements if one.id == name)
+
     def _decision(
         self, system: System, name: str, limit_m: float, *, what_if: bool = False
     ) -> Decision:
-        own = next(r for r in self.requirements if r.id == name)
+        own = self._requirement(name)
         moved = what_if or limit_m != float(own.limit)
         quantile = float(own.quantile or 0.0)
         return self.simulations.decide(self.case, system, quantile, limit_m, what_if=moved)
 
     def reached_m(self, problem: Problem, design: Design, requirement: str) -> float:
-        """Upper end of the interval of the quantile that the requirement limits [m]."""
+        """What the requirement limits [m], of a simulated quantile the interval's upper end."""
+        one = self._requirement(requirement)
+        if one.kind in STATED_KINDS:
+            system = _nameless(self._system(problem, design)[0])
+            return value_m(system, wanted_of(one), float(one.limit), self.simulations.seed)
         limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
         system, _ = self._system(problem, design)
         return self._decision(system, requirement, limit).estimate.high_m

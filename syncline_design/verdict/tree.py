@@ -16,6 +16,7 @@ from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
+from syncline_design.spec.requirement import JUDGED_KINDS
 from syncline_design.verdict.named import ChoiceResult, NamedDesign
 
 SCHEMA = "syncline-design/verdict/v1"
@@ -31,7 +32,7 @@ EXIT_CODES: Mapping[str, int] = {
 }
 UNITS = {
     "accuracy": "m",
-    "monte_carlo": "m",
+    **dict.fromkeys(JUDGED_KINDS, "m"),
     "sync": "1",
     "feasible": "1",
     "mass": "kg",
@@ -58,7 +59,8 @@ class RequirementResult(Record):
     """One requirement, decided: value against limit; made by `decided`.
 
     line, column: its place in the spec, None of one that no one wrote; quantile, low, high: of a
-    simulated one, with the interval of its value.
+    simulated one, with the interval of its value; axis: of the error that an rmse or a quantile
+    limits; at_distance_m: range of the last stage that the value is for.
     """
 
     id: str
@@ -75,6 +77,8 @@ class RequirementResult(Record):
     quantile: float | None = optional()
     low: float | None = optional()
     high: float | None = optional()
+    axis: str | None = optional()
+    at_distance_m: float | None = optional()
     waiver: WaiverResult | None = optional()
 
     @property

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.chosen_system import system_of
-from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.outcome import Proof
 from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.choice.table import Design, Problem
@@ -23,7 +22,7 @@ from syncline_design.simulation import CrossCheck, Decision, SimulationError, cr
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw, load
 from syncline_design.spec.references import names_candidates
-from syncline_design.spec.spec import Requirement
+from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS, Requirement
 from syncline_design.verdict.acceptance import (
     MOST_SIMULATED,
     Simulations,
@@ -42,6 +41,7 @@ from syncline_design.verdict.design_data import (
 from syncline_design.verdict.measured import claim_cautions, measured
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.recheck import Recheck, recheck
+from syncline_design.verdict.stated import value_m, wanted_of
 from syncline_design.verdict.tree import (
     UNITS,
     Caution,
@@ -52,6 +52,7 @@ from syncline_design.verdict.tree import (
     Verdict,
     WaiverResult,
     decided,
+    finite,
 )
 from syncline_design.verdict.verified import (
     Verified,
@@ -162,9 +163,8 @@ def unfinished_verdict(
 
 def _build(settings: CheckSettings) -> Build:
     """How a spec becomes a problem: with simulated requirements, unless nothing is simulated."""
-    if not settings.monte_carlo:
-        return problem_of
-    return Simulations(settings.seed, settings.today).problem_of
+    kinds = JUDGED_KINDS if settings.monte_carlo else STATED_KINDS
+    return Simulations(settings.seed, settings.today, kinds).problem_of
 
 
 def picked_design(case: Case, seed: int = 0) -> tuple[Problem, Design]:
@@ -263,7 +263,7 @@ def _unmet(
 ) -> RequirementResult:
     """A requirement of a spec without a design: part of the conflict, or not reached."""
     unit = UNITS.get(one.kind, case.spec.currency)
-    quantile = None if one.quantile is None else float(one.quantile)
+    quantile = one.share
     status: Status = "fail" if in_conflict else "indeterminate"
     part = "part of the conflict" if minimal else "perhaps part of the conflict"
     note = part if in_conflict else "no design to judge it by"
@@ -281,10 +281,14 @@ def _passed_over(picked: Picked) -> Iterator[Caution]:
     if not passed_over:
         return
     count = f"{passed_over} design{'s' if passed_over > 1 else ''}"
-    message = f"{count} that come before this one keep every sum but not the Monte Carlo limits"
+    rows = () if picked.verified is None else picked.verified.requirements
+    stated = [row.id for row in rows if row.kind in STATED_KINDS]
+    judged = [row.id for row in rows if row.kind in JUDGED_KINDS]
+    limits = f"the limits of {', '.join(judged)}" if stated else "the Monte Carlo limits"
+    message = f"{count} that come before this one keep every sum but not {limits}"
     if not picked.exhausted:
         message = (
-            f"{count} keep every sum but not the Monte Carlo limits; shown is the first; the "
+            f"{count} keep every sum but not {limits}; shown is the first; the "
             f"search stopped after {MOST_SIMULATED} simulated designs"
         )
     yield Caution("passed-over", message)
@@ -337,6 +341,8 @@ def _results(
     for index, requirement in enumerate(case.spec.requirements):
         if requirement.kind == "monte_carlo":
             result = _simulated(case, requirement, system, found, settings)
+        elif requirement.kind in STATED_KINDS:
+            result = _stated(case, requirement, system, settings)
         else:
             one = rechecked[requirement.id]
             result = decided(
@@ -381,6 +387,30 @@ def _simulated(
         note=_samples_note(decision, simulation.samples),
         **about,
     )
+
+
+def _stated(
+    case: Case, requirement: Requirement, system: System, settings: CheckSettings
+) -> RequirementResult:
+    """A requirement on a figure of the error, at its worst situation."""
+    limit = float(requirement.limit)
+    about: dict[str, Any] = {
+        "id": requirement.id, "kind": requirement.kind, "limit": limit,
+        "unit": UNITS[requirement.kind], "quantile": requirement.share,
+        "axis": requirement.axis or requirement.of,
+    }  # fmt: skip
+    try:
+        value = value_m(system, wanted_of(requirement), limit, settings.seed)
+    except OutOfTime:
+        note = "the time limit ended the search for its worst situation"
+        return decided(status="indeterminate", value=None, note=note, **about)
+    except SimulationError as error:
+        return decided(status="indeterminate", value=None, note=str(error), **about)
+    distance = float(case.stages[-1].platform.entry.distance)
+    return decided(
+        status="pass" if value <= limit else "fail", value=finite(value), at_distance_m=distance,
+        **about,
+    )  # fmt: skip
 
 
 def _samples_note(decision: Decision, asked: int) -> str:
