@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import jsonschema
 import pytest
@@ -13,7 +14,7 @@ import pytest
 from syncline_design.machine.records import NotThisResultError, Record, read_as
 from syncline_design.paper.reproduce import Reproduction, reproduce
 from syncline_design.report.json_out import json_text
-from syncline_design.report.result_schemas import ResultName, result_schema
+from syncline_design.report.result_schemas import RESULTS, ResultName, result_schema
 from syncline_design.simulation import Simulation, SimulationSettings, simulate
 from syncline_design.spec.load import load
 from syncline_design.verdict.simulated_spec import simulate_spec
@@ -91,3 +92,13 @@ def test_an_open_quantile_is_infinite_again_when_read() -> None:
     again = read_as(Simulation, json_text(result.to_json()))
     assert again == replace(result, grid=again.grid)
     assert again.monte_carlo.quantile(0.997).high_m == float("inf")
+
+
+@pytest.mark.parametrize("name", get_args(ResultName))
+def test_a_result_is_read_by_its_own_name_alone(name: ResultName) -> None:
+    """Another version, or another kind, is none: the schema says `const`, so does reading."""
+    kind, schema = RESULTS[name]
+    for one in get_args(kind) or (kind,):
+        with pytest.raises(NotThisResultError) as caught:
+            read_as(one, json.dumps({"schema": f"{schema}0"}))
+        assert f"schema: Input should be '{schema}'" in str(caught.value)

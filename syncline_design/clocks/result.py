@@ -6,11 +6,11 @@ Offsets are local minus reference: a clock that is 1 ms late gives -1 ms.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Annotated, Final, Literal
 
 from syncline_design.clocks.sessions import EventKind
 from syncline_design.machine.input_files import FileRead
-from syncline_design.machine.records import Record, optional
+from syncline_design.machine.records import Named, Record, optional
 
 SCHEMA: Final = "syncline-design/timing/v1"
 RestsOn = Literal["independent", "servo", "servo_and_declared", "unknown", "unknown_and_declared"]
@@ -135,7 +135,7 @@ class Timing(Record):
     forbids any claim until it is explained.
     """
 
-    schema: str = SCHEMA
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
     sessions: tuple[SessionResult, ...]
     bound_s: float | None
     event_bound_s: float | None

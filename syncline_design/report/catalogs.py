@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Annotated, Any, Final
 
-from syncline_design.machine.records import Record, optional
+from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.conversion import conversion_of
 from syncline_design.model.quantity import Quantity, UnitError, format_quantity
 from syncline_design.report.render_console import aligned
@@ -113,7 +113,7 @@ class Undecided(Record):
 class CatalogList(Record):
     """Entries that fit, and those of which a fact that was asked for is not known."""
 
-    schema: str
+    schema: Annotated[str, Named(LIST_SCHEMA)]
     entries: tuple[ListedEntry, ...]
     undecided: tuple[Undecided, ...]
 
@@ -151,7 +151,7 @@ class ShownFigure(Record):
 class WholeEntry(Record):
     """One entry of a catalog, whole."""
 
-    schema: str
+    schema: Annotated[str, Named(ENTRY_SCHEMA)]
     section: str
     id: str
     name: str

@@ -19,7 +19,7 @@ from syncline_design.studies import data as study
 from syncline_design.verdict import optimise
 from syncline_design.verdict import tree as verdict
 
-_RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
+RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "catalog-check": (catalog_check.CatalogCheck, catalog_check.SCHEMA),
     "catalog-entry": (catalogs.WholeEntry, catalogs.ENTRY_SCHEMA),
     "catalog-list": (catalogs.CatalogList, catalogs.LIST_SCHEMA),
@@ -38,7 +38,7 @@ RESULT_NAMES: Final[tuple[ResultName, ...]] = get_args(ResultName)
 
 def result_schema(name: ResultName) -> dict[str, Any]:
     """The schema of one kind of result as plain data (draft 2020-12)."""
-    kind, schema = _RESULTS[name]
+    kind, schema = RESULTS[name]
     return schema_of(kind, schema, f"syncline-design {name}")
 
 

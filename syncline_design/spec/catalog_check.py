@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
-from typing import Any, Final, Literal
+from typing import Annotated, Any, Final, Literal
 
-from syncline_design.machine.records import Record, optional
+from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.conversion import conversion_of, printed_value
 from syncline_design.model.quantity import UnitError, format_like
 from syncline_design.spec.catalog import SECTIONS, Catalog, Entry, Product, SensorEntry
@@ -75,7 +75,7 @@ class CatalogFinding(Record):
 class CatalogCheck(Record):
     """What was looked at and what was found."""
 
-    schema: str
+    schema: Annotated[str, Named(SCHEMA)]
     files: tuple[str, ...]
     entries: int
     findings: tuple[CatalogFinding, ...]
