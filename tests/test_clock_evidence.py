@@ -27,6 +27,7 @@ from syncline_design.spec.load import load
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 from tests import clock_logs as made
 from tests.clock_logs import START, sessions_csv, write
+from tests.html_page import Page
 
 ROOT = Path(__file__).parent.parent
 SPEC = """\
@@ -456,6 +457,9 @@ def test_outputs_agree_and_are_as_the_schema_says(tmp_path: Path) -> None:
 
     again = read_as(TimingAndSpec, data.read_text("utf-8"))
     assert again.to_json() == told
+    seen = Page(page.read_text("utf-8"))
+    assert (seen.open, seen.unbalanced) == ([], [])
+    assert len(seen.attribute("svg", "aria-labelledby")) == 3
     for words in ("Offset over time", "TDEV and MTIE", "Sessions against the bound"):
         assert words in page.read_text("utf-8")
     assert "No τ changes" not in text.read_text("utf-8") or told["spec"]["before"]

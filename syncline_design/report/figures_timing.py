@@ -74,26 +74,38 @@ def _time_or_zero(value: float) -> str:
 
 
 def sessions(
-    rows: Sequence[SessionResult], coverage: float, bounds: Sequence[tuple[str, float]]
-) -> InlineFigure:
-    """What |offset| stays below in each session, against the bounds; logarithmic."""
-    values = [row.quantile_s or 0.0 for row in rows]
+    rows: Sequence[tuple[int, SessionResult]], coverage: float,
+    bounds: Sequence[tuple[str, float]],
+) -> InlineFigure:  # fmt: skip
+    """What |offset| stays below in each session, against the bounds; logarithmic.
+
+    rows: sessions with their numbers.
+    """
+    numbered = [number for number, _ in rows]
+    values = [row.quantile_s or 0.0 for _, row in rows]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        axes.plot(range(1, len(values) + 1), values, linestyle="none", marker="o", markersize=4.5,
+        axes.plot(numbered, values, linestyle="none", marker="o", markersize=4.5,
                   color=SERIES[0], label=f"{numbers.percent(coverage)} of a session")  # fmt: skip
         for k, (label, value) in enumerate(bounds):
             axes.axhline(value, color=SERIES[1 + k], linewidth=1.3, label=label,
                          linestyle=((0, (5, 3)), (0, (2, 2)))[k % 2])  # fmt: skip
         _log_times(axes, "y", [v for v in (*values, *(b for _, b in bounds)) if v > 0.0])
         axes.set_xlabel("session")
+        _whole_ticks(axes)
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.2), ncols=3)
         scales.grid(axes, "y")
 
     spoken = "; ".join(f"{label} {numbers.time(value)}" for label, value in bounds)
     shown = f"{len(values)} sessions, largest {numbers.time(max(values))}; {spoken}"
     return draw("fig-sessions", "Sessions against the bound", shown, (WIDTH, 240.0), build)
+
+
+def _whole_ticks(axes: Axes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    axes.xaxis.set_major_locator(MaxNLocator(8, integer=True))
 
 
 def _log_times(axes: Axes, which: str, values: Sequence[float]) -> None:

@@ -251,7 +251,7 @@ def _offsets(result: Timing) -> list[Node]:
 
 
 def _sessions(result: Timing) -> list[Node]:
-    counted = [one for one in result.sessions if one.counted and one.quantile_s]
+    counted = [(k, one) for k, one in enumerate(result.sessions) if one.counted and one.quantile_s]
     both = (("statistical", result.statistical_bound_s), ("hard", result.hard_bound_s))
     bounds = [(name, value) for name, value in both if value]
 
