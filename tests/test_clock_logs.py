@@ -216,6 +216,7 @@ REFUSED = {
     "no time": (b"epoch,offset_us\n" + b"1,2\n" * 30, "no time"),
     "no number": (b"time_s,offset_us\n1,2\n2,x\n", "no number in column offset"),
     "infinite": (b"time_s,offset_us\n1,2\n2,inf\n", "no number in column offset"),
+    "beyond": (b"time_s,offset_us\n1,2\n2,1e300\n", "no number in column offset"),
     "ragged": (b"time_s,offset_us\n1,2\n2\n3,4\n", "a row has not the header's cells"),
     "two offsets": (b"time_s,offset_us,offset_ms\n1,2,3\n", "two columns of one meaning"),
     "damaged gzip": (b"\x1f\x8b" + bytes(30), "damaged gzip file"),

@@ -14,7 +14,7 @@ from datetime import UTC, datetime
 from typing import Final
 
 from syncline_design.clocks.files import LogFile, refused
-from syncline_design.clocks.series import Row, Sheet, SourceKind
+from syncline_design.clocks.series import FARTHEST_S, Row, Sheet, SourceKind
 from syncline_design.machine.deadline import in_force
 
 _UNITS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "\N{MICRO SIGN}s": 1e-6,
@@ -158,10 +158,11 @@ class _Cells:
                 value = float(text.replace(",", ".") if self.comma else text)
             except ValueError:
                 value = math.inf
-            if not math.isfinite(value):
+            value *= float(key.split(" ")[1])
+            if not abs(value) < FARTHEST_S:
                 raise refused(self.file.path, f"no number in column {name}", line=self.line,
                               column=place + 1, found=repr(text[:40]))  # fmt: skip
-            return value * float(key.split(" ")[1])
+            return value
         return None
 
     def _time(self) -> float | None:

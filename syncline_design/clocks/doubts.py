@@ -27,6 +27,7 @@ def doubts(series: Sequence[Series], sessions: Sequence[ClockSession]) -> tuple[
         *_levels(sessions),
         *_units(sessions),
         *_own_bound(sessions),
+        *_stuck(sessions),
     ]
     return tuple(dict.fromkeys(found))
 
@@ -100,4 +101,19 @@ def _own_bound(sessions: Sequence[ClockSession]) -> Iterator[str]:
         if np.sum(known) >= 20 and float(np.mean(beyond)) > 0.5:
             yield (f"{session.series.kind.name}: most offsets are beyond the bound given beside "
                    "them: are the units the same?")  # fmt: skip
+            return
+
+
+def _stuck(sessions: Sequence[ClockSession]) -> Iterator[str]:
+    """A session whose offset never changes; whole nanoseconds of linuxptp may well not."""
+    for session in sessions:
+        offsets = session.offsets
+        if not session.is_counted or session.series.kind.family == "linuxptp":
+            continue
+        if bool(np.all(offsets == offsets[0])):
+            stamps = session.series.kind.stamps
+            yield (f"{session.series.kind.name}: the offset never changes in the session from "
+                   f"{moment(float(session.series.time_s[0]), stamps)} "
+                   f"({offsets.shape[0]} samples of {shown(float(offsets[0]))}): is the log stuck?"
+                   )  # fmt: skip
             return

@@ -30,6 +30,7 @@ _SUMMARY: Final = re.compile(
 _LOST: Final = re.compile(r"port \d{1,5}[^:]{0,64}: SLAVE to (?!SLAVE)|link down")
 _STARTED: Final = re.compile(r"INITIALIZING to LISTENING on INIT_COMPLETE|selected /dev/ptp\d+ as")
 _UNIX: Final = 1e9
+RESOLUTION_S: Final = 0.5e-9  # of whole nanoseconds
 _MOST: Final = 512  # characters before and behind a program's name
 _RANKS: Final = {"phc2sys": 1, "ptp4l": 2, "ts2phc": 3}
 _STEERING: Final[dict[str, Steering]] = {
@@ -92,7 +93,11 @@ class Reader:
             return None
         what = ((found or summary) or found)["what"]  # type: ignore[index]
         offset_s = 1e-9 * int(offset)
-        hard = abs(offset_s) + 1e-9 * abs(int(delay or 0)) * (0.5 if key[0] == "phc2sys" else 1.0)
+        hard = (
+            abs(offset_s)
+            + RESOLUTION_S
+            + 1e-9 * abs(int(delay or 0)) * (0.5 if key[0] == "phc2sys" else 1.0)
+        )
         if key[0] == "phc2sys" and (what or "phc").strip() == "phc":
             what = "CLOCK_REALTIME"  # older versions name only the side that they compare with
         kind = _kind(key, what, time_s)

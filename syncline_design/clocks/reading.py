@@ -12,7 +12,7 @@ import numpy as np
 
 from syncline_design.clocks import chrony, columns, linuxptp, ntpd, pulses
 from syncline_design.clocks.files import LogFile, read_files, refused
-from syncline_design.clocks.series import Row, Series, Sheet, SourceKind, series_of
+from syncline_design.clocks.series import FARTHEST_S, Row, Series, Sheet, SourceKind, series_of
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead
 
@@ -92,8 +92,8 @@ def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:
 
 def _is_finite(row: Row) -> bool:
     """Figures that are some; only a line that says that lock was lost has no offset."""
-    known = math.isfinite(row.offset_s) or (math.isnan(row.offset_s) and not row.locked)
-    return math.isfinite(row.time_s) and known and not math.isinf(row.hard_s)
+    known = abs(row.offset_s) < FARTHEST_S or (math.isnan(row.offset_s) and not row.locked)
+    return abs(row.time_s) < FARTHEST_S and known and not abs(row.hard_s) >= FARTHEST_S
 
 
 def _strange(file: LogFile, strange: list[int], total: int) -> list[str]:

@@ -6,7 +6,7 @@ import math
 from array import array
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ Flags = NDArray[np.bool_]
 Family = Literal["chrony", "ntpd", "linuxptp", "gpsd", "ppstest", "csv"]
 Steering = Literal["servo", "independent", "unknown"]
 Stamps = Literal["utc", "boot"]
+FARTHEST_S: Final = 1e11  # 3 000 years: neither a stamp nor an offset
 
 
 class Row(NamedTuple):

@@ -164,7 +164,8 @@ def _claim(
         why = ("one session says nothing about the next start" if len(counted) == 1
                else f"{len(counted)} sessions are too few")  # fmt: skip
     elif min(int(np.sum(s.steady)) for s in counted) * (1.0 - settings.coverage) < 1.0:
-        why = f"sessions with too few samples to say {100.0 * settings.coverage:.6g} % of anything"
+        why = ("too few samples in a session to say what holds for "
+               f"{100.0 * settings.coverage:.6g} % of its time")  # fmt: skip
     elif figures.bound_s is None:
         why = "the logs hold nothing that a hard bound could be made of"
     durations = [s.duration_s for s in counted]

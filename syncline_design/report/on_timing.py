@@ -97,7 +97,8 @@ def _sentences(result: Timing) -> Iterator[str]:
                f"{numbers.percent(claim.coverage)} of its time. It says nothing about the next "
                f"start: {_more(result)}.")  # fmt: skip
     elif not result.doubts:
-        yield f"{_sentence(claim.why_not or '')}: {_more(result)}."
+        more = f": {_more(result)}" if claim.needs_sessions else ""
+        yield f"{_sentence(claim.why_not or '')}{more}."
     else:
         yield "Nothing is claimed and nothing written until the doubts below are explained."
 
@@ -118,8 +119,6 @@ def _claim_words(result: Timing) -> str:
 
 def _more(result: Timing) -> str:
     need = result.claim.needs_sessions
-    if not need:
-        return "more samples are needed"
     return f"{need} more session{'s' if need > 1 else ''} would carry the claim"
 
 
