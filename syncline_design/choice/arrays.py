@@ -119,7 +119,9 @@ def _beside(
 
 
 def _matters(problem: Problem, name: ResourceName, tracked: tuple[int, ...]) -> bool:
-    """Whether a resource can tell designs apart."""
+    """Whether a resource can tell designs apart: not where no design says how much it takes."""
+    if any(len(t.options) and t.options.spent(name).is_silent for t in problem.roles):
+        return False
     amounts = _beside(problem, name, tracked)
     return any(a is None or a for a in amounts) or any(
         table.options.spent(name).whole.any() for table in problem.roles

@@ -24,6 +24,8 @@ from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
 from syncline_design.choice.table import ClockOption, Problem, VehicleTable
 
 STEPS = 64  # of the staircases that bound what is still to come
+MANY = 2000  # labels that are looked up in a grid of so many amounts:
+GRID = 128
 FEW = 64  # partial designs that are not worth comparing with one another
 
 
@@ -34,12 +36,11 @@ class Ceiling:
     amount: Column
     total: Floats
 
-    def reaches(self, amount: Floats, total: Floats) -> Bools:
-        """Whether these least figures come as low as every known design of no larger amount."""
+    def lowest(self, amount: Floats) -> Floats:
+        """The least error among known designs of no larger amount; infinite where there is none."""
         known = self.amount.astype(np.float64)
-        place = np.searchsorted(known, amount * (1.0 - MARGIN), side="right") - 1
-        best = np.where(place >= 0, self.total[np.maximum(place, 0)], np.inf)
-        return np.asarray(total <= best * (1.0 + MARGIN))
+        place = np.searchsorted(known, amount * (1.0 - MARGIN), side="right")
+        return np.asarray(np.append(np.inf, self.total)[place])
 
 
 def lowered(ceiling: Ceiling | None, labels: Labels, total: Floats) -> Ceiling:
@@ -387,19 +388,33 @@ class Merge:
         Whatever the roles still to come are, they add no less than some step of their staircase.
         """
         assert self.ceiling is not None
-        out = np.zeros(len(labels), dtype=bool)
-        left = np.arange(len(labels))
         amount, error = labels.resources[0].astype(np.float64), labels.error
         demanded, caused = self._demanded(labels, bound, role), self._caused(labels, bound)
         steps = self.after.steps[role]
+        if self.safety is None and len(labels) > MANY:
+            return self._below_on_grid(amount, error + caused, steps)
+        out = np.zeros(len(labels), dtype=bool)
+        left = np.arange(len(labels))
         for more, adds in zip(steps.amount.tolist(), steps.error.tolist(), strict=True):
             total = np.maximum(error[left] + adds, demanded[left]) + caused[left]
-            below = self.ceiling.reaches(amount[left] + more, total)
+            below = self.ceiling.lowest(amount[left] + more) >= total * (1.0 - MARGIN)
             out[left[below]] = True
             left = left[~below]
             if not len(left):
                 break
         return out
+
+    def _below_on_grid(self, amount: Floats, total: Floats, steps: Stairs) -> Bools:
+        """The same for many labels: what each amount leaves to err, looked up in a grid of them.
+
+        The larger the amount, the less it leaves; between two amounts of the grid the smaller one
+        counts, so that none is dropped that may come below.
+        """
+        assert self.ceiling is not None
+        grid = np.unique(np.append(amount[:: len(amount) // GRID], amount.min()))
+        known = self.ceiling.lowest(np.add.outer(grid, steps.amount)) * (1.0 + MARGIN)
+        leaves = (known - steps.error).max(axis=1)
+        return np.asarray(total <= leaves[np.searchsorted(grid, amount, side="right") - 1])
 
 
 class Remaining:

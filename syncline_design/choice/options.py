@@ -130,6 +130,11 @@ class Spent:
         return self.whole.dtype != object or not any(top == math.inf for top in self.whole)
 
     @property
+    def is_silent(self) -> bool:
+        """Whether no amount is given."""
+        return self.whole.dtype == object and all(top == math.inf for top in self.whole)
+
+    @property
     def largest(self) -> int:
         """The largest known amount, without its sign, in whole units."""
         if self.whole.dtype != object:
