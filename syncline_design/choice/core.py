@@ -10,14 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from fractions import Fraction
 
 import numpy as np
 
-from syncline_design.choice.evaluate import broken, evaluate, known_or_more
+from syncline_design.choice.evaluate import Known, known_or_more, resource_of
 from syncline_design.choice.narrowed import Narrowed, narrowed, whole_of
-from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, Options, ResourceName
+from syncline_design.choice.options import MARGIN, Bools, Floats, Indices, Options
 from syncline_design.choice.partition import best_of
 from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
 from syncline_design.choice.table import Design, Problem
@@ -25,29 +23,6 @@ from syncline_design.machine.deadline import in_force
 
 EXACT = 2**52  # sums of whole amounts below it are exact as floats
 TIED = 1e-11  # errors of one order: 12 figures
-
-
-@dataclass(frozen=True, slots=True)
-class Known:
-    """A design that meets every sum: what others have to come below."""
-
-    design: Design
-    amount: Fraction | float  # of the objective's resource; infinite where it does not say
-    total_m: float
-
-    @classmethod
-    def of(cls, problem: Problem, design: Design) -> Known | None:
-        """None where the design breaks a requirement."""
-        found = evaluate(problem, design)
-        if broken(problem, found):
-            return None
-        amount = known_or_more(found.amount(resource_of(problem)))
-        return cls(design, amount, found.error_m)
-
-
-def resource_of(problem: Problem) -> ResourceName:
-    """The resource that a front sets against error when a design is chosen."""
-    return "cost" if problem.objective == "error" else problem.objective
 
 
 class Beside:
@@ -166,7 +141,7 @@ def best_from(problem: Problem, design: Design | None, beside: Beside) -> Design
     left = core(problem, known, beside)
     if left.problem.combinations == 1:
         return known.design
-    return best_of(left, in_force())
+    return best_of(left, in_force(), known)
 
 
 def _every_clock(problem: Problem) -> list[range]:

@@ -198,3 +198,26 @@ def rank(problem: Problem, design: Design, found: Evaluation) -> Rank:
     names: list[tuple[str, ...]] = [o.names for o in chosen_options(problem, design)]
     names += [(clock.id or "",) for clock in chosen_clocks(problem, design)]
     return (first, error, sums[0], sums[1], sums[2], tuple(names))
+
+
+@dataclass(frozen=True, slots=True)
+class Known:
+    """A design that meets every sum: what others have to come below."""
+
+    design: Design
+    amount: Fraction | float  # of the objective's resource; infinite where it does not say
+    total_m: float
+
+    @classmethod
+    def of(cls, problem: Problem, design: Design) -> Known | None:
+        """None where the design breaks a requirement."""
+        found = evaluate(problem, design)
+        if broken(problem, found):
+            return None
+        amount = known_or_more(found.amount(resource_of(problem)))
+        return cls(design, amount, found.error_m)
+
+
+def resource_of(problem: Problem) -> ResourceName:
+    """The resource that a front sets against error when a design is chosen."""
+    return "cost" if problem.objective == "error" else problem.objective

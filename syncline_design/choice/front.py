@@ -26,6 +26,7 @@ import numpy as np
 
 from syncline_design.choice.arrays import Tables, tabulate, tie_order, useful_options
 from syncline_design.choice.evaluate import (
+    Known,
     Rank,
     error_key,
     evaluate,
@@ -104,30 +105,45 @@ def merged_front(
     *,
     accuracy: bool,
     deadline: Deadline | None = None,
+    known: Known | None = None,
 ) -> Sequence[FrontPoint]:
-    """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12)."""
+    """The front; with `accuracy`, only designs whose error stays within the limit (1 + 1e-12).
+
+    known: a design that meets every sum; then only what comes no later in the order, by objective
+    and error, need be on it.
+    """
     demand_structure(problem)
     if is_empty(problem):
         return ()
     with within(deadline or in_force()) as end:
-        return _merged(problem, resource, accuracy, end)
+        return _merged(problem, resource, accuracy, end, known)
 
 
 def _merged(
-    problem: Problem, resource: ResourceName, accuracy: bool, end: Deadline
+    problem: Problem, resource: ResourceName, accuracy: bool, end: Deadline, known: Known | None
 ) -> Sequence[FrontPoint]:
     tables = _one_timeline(tabulate(problem, resource))
-    relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=None)
+    ceiling = None if known is None else _no_worse(tables, known)
+    relaxed = _merge_all(_reduced(tables), accuracy, end, guarded=False, ceiling=ceiling)
     holds = _hold_sync(tables, relaxed)
     held = relaxed.take(np.flatnonzero(holds))
     if bool(holds.all()):
         return _points(tables, [held]) if len(held.total) else ()
-    ceiling = None
     if bool(holds.any()):
-        ceiling = lowered(None, held.labels, held.total)
+        ceiling = lowered(ceiling, held.labels, held.total)
     guarded = _merge_all(tables, accuracy, end, guarded=True, ceiling=ceiling)
     parts = [part for part in (held, guarded) if len(part.total)]
     return _points(tables, parts) if parts else ()
+
+
+def _no_worse(tables: Tables, known: Known) -> Ceiling:
+    """What leaves nothing that comes after a known design, by objective and error."""
+    total = known.total_m * (1.0 + APART)
+    if tables.problem.objective == "error":
+        return Ceiling(np.array([-math.inf]), np.array([total]))
+    amount = float(known.amount * tables.keys[0].denominator)
+    dearer = amount + abs(amount) * 4.0 * MARGIN
+    return Ceiling(np.array([amount, dearer]), np.array([total, -math.inf]))
 
 
 def _reduced(tables: Tables) -> Tables:

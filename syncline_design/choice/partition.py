@@ -17,10 +17,10 @@ from typing import Literal
 
 import numpy as np
 
-from syncline_design.choice.evaluate import Rank, broken, evaluate, rank
+from syncline_design.choice.evaluate import Known, Rank, broken, evaluate, rank, resource_of
 from syncline_design.choice.front import merged_front
 from syncline_design.choice.narrowed import Narrowed, narrowed
-from syncline_design.choice.options import Indices, ResourceName
+from syncline_design.choice.options import Indices
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Deadline, in_force
 
@@ -66,14 +66,17 @@ def iter_differing(
             put(rest)
 
 
-def best_of(part: Narrowed, deadline: Deadline) -> Design | None:
-    """The first design of a part in the documented order, by merging, decided exactly."""
+def best_of(part: Narrowed, deadline: Deadline, known: Known | None = None) -> Design | None:
+    """The first design of a part in the documented order, by merging, decided exactly.
+
+    known: a design of the whole that is in the part: none worse is looked at.
+    """
     deadline.check()
     if part.is_empty:
         return None
     problem = part.problem
-    resource: ResourceName = "cost" if problem.objective == "error" else problem.objective
-    points = merged_front(problem, resource, accuracy=True, deadline=deadline)
+    resource = resource_of(problem)
+    points = merged_front(problem, resource, accuracy=True, deadline=deadline, known=known)
     for point in reversed(points) if problem.objective == "error" else points:
         if not broken(problem, evaluate(problem, point.design)):
             return part.whole(point.design)

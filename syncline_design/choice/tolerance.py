@@ -16,9 +16,9 @@ from fractions import Fraction
 from typing import Literal
 
 from syncline_design.choice.acceptable import judgement
-from syncline_design.choice.core import Beside, Known, best_from
+from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
-from syncline_design.choice.evaluate import chosen_options, evaluate
+from syncline_design.choice.evaluate import Known, chosen_options, evaluate
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
 from syncline_design.choice.problem import build_problem, selection_of, with_everything
@@ -31,7 +31,13 @@ from syncline_design.choice.variations import (
     sigma_figures,
     with_figure,
 )
-from syncline_design.choice.what_if import same_design, sensors_that_matter, with_sheet_figure
+from syncline_design.choice.what_if import (
+    Numbers,
+    numbers_of,
+    same_design,
+    sensors_that_matter,
+    with_sheet_figure,
+)
 from syncline_design.machine.records import Record
 from syncline_design.model.quantity import format_like
 from syncline_design.spec.case import Case
@@ -239,12 +245,14 @@ class _Asked:
     problem: Problem
     design: Design
     build: Build
+    numbers: Numbers
     beside: Beside | None
 
     @classmethod
     def of(cls, case: Case, problem: Problem, design: Design, build: Build) -> _Asked:
         plain = not case.effects and problem.judge is None
-        return cls(case, problem, design, build, Beside(problem) if plain else None)
+        beside = Beside(problem) if plain else None
+        return cls(case, problem, design, build, numbers_of(case, problem), beside)
 
     def worth_trying(self, figures: Sequence[tuple[SheetFigure, Ends]]) -> list[SheetFigure]:
         """The figures without those that cannot change the choice."""
@@ -262,7 +270,7 @@ class _Asked:
         """The problem with a figure changed, and the choice made anew."""
         value = quantity(end, figure.dimension)
         if self.beside is not None:
-            other = with_sheet_figure(self.case, self.problem, figure, value)
+            other = with_sheet_figure(self.case, self.problem, self.numbers, figure, value)
             at_hand = same_design(self.problem, self.design, other)
             return other, best_from(other, at_hand, self.beside)
         other = self.build(with_figure(self.case, figure, value))

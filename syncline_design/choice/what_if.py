@@ -18,7 +18,8 @@ from syncline_design.choice.candidates import (
     motion_of,
     sensor_error,
 )
-from syncline_design.choice.core import Beside, Known, may_improve, total_least
+from syncline_design.choice.core import Beside, may_improve, total_least
+from syncline_design.choice.evaluate import Known
 from syncline_design.choice.options import MARGIN, Bools, Floats, Option, Options
 from syncline_design.choice.problem import with_motions
 from syncline_design.choice.table import Design, Problem, RoleTable
@@ -103,22 +104,32 @@ def _with_pool(problem: Problem, r: int, pool: Options) -> Problem:
 
 
 def with_sheet_figure(
-    case: Case, problem: Problem, figure: SheetFigure, value: Quantity
+    case: Case, problem: Problem, numbers: Numbers, figure: SheetFigure, value: Quantity
 ) -> Problem:
     """The problem with one datasheet figure changed, in a case without known effects."""
     for r, table in enumerate(problem.roles):
         stage = case.stages[table.stage]
         if figure.place not in (None, (table.stage, table.role)):
             continue
-        for number, sensor in enumerate(candidates_of(case, table)):
-            if sensor.id != figure.sensor:
-                continue
-            rows = table.pool().sensor == number
-            if rows.any():
-                changed = with_changed(sensor.entry, figure, value)
-                error = sensor_error(changed, table.role, motion_of(stage))
-                problem = with_sensor_error(problem, r, rows, error) if error else problem
+        number = numbers[r].get(figure.sensor)
+        rows = table.pool().sensor == number
+        if number is not None and rows.any():
+            entry = candidates_of(case, table)[number].entry
+            changed = with_changed(entry, figure, value)
+            error = sensor_error(changed, table.role, motion_of(stage))
+            problem = with_sensor_error(problem, r, rows, error) if error else problem
     return problem
+
+
+Numbers = list[dict[str, int]]
+
+
+def numbers_of(case: Case, problem: Problem) -> Numbers:
+    """Of each role the numbers of its sensors in its columns."""
+    return [
+        {one.id: number for number, one in enumerate(candidates_of(case, table))}
+        for table in problem.roles
+    ]
 
 
 def candidates_of(case: Case, table: RoleTable) -> tuple[Candidate[SensorEntry], ...]:
