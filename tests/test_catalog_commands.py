@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
 from pathlib import Path
 from typing import Any
 
@@ -298,7 +299,7 @@ def test_findings_as_json_keep_to_their_schema(tmp_path: Path) -> None:
 def test_a_stub_reads_as_yaml_and_is_refused_until_it_is_filled_in(
     tmp_path: Path, kind: str
 ) -> None:
-    section, text = stub(kind, "2026-11-22")
+    section, text = stub(kind, "2026-11-22", lambda _, __: False)
     document = parse(f"{section}:\n{text}")
     assert not document.problems
     assert [*document.data[section]] == [f"new_{kind}"]
@@ -308,7 +309,7 @@ def test_a_stub_reads_as_yaml_and_is_refused_until_it_is_filled_in(
 
 
 def test_a_stub_filled_in_is_a_good_entry(tmp_path: Path) -> None:
-    _, text = stub("lidar", "2026-11-22")
+    _, text = stub("lidar", "2026-11-22", lambda _, __: False)
     for old, new in (
         ("_ cm", "2 cm"),
         ("_ deg .. _ deg", "-20 deg .. 20 deg"),
@@ -345,6 +346,48 @@ def test_an_entry_is_put_into_its_section() -> None:
         assert after.data == wanted, before
 
 
+@pytest.mark.parametrize("text", ["", "\n", "# mine\n", "  # mine, without an end"])
+def test_a_file_without_entries_takes_one(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(text, "utf-8")
+    assert run("add", "--from-template", "clock", "--to", str(path)).exit_code == 0
+    assert list(read(path).data["clocks"]) == ["new_clock"]
+    assert path.read_text("utf-8").startswith(text)
+
+
+def test_a_second_stub_gets_an_id_of_its_own(tmp_path: Path) -> None:
+    path = tmp_path / "mine.yaml"
+    for _ in range(3):
+        assert run("add", "--from-template", "usbl", "--to", str(path)).exit_code == 0
+    document = read(path)
+    assert not document.problems
+    assert list(document.data["sensors"]) == ["new_usbl", "new_usbl_2", "new_usbl_3"]
+
+
+@pytest.mark.parametrize("text", ["- one\n", "sensors: [a]\n", "sensors: 3\n", "just words\n"])
+def test_what_is_no_catalog_is_not_added_to(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "mine.yaml"
+    path.write_text(text, "utf-8")
+    result = run("add", "--from-template", "lidar", "--to", str(path))
+    assert result.exit_code == 2
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert path.read_text("utf-8") == text
+
+
+def test_thousands_of_entries_are_checked_in_seconds(tmp_path: Path) -> None:
+    """Siblings are compared by sorted sizes; pair by pair this took a minute."""
+    body = GOOD.removeprefix("sensors:\n")
+    entries = (
+        body.replace("acme_lidar_one", f"acme_lidar_{n}").replace("Acme One", f"Acme {n}")
+        for n in range(2000)
+    )
+    path = tmp_path / "mine.yaml"
+    path.write_text("sensors:\n" + "".join(entries), "utf-8")
+    start = time.process_time()
+    assert check_catalogs([path]).findings == ()
+    assert time.process_time() - start < 10.0
+
+
 def test_a_broken_file_is_not_added_to(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_text("sensors: {a: 1, a: 2}\n", "utf-8")
@@ -355,6 +398,7 @@ def test_a_broken_file_is_not_added_to(tmp_path: Path) -> None:
 
 def test_families_hold_what_their_lines_say() -> None:
     """The quick look into the families' lines agrees with reading them whole."""
+    core = _core_ids()
     for path in sorted(CATALOGS.glob("*/*.yaml")):
         data = read(path).data
         shown = f"builtin:{path.parent.name}/{path.name}"
@@ -372,7 +416,7 @@ def test_families_hold_what_their_lines_say() -> None:
         for section, entries in data.items():  # a family brings the hardware that it requires
             for entry in entries.values():
                 needed = {("infrastructure", one) for one in entry.get("requires", {})}
-                assert needed <= {*whole, *_core_ids()}, (section, path)
+                assert needed <= {*whole, *core}, (section, path)
 
 
 def _core_ids() -> set[tuple[str, str]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -160,26 +160,35 @@ def catalog_add(
 
     if kind not in STUB_TYPES:
         refuse(f"syncline-design: --from-template {kind}: expected one of {', '.join(STUB_TYPES)}")
-    section, text = stub(kind, date.today().isoformat())
+    day = date.today().isoformat()
     if to is None:
+        section, text = stub(kind, day, lambda _, __: False)
         show(f"{section}:\n{text}")
         return 0
-    before = _catalog_text(to)
+    before, sections = _catalog_there(to)
+    section, text = stub(kind, day, lambda part, name: name in sections.get(part, {}))
     write_outputs([(Target("text", str(to)), put_in(before, section, text))])
     return 0
 
 
-def _catalog_text(path: Path) -> str:
-    """The text of a catalog that an entry is to be put into; empty where there is none yet."""
+def _catalog_there(path: Path) -> tuple[str, dict[str, Any]]:
+    """Text and data of the catalog that an entry is put into; nothing where there is none yet."""
     from syncline_design.spec.yaml_text import read
 
     if not path.exists():
-        return ""
+        return "", {}
     document = read(path)
-    if not isinstance(document.data, dict | None) or document.problems:
-        reason = str(document.problems[0]) if document.problems else f"{path}: not a catalog"
-        refuse(f"{reason}; mend it before something is added")
-    return document.text
+    sections = document.data
+    lines = [line.strip() for line in document.text.splitlines()]
+    if document.sha256 and all(not line or line.startswith("#") for line in lines):
+        return document.text, {}
+    if document.problems:
+        refuse(f"{document.problems[0]}; mend it before something is added")
+    if not isinstance(sections, dict) or not all(
+        isinstance(entries, dict) for key, entries in sections.items() if key != "catalogs"
+    ):
+        refuse(f"{path}: not a catalog; mend it before something is added")
+    return document.text, sections
 
 
 @guarded

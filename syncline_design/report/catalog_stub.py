@@ -6,6 +6,8 @@ forgotten is refused, with its line.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from itertools import chain, count
 from typing import Final
 
 from syncline_design.spec.catalog import SECTIONS
@@ -96,10 +98,15 @@ _TYPES: Final[dict[str, tuple[str, str, str, str, dict[str, str]]]] = {
 STUB_TYPES: Final = tuple(_TYPES)
 
 
-def stub(kind: str, day: str) -> tuple[str, str]:
-    """Section and text of an entry of a type, its figures still to be filled in."""
+def stub(kind: str, day: str, taken: Callable[[str, str], bool]) -> tuple[str, str]:
+    """Section and text of an entry of a type, its figures still to be filled in.
+
+    taken: whether a section has an id already; the stub's is numbered then.
+    """
     section, own, first, unit, words = _TYPES[kind]
-    text = f"  new_{kind}:                        # id: maker_model_variant, for years\n"
+    names = (f"new_{kind}{end}" for end in chain([""], (f"_{n}" for n in count(2))))
+    identity = next(name for name in names if not taken(section, name))
+    text = f"  {identity}:                        # id: maker_model_variant, for years\n"
     text += '    name: "_"\n' + own.format(**words)
     if section != "platforms":
         text += _BOUGHT.format(day=day) + _SOURCES.format(first=first, unit=unit, day=day)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -116,9 +117,10 @@ def check_catalogs(paths: Sequence[Path] = ()) -> CatalogCheck:
     findings = [_refused(flaw) for flaw in flaws]
     findings += [] if paths else list(_withdrawn(collection))
     known = {section: {one.id for one in every if one.section == section} for section in SECTIONS}
+    sizes = _sizes(every)
     for one in looked_at:
         findings += [*_ids(one), *_sources(one), *_conversions(one), *_successor(one, known)]
-        findings += _siblings(one, every)
+        findings += _siblings(one, sizes)
     findings += _same_names(looked_at, every)
     found = sorted(set(findings), key=lambda f: (f.file, f.line, f.column, f.code, f.message))
     read = (*own, *(one.document for one in looked_at))
@@ -261,29 +263,39 @@ def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[CatalogFi
         yield one.finding("successor", "lifecycle", f"no such successor: {follower}", hint)
 
 
-def _siblings(one: _Place, every: Sequence[_Place]) -> Iterator[CatalogFinding]:
-    """Figures more than a factor of 5 off the median of the same kind of sensor."""
+def _sizes(every: Sequence[_Place]) -> Mapping[tuple[str, str, str], list[float]]:
+    """What sensors of a modality and type say of a figure, by size."""
+    found: dict[tuple[str, str, str], list[float]] = {}
+    for one in every:
+        if isinstance(one.entry, SensorEntry):
+            for key in _COMPARED:
+                if size := _size(one.entry, key):
+                    found.setdefault((one.entry.modality, one.entry.type, key), []).append(size)
+    return {family: sorted(sizes) for family, sizes in found.items()}
+
+
+def _siblings(
+    one: _Place, sizes: Mapping[tuple[str, str, str], list[float]]
+) -> Iterator[CatalogFinding]:
+    """Figures more than a factor of 5 off the median of the others of the same kind of sensor."""
     entry = one.entry
     if not isinstance(entry, SensorEntry) or not entry.type:
         return
-    family = [
-        other.entry
-        for other in every
-        if other.section == one.section
-        and other.id != one.id
-        and (other.entry.modality, other.entry.type) == (entry.modality, entry.type)
-    ]
     for key in _COMPARED:
         value = _size(entry, key)
-        sizes = [size for size in (_size(other, key) for other in family) if size]
-        if not value or len(sizes) < FEWEST_SIBLINGS or key in entry.unusual:
+        if not value or key in entry.unusual:
             continue
-        middle = median(sizes)
+        family = sizes[entry.modality, entry.type, key]
+        mine = bisect_left(family, value)
+        others = family[:mine] + family[mine + 1 :]
+        if len(others) < FEWEST_SIBLINGS:
+            continue
+        middle = median(others)
         if not middle / FACTOR <= value <= middle * FACTOR:
             ratio = max(value / middle, middle / value)
             way = "more" if value > middle else "less"
             message = (
-                f"{ratio:.3g} times {way} than the median of {len(sizes)} others "
+                f"{ratio:.3g} times {way} than the median of {len(others)} others "
                 f"of type {entry.type}"
             )
             hint = f"look at the unit; if it is right, say why: unusual: {{{key}: ...}}"
