@@ -31,6 +31,7 @@ lint: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+	$(BIN)/syncline-design catalog check
 
 # Side by side with peers, as ratios in one run.
 bench: $(DEV)
