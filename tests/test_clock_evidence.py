@@ -518,6 +518,17 @@ def test_what_a_session_remembers_is_held_against_its_length(tmp_path: Path) -> 
     assert not any("remember" in note for note in noise)
 
 
+def test_clocks_at_the_same_time_are_said(tmp_path: Path) -> None:
+    source = np.random.default_rng(0)
+    times = START + 10.0 * np.arange(200)
+    paths = [write(tmp_path / f"van{k}.csv", made.csv_lines(times, source.normal(0, 1e-5, 200)))
+             for k in range(3)]  # fmt: skip
+    notes = study_logs(paths, TimingSettings()).timing.notes
+    assert any("overlap in time" in note for note in notes)
+    apart = study_logs(sessions_csv(tmp_path, [1e-5] * 3), TimingSettings()).timing.notes
+    assert not any("overlap" in note for note in apart)
+
+
 def test_a_session_a_row_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("syncline_design.clocks.study.MOST_SESSIONS", 100)
     done = run("timing", *sessions_csv(tmp_path, [1e-5]), "--session", "5 s")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -317,6 +318,9 @@ def _notes(
     if short:
         said.append(f"{short} of {len(sessions)} sessions are empty or too short to count "
                     "(less than 20 samples in lock, or than 90 s)")  # fmt: skip
+    if _overlap(sessions):
+        said.append("sessions overlap in time: if these are several clocks, the claim is for such "
+                    "clocks together")  # fmt: skip
     brief = sum(
         one.counted
         and one.autocorrelation_s is not None
@@ -341,6 +345,13 @@ def _notes(
     if figures.hard_s is None and figures.bound_s is not None:
         said.append("no hard bound: these logs hold no dispersions or delays")
     return said
+
+
+def _overlap(sessions: Sequence[ClockSession]) -> bool:
+    """Whether two sessions with dates were at the same time."""
+    spans = sorted((float(s.series.time_s[0]), float(s.series.time_s[-1]))
+                   for s in sessions if s.series.kind.stamps == "utc")  # fmt: skip
+    return any(after[0] < before[1] for before, after in itertools.pairwise(spans))
 
 
 def _distribution(counted: Sequence[ClockSession]) -> Array:
