@@ -259,6 +259,7 @@ def _stored(spec: Path) -> Path:
     return target
 
 
+RMSE = "{{id: RMS-1, kind: rmse, axis: {}, limit: 9 m}}"
 WAIVER = "waiver: {reason: trial, expires: 2199-01-01}"
 LATENCY = "effects:\n  - {effect: latency, sensor: attitude, parameters: {latency_s: 17 us}}\n"
 
@@ -271,14 +272,18 @@ LATENCY = "effects:\n  - {effect: latency, sensor: attitude, parameters: {latenc
         ("limit: 0.30 m", f"limit: 0.30 m, {WAIVER}", "requirements[ACC-1].waiver"),
         ("id: ACC-1", "id: ACC-7", "requirements[ACC-7]"),
         ("kind: cost, limit: 100000 EUR", "kind: mass, limit: 90 kg", "requirements[COST-1].kind"),
+        (RMSE.format("3d"), RMSE.format("vertical"), "requirements[RMS-1].axis"),
         ("name: Small", "name: Tiny", "spec (hash)"),
     ],
-    ids=["horizon", "effect", "waiver", "id", "kind", "what verdicts do not repeat"],
+    ids=["horizon", "effect", "waiver", "id", "kind", "axis", "what verdicts do not repeat"],
 )
 def test_verdict_files_never_differ_in_nothing(
     files: tuple[Path, Path], before: str, after: str, key: str
 ) -> None:
     """Two verdicts on specs that differ were said to differ in nothing, whatever they showed."""
+    if "RMS-1" in before:
+        for path in files:
+            change(path, ("requirements:\n", f"requirements:\n  - {before}\n"))
     change(files[1], (before, after))
     found = diff(_stored(files[0]), _stored(files[1]))
     assert key in {cause.key for cause in found.causes}

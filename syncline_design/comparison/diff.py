@@ -187,7 +187,7 @@ def _asked(verdict: Verdict, both: set[str]) -> Json:
 
 def _required(row: RequirementResult) -> Json:
     """A requirement without its outcome."""
-    keys = ("id", "kind", "limit", "quantile", "waiver")
+    keys = ("id", "kind", "limit", "quantile", "axis", "waiver")
     return {key: value for key, value in row.to_json().items() if key in keys}
 
 

@@ -68,7 +68,8 @@ class FigureChange(Record):
 class Standing(Record):
     """How one side stands to a requirement.
 
-    quantile: of a simulated one; waived: true where a waiver in force covers it.
+    quantile: of a simulated one; axis: of the error that is limited; waived: true where a waiver
+    in force covers it.
     """
 
     status: Status
@@ -79,6 +80,7 @@ class Standing(Record):
     line: int | None
     column: int | None
     quantile: float | None = optional()
+    axis: str | None = optional()
     waived: bool | None = optional()
 
 
@@ -210,5 +212,5 @@ def _standing(row: RequirementResult | None) -> Standing | None:
         return None
     return Standing(
         row.status, row.value, row.limit, row.margin, row.unit, row.line, row.column,
-        row.quantile, row.is_waived or None,
+        row.quantile, row.axis, row.is_waived or None,
     )  # fmt: skip

@@ -22,7 +22,7 @@ from syncline_design.report.render_markdown import markdown
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import kind_words, status_word
-from syncline_design.report.words import OUTCOMES
+from syncline_design.report.words import KINDS, OUTCOMES
 
 
 def render_diff(name: str, data: Difference) -> str:
@@ -178,9 +178,11 @@ def _margin_row(entry: RequirementChange) -> tuple[Cell | str, ...]:
 
 
 def _limited(entry: RequirementChange) -> str:
-    """What a requirement limits; of a simulated one the quantile too, where both sides agree."""
-    quantiles = {row.quantile for row in (entry.old, entry.new) if row is not None}
-    return kind_words(entry.kind, quantiles.pop() if len(quantiles) == 1 else None)
+    """What a requirement limits; its quantile and axis where both sides have the same."""
+    told = {(row.quantile, row.axis) for row in (entry.old, entry.new) if row is not None}
+    if len(told) > 1:
+        return KINDS.get(entry.kind, entry.kind)
+    return kind_words(entry.kind, *told.pop())
 
 
 def _standing(row: Standing | None) -> Cell:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.chosen_system import system_of
@@ -18,7 +18,7 @@ from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
-from syncline_design.simulation import CrossCheck, Decision, SimulationError, cross_check, decide
+from syncline_design.simulation import CrossCheck, SimulationError, cross_check
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw, load
 from syncline_design.spec.references import names_candidates
@@ -38,10 +38,11 @@ from syncline_design.verdict.design_data import (
     transcripts,
     used_entries,
 )
+from syncline_design.verdict.held import placed
+from syncline_design.verdict.held import results as held_results
 from syncline_design.verdict.measured import claim_cautions, measured
 from syncline_design.verdict.named import ChoiceResult
-from syncline_design.verdict.recheck import Recheck, recheck
-from syncline_design.verdict.stated import value_m, wanted_of
+from syncline_design.verdict.recheck import recheck
 from syncline_design.verdict.tree import (
     UNITS,
     Caution,
@@ -50,9 +51,7 @@ from syncline_design.verdict.tree import (
     RequirementResult,
     Status,
     Verdict,
-    WaiverResult,
     decided,
-    finite,
 )
 from syncline_design.verdict.verified import (
     Verified,
@@ -153,7 +152,7 @@ def unfinished_verdict(
         verdict="indeterminate",
         **frame(case, problem, settings.seed),
         requirements=tuple(
-            _placed(case, index, one, _unmet(case, one, in_conflict=False), settings)
+            placed(case, index, one, _unmet(case, one, in_conflict=False), settings)
             for index, one in enumerate(case.spec.requirements)
         ),
         warnings=(Caution("time-limit", f"{why}; no design was found by then"),),
@@ -249,7 +248,7 @@ def _infeasible(case: Case, problem: Problem, settings: CheckSettings, build: Bu
         verdict="infeasible",
         **frame(case, problem, settings.seed),
         requirements=tuple(
-            _placed(case, i, one, _unmet(case, one, one.id in conflict, minimal), settings)
+            placed(case, i, one, _unmet(case, one, one.id in conflict, minimal), settings)
             for i, one in enumerate(case.spec.requirements)
         ),
         warnings=(late,) if found.cut_short else (),
@@ -301,7 +300,7 @@ def verify(case: Case, problem: Problem, design: Design, settings: CheckSettings
     figures = budget(system, known)
     exact = recheck(case, selection_of(problem, design), known)
     found, trouble = _monte_carlo(case, system, settings)
-    results = tuple(_results(case, system, exact, found, settings))
+    results = tuple(held_results(case, system, exact, found, settings))
     simulated = None if found is None else found.monte_carlo
     return Verified(design, system, figures, exact, simulated, results, trouble)
 
@@ -321,120 +320,6 @@ def _monte_carlo(
         if case.spec.monte_carlo.trajectory is not None:
             refuse_trajectory(case, str(error))
         return None, str(error)
-
-
-def _results(
-    case: Case,
-    system: System,
-    exact: Recheck,
-    found: CrossCheck | None,
-    settings: CheckSettings,
-) -> Iterator[RequirementResult]:
-    rechecked = {one.id: one for one in exact.requirements}
-    for one in exact.requirements:
-        if one.implied:
-            yield decided(
-                id=one.id, kind=one.kind, status="pass" if one.passed else "fail",
-                value=one.value_float, limit=float(one.limit), unit=UNITS[one.kind], implied=True,
-                note=one.note,
-            )  # fmt: skip
-    for index, requirement in enumerate(case.spec.requirements):
-        if requirement.kind == "monte_carlo":
-            result = _simulated(case, requirement, system, found, settings)
-        elif requirement.kind in STATED_KINDS:
-            result = _stated(case, requirement, system, settings)
-        else:
-            one = rechecked[requirement.id]
-            result = decided(
-                id=one.id,
-                kind=one.kind,
-                status="pass" if one.passed else "fail",
-                value=one.value_float,
-                limit=float(one.limit),
-                unit=UNITS.get(one.kind, case.spec.currency),
-                note="" if one.value is not None else f"a catalog entry gives no {one.kind}",
-            )
-        yield _placed(case, index, requirement, result, settings)
-
-
-def _simulated(
-    case: Case,
-    requirement: Requirement,
-    system: System,
-    found: CrossCheck | None,
-    settings: CheckSettings,
-) -> RequirementResult:
-    """A Monte Carlo requirement: sampled on until its interval leaves the limit."""
-    limit, quantile = float(requirement.limit), float(requirement.quantile or 0.0)
-    about: dict[str, Any] = {
-        "id": requirement.id, "kind": "monte_carlo", "limit": limit,
-        "unit": UNITS["monte_carlo"], "quantile": quantile,
-    }  # fmt: skip
-    if found is None:
-        return decided(status="indeterminate", value=None, note="not simulated", **about)
-    simulation = simulation_settings(case, settings.seed)
-    try:
-        decision = decide(system, simulation, quantile, limit, first=found)
-    except OutOfTime:
-        note = "the time limit ended the simulation before it was decided"
-        return decided(status="indeterminate", value=None, note=note, **about)
-    estimate = decision.estimate
-    return decided(
-        status=decision.status,
-        value=estimate.value_m,
-        low=estimate.low_m,
-        high=estimate.high_m,
-        note=_samples_note(decision, simulation.samples),
-        **about,
-    )
-
-
-def _stated(
-    case: Case, requirement: Requirement, system: System, settings: CheckSettings
-) -> RequirementResult:
-    """A requirement on a figure of the error, at its worst situation."""
-    limit = float(requirement.limit)
-    about: dict[str, Any] = {
-        "id": requirement.id, "kind": requirement.kind, "limit": limit,
-        "unit": UNITS[requirement.kind], "quantile": requirement.share,
-        "axis": requirement.axis or requirement.of,
-    }  # fmt: skip
-    try:
-        value = value_m(system, wanted_of(requirement), limit, settings.seed)
-    except OutOfTime:
-        note = "the time limit ended the search for its worst situation"
-        return decided(status="indeterminate", value=None, note=note, **about)
-    except SimulationError as error:
-        return decided(status="indeterminate", value=None, note=str(error), **about)
-    distance = float(case.stages[-1].platform.entry.distance)
-    return decided(
-        status="pass" if value <= limit else "fail", value=finite(value), at_distance_m=distance,
-        **about,
-    )  # fmt: skip
-
-
-def _samples_note(decision: Decision, asked: int) -> str:
-    if decision.status == "indeterminate":
-        return f"the interval still holds the limit after {decision.samples} samples"
-    return f"took {decision.samples} samples to decide" if decision.samples > asked else ""
-
-
-def _placed(
-    case: Case,
-    index: int,
-    requirement: Requirement,
-    result: RequirementResult,
-    settings: CheckSettings,
-) -> RequirementResult:
-    """The result with its place in the spec, its note and its waiver."""
-    line, column = case.positions.get(("requirements", index), (None, None))
-    note = "; ".join(text for text in (requirement.note, result.note) if text)
-    waiver = None
-    if requirement.waiver is not None:
-        today = settings.today or date.today()
-        given = requirement.waiver
-        waiver = WaiverResult(given.reason, given.expires, not given.holds_on(today))
-    return replace(result, line=line, column=column, note=note, waiver=waiver)
 
 
 def _verdict(

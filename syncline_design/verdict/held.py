@@ -1,0 +1,143 @@
+"""Every requirement held against what a design reaches: recomputed, simulated, or stated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from datetime import date
+from typing import TYPE_CHECKING, Any
+
+from syncline_design.machine.deadline import OutOfTime
+from syncline_design.model.system import System
+from syncline_design.simulation import CrossCheck, Decision, SimulationError, decide
+from syncline_design.spec.case import Case
+from syncline_design.spec.requirement import STATED_KINDS, Requirement
+from syncline_design.verdict.acceptance import (
+    simulation_settings,
+)
+from syncline_design.verdict.recheck import Recheck
+from syncline_design.verdict.stated import value_m, wanted_of
+from syncline_design.verdict.tree import (
+    UNITS,
+    RequirementResult,
+    WaiverResult,
+    decided,
+    finite,
+)
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.verify import CheckSettings
+
+
+def results(
+    case: Case,
+    system: System,
+    exact: Recheck,
+    found: CrossCheck | None,
+    settings: CheckSettings,
+) -> Iterator[RequirementResult]:
+    rechecked = {one.id: one for one in exact.requirements}
+    for one in exact.requirements:
+        if one.implied:
+            yield decided(
+                id=one.id, kind=one.kind, status="pass" if one.passed else "fail",
+                value=one.value_float, limit=float(one.limit), unit=UNITS[one.kind], implied=True,
+                note=one.note,
+            )  # fmt: skip
+    for index, requirement in enumerate(case.spec.requirements):
+        if requirement.kind == "monte_carlo":
+            result = _simulated(case, requirement, system, found, settings)
+        elif requirement.kind in STATED_KINDS:
+            result = _stated(case, requirement, system, settings)
+        else:
+            one = rechecked[requirement.id]
+            result = decided(
+                id=one.id,
+                kind=one.kind,
+                status="pass" if one.passed else "fail",
+                value=one.value_float,
+                limit=float(one.limit),
+                unit=UNITS.get(one.kind, case.spec.currency),
+                note="" if one.value is not None else f"a catalog entry gives no {one.kind}",
+            )
+        yield placed(case, index, requirement, result, settings)
+
+
+def _simulated(
+    case: Case,
+    requirement: Requirement,
+    system: System,
+    found: CrossCheck | None,
+    settings: CheckSettings,
+) -> RequirementResult:
+    """A Monte Carlo requirement: sampled on until its interval leaves the limit."""
+    limit, quantile = float(requirement.limit), float(requirement.quantile or 0.0)
+    about: dict[str, Any] = {
+        "id": requirement.id, "kind": "monte_carlo", "limit": limit,
+        "unit": UNITS["monte_carlo"], "quantile": quantile,
+    }  # fmt: skip
+    if found is None:
+        return decided(status="indeterminate", value=None, note="not simulated", **about)
+    simulation = simulation_settings(case, settings.seed)
+    try:
+        decision = decide(system, simulation, quantile, limit, first=found)
+    except OutOfTime:
+        note = "the time limit ended the simulation before it was decided"
+        return decided(status="indeterminate", value=None, note=note, **about)
+    estimate = decision.estimate
+    return decided(
+        status=decision.status,
+        value=estimate.value_m,
+        low=estimate.low_m,
+        high=estimate.high_m,
+        note=_samples_note(decision, simulation.samples),
+        **about,
+    )
+
+
+def _stated(
+    case: Case, requirement: Requirement, system: System, settings: CheckSettings
+) -> RequirementResult:
+    """A requirement on a figure of the error, at its worst situation."""
+    limit = float(requirement.limit)
+    about: dict[str, Any] = {
+        "id": requirement.id, "kind": requirement.kind, "limit": limit,
+        "unit": UNITS[requirement.kind], "quantile": requirement.share,
+        "axis": requirement.axis or requirement.of,
+    }  # fmt: skip
+    try:
+        value = value_m(system, wanted_of(requirement), limit, settings.seed)
+    except OutOfTime:
+        note = "the time limit ended the search for its worst situation"
+        return decided(status="indeterminate", value=None, note=note, **about)
+    except SimulationError as error:
+        return decided(status="indeterminate", value=None, note=str(error), **about)
+    distance = float(case.stages[-1].platform.entry.distance)
+    return decided(
+        status="pass" if value <= limit else "fail", value=finite(value), at_distance_m=distance,
+        **about,
+    )  # fmt: skip
+
+
+def _samples_note(decision: Decision, asked: int) -> str:
+    if decision.status == "indeterminate":
+        return f"the interval still holds the limit after {decision.samples} samples"
+    return f"took {decision.samples} samples to decide" if decision.samples > asked else ""
+
+
+def placed(
+    case: Case,
+    index: int,
+    requirement: Requirement,
+    result: RequirementResult,
+    settings: CheckSettings,
+) -> RequirementResult:
+    """The result with its place in the spec, its note and its waiver."""
+    line, column = case.positions.get(("requirements", index), (None, None))
+    note = "; ".join(text for text in (requirement.note, result.note) if text)
+    waiver = None
+    if requirement.waiver is not None:
+        today = settings.today or date.today()
+        given = requirement.waiver
+        waiver = WaiverResult(given.reason, given.expires, not given.holds_on(today))
+    return replace(result, line=line, column=column, note=note, waiver=waiver)
