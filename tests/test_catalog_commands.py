@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import shutil
 import time
@@ -452,3 +453,35 @@ def test_a_package_without_its_families_would_be_seen(tmp_path: Path) -> None:
     packed = {path for one in patterns for path in (tmp_path / "catalogs").glob(one)}
     data = {p for p in (tmp_path / "catalogs").rglob("*") if p.is_file() and p.suffix != ".py"}
     assert packed == data
+
+
+def test_a_study_may_vary_what_its_base_does_not_name(tmp_path: Path) -> None:
+    """Family entries as values, and a figure of one of them: read when a case asks for them."""
+    spec = (CATALOGS.parent / "specs" / "usv_wire_missing.yaml").read_text("utf-8")
+    (tmp_path / "base.yaml").write_text(spec, "utf-8")
+    (tmp_path / "study.yaml").write_text(
+        "study: 1\nname: lidars\nbase: [base.yaml]\ngrid:\n"
+        "  stages[usv].ranging.sensor: [velodyne_hdl32e, hesai_xt32]\n"
+        "  catalog.sensors[hesai_xt32].cost: [3000 EUR, 9000 EUR]\n",
+        "utf-8",
+    )
+    result = CliRunner().invoke(app, ["study", str(tmp_path / "study.yaml"), "-o", "csv"])
+    assert result.exit_code in (0, 1), result.stderr
+    rows = list(csv.DictReader(result.stdout.splitlines()))
+    (cost,) = [key for key in rows[0] if key.startswith("cost")]
+    by_sensor: dict[str, set[float]] = {}
+    for row in rows:
+        sensor = row[next(key for key in row if key.endswith("ranging.sensor"))]
+        by_sensor.setdefault(sensor, set()).add(float(row[cost]))
+    assert len(by_sensor["velodyne_hdl32e"]) == 1
+    low, high = sorted(by_sensor["hesai_xt32"])
+    assert high - low == pytest.approx(6000.0)
+
+
+def test_an_unknown_id_is_told_of_the_families_too(tmp_path: Path) -> None:
+    spec = (CATALOGS.parent / "specs" / "usv_mapping.yaml").read_text("utf-8")
+    path = tmp_path / "spec.yaml"
+    path.write_text(spec.replace("sensor: velodyne_hdl32e", "sensor: hesai_xt33"), "utf-8")
+    result = CliRunner().invoke(app, ["check", str(path)])
+    assert result.exit_code == 2
+    assert "did you mean hesai_xt32?" in result.stderr

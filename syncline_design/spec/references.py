@@ -26,11 +26,10 @@ _WORDS = {
 
 def unknown_ids(spec: ParsedFile, collection: Collection) -> list[Flaw]:
     """Ids that no catalog has; looked for in the raw data, so that other errors don't hide them."""
-    unknown = (
-        (path, section, identity)
-        for section, path, identity in _spec_ids(spec.data)
-        if (section, identity) not in collection.origins
-    )
+    named = [(path, section, identity) for section, path, identity in _spec_ids(spec.data)]
+    if any((section, identity) not in collection.origins for _, section, identity in named):
+        collection.note_families()  # what nothing has asked for yet is known all the same
+    unknown = (item for item in named if item[1:] not in collection.origins)
     problems = [_unknown(spec, *item, collection) for item in islice(unknown, MAX_SUGGESTIONS)]
     return problems + unknown_requirements(collection)
 
