@@ -32,6 +32,7 @@ from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:
     from syncline_design.verdict.optimise import Optimised
+    from syncline_design.verdict.tree import Checked
 
 
 @guarded
@@ -45,6 +46,10 @@ def check(
     skip_others: Annotated[
         bool, typer.Option("--skip-others", help="Pass over named files that are no specs too.")
     ] = False,
+    explain: Annotated[
+        list[str] | None,
+        typer.Option("--explain", metavar="ID", help="Work a requirement out step by step."),
+    ] = None,
 ) -> int:
     """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
     deadline = deadline_of(time_limit)
@@ -60,9 +65,10 @@ def check(
     with watched(deadline, quiet=quiet):
         found = spec_files(spec, skip_others=skip_others)
     targets = output_targets(output, CHECK_FORMATS, found.files)
-    settings = CheckSettings(seed=seed, method=road(method))
+    settings = CheckSettings(seed=seed, method=road(method), explain=tuple(explain or ()))
     with watched(deadline, targets, quiet=quiet):
         verdicts = check_files(found.files, settings)
+    _demand_known(verdicts, settings.explain)
     refused = [verdict for verdict in verdicts if isinstance(verdict, Refused)]
     for verdict in refused:
         say(verdict.text)
@@ -81,6 +87,15 @@ def check(
             raise
         say(f"syncline-design: {error}")  # nothing was computed: that the specs are bad stands
     return max((verdict.exit_code for verdict in verdicts), default=0)
+
+
+def _demand_known(verdicts: Sequence[Checked], ids: Sequence[str]) -> None:
+    """Refuse to explain what no spec requires."""
+    known = [row.id for found in verdicts for row in getattr(found, "requirements", ())]
+    for one in ids:
+        if known and one not in known:
+            listed = ", ".join(dict.fromkeys(known))
+            refuse(f"syncline-design: --explain {one}: no such requirement; there are {listed}")
 
 
 @guarded

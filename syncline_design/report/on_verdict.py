@@ -34,6 +34,7 @@ from syncline_design.report.document import (
     strong,
 )
 from syncline_design.report.error_figures import error_figures
+from syncline_design.report.explained import explained
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -71,6 +72,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
                      "Why not"),
             *section("requirements", "Requirements",
                      show(verdict_tables.requirements(verdict), silent=True)),
+            *section("explained", "Worked out", explained(verdict), "Worked out"),
             *section("figures", "Three figures", error_figures(verdict), "Figures"),
             *section("warnings", "Warnings", verdict_words.warning_nodes(verdict.warnings)),
             *section("payload", "Payload and timestamping", _payload(verdict), "Payload"),

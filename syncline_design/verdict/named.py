@@ -149,3 +149,26 @@ class ChoiceResult(Record):
     next_best_every: tuple[RankedDesign, ...] | None = optional()
     excluded: tuple[Exclusion, ...] | None = optional()
     excluded_count: int | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainedStep(Record):
+    """One figure: its name, its formula in symbols, the numbers put in (SI), its value, whence."""
+
+    name: str
+    formula: str
+    numbers: str
+    value: float
+    unit: str
+    source: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ExplainedRequirement(Record):
+    """A requirement's value, worked out step by step; the last step is its value."""
+
+    id: str
+    kind: str
+    limit: float
+    unit: str
+    steps: tuple[ExplainedStep, ...]

@@ -17,7 +17,7 @@ from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
-from syncline_design.verdict.named import ChoiceResult, NamedDesign
+from syncline_design.verdict.named import ChoiceResult, ExplainedRequirement, NamedDesign
 
 SCHEMA = "syncline-design/verdict/v1"
 SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
@@ -341,6 +341,7 @@ class Verdict(Record):
     effects: tuple[KnownEffect, ...] | None = optional()
     choice: ChoiceResult | None = optional()
     measured: tuple[MeasuredEntry, ...] | None = optional()
+    explained: tuple[ExplainedRequirement, ...] | None = optional()
 
     @property
     def name(self) -> str:

@@ -38,6 +38,7 @@ from syncline_design.verdict.design_data import (
     transcripts,
     used_entries,
 )
+from syncline_design.verdict.explain import Worked, explained
 from syncline_design.verdict.held import placed
 from syncline_design.verdict.held import results as held_results
 from syncline_design.verdict.measured import claim_cautions, measured
@@ -75,6 +76,7 @@ class CheckSettings:
     """How to check: seed of the random numbers, road of the choice and its time limit.
 
     monte_carlo: whether to simulate (a monte_carlo requirement stays undecided without).
+    explain: ids of requirements to work out step by step.
     today: the day on which waivers are judged; None: the machine's date.
     """
 
@@ -82,6 +84,7 @@ class CheckSettings:
     method: Road = "auto"
     time_limit_s: float | None = None
     monte_carlo: bool = True
+    explain: tuple[str, ...] = ()
     today: date | None = None
 
 
@@ -333,11 +336,15 @@ def _verdict(
     assumed = assumptions(entries)
     in_force().doing("working out the statistical budget")
     figures = error_figures(verified, settings.seed, settings.monte_carlo)
+    told = sources(entries)
+    shown = named_design(case, problem, verified.design, verified.figures)
+    worked = Worked(verified.system, case.spec.sync_model, shown, figures, told)
+    asked = [row for row in verified.requirements if row.id in settings.explain]
     return Verdict(
         verdict=verified.word,
         **frame(case, problem, settings.seed),
         requirements=verified.requirements,
-        design=named_design(case, problem, verified.design, verified.figures),
+        design=shown,
         syncline=syncline_figures(verified, case.spec.sync_model),
         monte_carlo=verified.monte_carlo,
         warnings=(
@@ -346,8 +353,9 @@ def _verdict(
         ),
         figures=figures,
         assumptions=assumed,
-        sources=sources(entries),
+        sources=told,
         effects=known_effects(verified.system),
         choice=choice or None,
         measured=measured(case, entries),
+        explained=explained(worked, asked) if asked else None,
     )
