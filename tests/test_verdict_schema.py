@@ -27,7 +27,10 @@ VALIDATOR = jsonschema.Draft202012Validator(result_schema("verdict"))
 
 @functools.cache
 def verdict_of(spec: Path) -> Verdict:
-    return check_file(spec, CheckSettings(monte_carlo=spec == SIMULATED))
+    simulated = spec == SIMULATED
+    return check_file(
+        spec, CheckSettings(monte_carlo=simulated, explain=("ACC-1",) if simulated else ())
+    )
 
 
 def assert_written_as_the_schema_says(verdict: Verdict) -> None:
