@@ -322,6 +322,10 @@ def _spoiled(folder: Path, name: str) -> list[Path]:
     rows = [[float(cell) for cell in line.split(",")] for line in lines[1:]]
     if name == "DST":
         rows = [[t - (3600.0 if k > 150 else 0.0), x] for k, (t, x) in enumerate(rows)]
+    elif name == "DST in spring":
+        sunday = 1_805_590_800.0  # 2027-03-21T01:00:00Z
+        rows = [[sunday + 10.0 * k + (3600.0 if k > 150 else 0.0), x]
+                for k, (_, x) in enumerate(rows)]  # fmt: skip
     elif name == "leap":
         midnight = 1_798_761_600.0
         rows = [[midnight + 10.0 * (k - 150), x + (1e6 if k >= 150 else 0.0)]
@@ -342,6 +346,7 @@ def _spoiled(folder: Path, name: str) -> list[Path]:
 
 DOUBTS = {
     "DST": "local time set back",
+    "DST in spring": "local time set ahead (DST)?",
     "leap": "a leap second?",
     "hour": "local time (DST)?",
     "TAI": "TAI against UTC (37 s)",

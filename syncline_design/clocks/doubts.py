@@ -22,7 +22,7 @@ _THOUSANDS: Final = (1e3, 1e6, 1e9)
 def doubts(series: Sequence[Series], sessions: Sequence[ClockSession]) -> tuple[str, ...]:
     """Every doubt as a sentence without its stop."""
     found = [
-        *(said for one in series for said in _stamps(one)),
+        *(said for one in series for said in (*_stamps(one), *_summer_time(one))),
         *(said for one in sessions for said in _steps(one)),
         *_levels(sessions),
         *_units(sessions),
@@ -39,6 +39,20 @@ def _stamps(one: Series) -> Iterator[str]:
         why = "local time set back (DST)? give stamps in UTC" if dst else "was the clock set?"
         yield (f"{one.kind.name}: the stamps go back by {format_duration(back_s)} at "
                f"{moment(time_s, one.kind.stamps)}: {why}")  # fmt: skip
+
+
+def _summer_time(one: Series) -> Iterator[str]:
+    """A table whose stamps leave out an hour on a Sunday, as local time does in spring."""
+    if one.kind.family != "csv" or one.kind.stamps != "utc":
+        return
+    steps = np.diff(one.time_s)
+    usual = float(np.median(steps)) if steps.shape[0] else 0.0
+    for k in np.flatnonzero(np.abs(steps - 3600.0 - usual) < max(0.5 * usual, 1.0)):
+        at = float(one.time_s[k])
+        if 0.0 < usual < 600.0 and int(at // 86400.0 + 4) % 7 == 0:
+            yield (f"{one.kind.name}: the stamps leave out an hour at "
+                   f"{moment(at, one.kind.stamps)}, a Sunday: local time set ahead (DST)? give "
+                   "stamps in UTC")  # fmt: skip
 
 
 def _steps(session: ClockSession) -> Iterator[str]:
