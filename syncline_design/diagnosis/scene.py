@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from syncline_design.diagnosis.past import LoggedPast
-from syncline_design.diagnosis.trajectory import LoggedMotion, pieces
+from syncline_design.diagnosis.trajectory import LoggedMotion, pieces, smooth_slope
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
@@ -148,7 +148,8 @@ def _stage_rows(
 ) -> StageRows:
     zero = np.zeros(len(log))
     back = np.swapaxes(rotation, 1, 2)
-    acceleration = motion.velocity.slope(log.time_s, log.time_s)
+    track = logged.velocity_track or LogTrack(log.time_s, logged.velocity_mps)
+    acceleration = smooth_slope(track.time_s, track.value, log.time_s)
     vector = _logged_vector(logged, len(log))
     return StageRows(
         time_s=log.time_s,

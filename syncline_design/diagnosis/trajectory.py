@@ -8,6 +8,7 @@ time shift, and a fit would prefer shifts half way between rows.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -20,6 +21,10 @@ from syncline_design.logs.stamps import per_stamp
 from syncline_design.simulation.chain import rotation_exp
 
 Index = NDArray[np.int64]
+NEAR_S = 5.0  # of a series around the stamps, that their slopes rest on
+LEAST_SMOOTHED = 20  # rows of a stretch
+MOST_TRIED = 1000  # rows on which the penalty is chosen
+PENALTIES = np.geomspace(1e-3, 1e4, 15)  # over the cube of the time between rows
 FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
 
 
@@ -106,6 +111,61 @@ def pieces(time_s: Array, series: Array) -> SplinePieces:
         np.concatenate([s.antiderivative().c for s in splines], axis=1),
         tuple(splines),
     )
+
+
+def smooth_slope(time_s: Array, series: Array, at_s: Array) -> Array:
+    """Slope of a noisy series (n, k) at some stamps, by smoothing splines, one per stretch.
+
+    Noise in a regressor makes its effect too small (errors in variables), and slopes from row to
+    row are mostly noise.  A spline minimises sum (y - f)^2 + lambda int f''^2; lambda is the one by
+    which every second row best foretells the others, so a series without noise keeps its slope.
+    Source: Craven and Wahba, Numerische Mathematik 31 (1979), for cross-validation.
+    """
+    near = np.searchsorted(at_s, time_s + NEAR_S) > np.searchsorted(at_s, time_s - NEAR_S)
+    keys = (np.ascontiguousarray(v).tobytes() for v in (time_s[near], series[near], at_s))
+    return _smooth_slope(*keys, series.shape[1]).copy()
+
+
+@lru_cache(maxsize=8)  # the scene of one log is set many times, each gross fault once
+def _smooth_slope(time_bytes: bytes, series_bytes: bytes, at_bytes: bytes, width: int) -> Array:
+    from scipy.interpolate import make_smoothing_spline
+
+    time_s, at_s = np.frombuffer(time_bytes), np.frombuffer(at_bytes)
+    time_s, series = per_stamp(time_s, np.frombuffer(series_bytes).reshape(-1, width))
+    slope = pieces(time_s, series).slope(at_s, at_s)
+    step = np.diff(time_s)
+    cuts = np.flatnonzero(step > GAP_FACTOR * np.median(step)) + 1
+    bounds = [0, *cuts.tolist(), time_s.shape[0]]
+    longest = max(pairwise(bounds), key=lambda ends: ends[1] - ends[0])
+    chosen = slice(longest[0], min(longest[1], longest[0] + MOST_TRIED))
+    for k in range(width):
+        penalty = _penalty(time_s[chosen], series[chosen, k])
+        for a, b in pairwise(bounds) if penalty else ():
+            own = (at_s >= time_s[a]) & (at_s <= time_s[b - 1])
+            if b - a >= LEAST_SMOOTHED and np.any(own):
+                smooth = make_smoothing_spline(time_s[a:b], series[a:b, k], lam=penalty)
+                slope[own, k] = smooth(at_s[own], 1)
+    return slope
+
+
+def _penalty(time_s: Array, series: Array) -> float:
+    """Lambda [s3] of least error in rows left out; 0 of a series that is short, still or smooth.
+
+    Half of the rows weigh half, so all of them go with twice the lambda.
+    """
+    from scipy.interpolate import make_smoothing_spline
+
+    if time_s.shape[0] < 2 * LEAST_SMOOTHED or np.ptp(series) == 0.0:
+        return 0.0
+    unit = float(np.median(np.diff(time_s))) ** 3
+    known, asked = slice(0, None, 2), slice(1, -1, 2)
+    errors = [
+        np.sum((make_smoothing_spline(time_s[known], series[known], lam=unit * p)(time_s[asked])
+                - series[asked]) ** 2)
+        for p in PENALTIES
+    ]  # fmt: skip
+    best = int(np.argmin(errors))
+    return 2.0 * unit * float(PENALTIES[best]) if best else 0.0  # a spline through all rows then
 
 
 @dataclass(frozen=True, slots=True)
