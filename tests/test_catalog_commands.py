@@ -262,6 +262,7 @@ def test_show_tells_figure_kind_conversion_and_source() -> None:
     for words in ("0.006 m + 1 ppm of 1 km", "cep50", "/ 1.1774", "UBXDOC-963802114-12690",
                   "read 2026-11-22", "one sigma 5.945 mm"):  # fmt: skip
         assert words in text
+    assert "one sigma 0.2865 deg" in run("show", "exail_gaps_m5").stdout  # 0.5 % is 0.005 rad
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,13 @@ from typing import Annotated, Any, Final
 
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.conversion import conversion_of
-from syncline_design.model.quantity import Quantity, UnitError, format_quantity
+from syncline_design.model.quantity import (
+    Dimension,
+    Quantity,
+    UnitError,
+    format_like,
+    format_quantity,
+)
 from syncline_design.report.render_console import aligned
 from syncline_design.report.text import visible
 from syncline_design.spec.catalog import SECTIONS as SECTIONS
@@ -277,12 +283,19 @@ def _printed(name: str, one: PrintedFigure) -> Printed:
         one.read,
         None if conversion is None else conversion.factor,
         None if conversion is None else conversion.formula,
-        None if sigma is None else format_quantity(sigma, SIGMA_DIMENSIONS[key]),
+        None if sigma is None else _one_sigma(sigma, SIGMA_DIMENSIONS[key]),
         None if one.over is None else str(getattr(one.over, "text", one.over)),
         one.at or None,
         one.address or None,
         one.note or None,
     )
+
+
+def _one_sigma(value: float, dimension: Dimension) -> str:
+    """In the unit that catalogs use: degrees for angles, however small."""
+    if dimension is Dimension.ANGLE:
+        return format_like("deg", value)
+    return format_quantity(value, dimension)
 
 
 def entry_text(entry: WholeEntry) -> str:
