@@ -226,6 +226,8 @@ def test_a_parked_vehicle_shows_nothing(tmp_path: Path) -> None:
         assert found.verdict == "agrees"
         blind[name] = {(b.effect, b.sensor) for b in found.informative.blind_to}
         assert found.informative.ok == (not blind[name])
+        assert found.demanded_exit_code(informative=False) == 0
+        assert found.demanded_exit_code(informative=True) == (0 if found.informative.ok else 3)
         seen = {(s.effect, s.sensor, s.parameter): s.value for s in found.smallest_seen}
         shown = seen["latency", "position", "latency_s"]
         assert shown is None if name == "parked" else shown is not None and shown < 0.02

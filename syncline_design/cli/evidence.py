@@ -91,6 +91,13 @@ def diagnose(
     max_effects: Annotated[
         int, typer.Option(min=0, max=MOST_EFFECTS, help="Effects named at most.")
     ] = 8,
+    require_informative: Annotated[
+        bool,
+        typer.Option(
+            "--require-informative",
+            help="Exit with 3 where the log agrees but could not have shown what would turn it.",
+        ),
+    ] = False,
     time_limit: TimeLimitOption = None,
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
@@ -123,7 +130,7 @@ def diagnose(
         say(f"{'the time was over' if found_any else 'nothing was found'}: no spec written")
     text = console(on_diagnosis(whole))
     emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
-    return found.exit_code
+    return found.demanded_exit_code(informative=require_informative)
 
 
 def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> DesignMeaning | None:

@@ -15,6 +15,7 @@ LogOutcome = Literal["agrees", "explained", "unexplained"]
 Kind = Literal["cause", "noise", "stand_in"]
 Severity = Literal["contradiction", "caution"]
 EXIT_CODES: Final[Mapping[LogOutcome, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
+NOT_SHOWN: Final = 3
 LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
 
 
@@ -428,6 +429,11 @@ class Diagnosis(Record):
     def exit_code(self) -> int:
         """0 agrees, 1 something is missing."""
         return EXIT_CODES[self.verdict]
+
+    def demanded_exit_code(self, *, informative: bool) -> int:
+        """The exit code; 3 for a log that agrees but could not have shown what matters."""
+        hidden = informative and self.verdict == "agrees" and not self.informative.ok
+        return NOT_SHOWN if hidden else self.exit_code
 
     def effects_entries(self) -> tuple[EffectChoice, ...]:
         """The findings as entries of a spec's `effects:`."""
