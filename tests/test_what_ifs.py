@@ -1,0 +1,157 @@
+"""What-ifs on changed columns, against tables built anew and every design tried."""
+
+from __future__ import annotations
+
+import random
+import sys
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from random_problems import random_problem, with_random_limits
+from syncline_design.choice.core import Beside, best_from
+from syncline_design.choice.decide import choose
+from syncline_design.choice.enumerate import all_designs, best_by_enumeration
+from syncline_design.choice.evaluate import broken
+from syncline_design.choice.outcome import Choice, Deadline
+from syncline_design.choice.problem import build_problem
+from syncline_design.choice.slack import payload
+from syncline_design.choice.tolerance import measure_next
+from syncline_design.choice.variations import (
+    PLATFORM_FIGURES,
+    platform_figure,
+    quantity,
+    sigma_figures,
+    with_figure,
+    with_platform_figure,
+)
+from syncline_design.choice.what_if import (
+    Moving,
+    of_method,
+    of_sensor,
+    with_method_tau,
+    with_sensor_error,
+)
+from syncline_design.spec.load import load
+
+SEEDS = range(16)
+BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_what_a_design_at_hand_leaves_holds_the_best(seed: int) -> None:
+    """From any design that meets the sums: the first of all designs in the documented order."""
+    rng = random.Random(seed)
+    problem = random_problem(rng, 20)
+    problem = with_random_limits(rng, problem, [e.error_m for _, e in all_designs(problem)])
+    meet = [design for design, found in all_designs(problem) if not broken(problem, found)]
+    best = best_by_enumeration(problem, Deadline())
+    for at_hand in [None, *rng.sample(meet, min(3, len(meet)))]:
+        assert best_from(problem, at_hand, Beside(problem)) == best
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_changed_column_is_a_changed_option(seed: int) -> None:
+    """One sensor's error, or one method's tau, set in columns or option by option."""
+    rng = random.Random(seed)
+    problem = random_problem(rng, 20)
+    at_hand = next(design for design, _ in all_designs(problem))
+    beside = Beside(problem)
+    r = rng.randrange(len(problem.roles))
+    table = problem.roles[r]
+    place = rng.randrange(len(table.options))
+    own = table.options[place]
+    value = Fraction(rng.randint(1, 40), 16)
+    if rng.random() < 0.5:
+        changed = with_sensor_error(problem, r, of_sensor(problem, r, place), value)
+        options = [
+            replace(o, sensor_error_m=float(value), exact_error_m=value)
+            if o.sensor == own.sensor
+            else o
+            for o in table.options
+        ]
+    else:
+        changed = with_method_tau(problem, r, of_method(problem, r, place), value)
+        options = [
+            replace(o, tau_s=float(value), exact_tau_s=value) if o.method == own.method else o
+            for o in table.options
+        ]
+    table = replace(table, options=tuple(options))
+    anew = replace(problem, roles=(*problem.roles[:r], table, *problem.roles[r + 1 :]))
+    assert [tuple(o) for o in map(_figures, changed.roles[r].options)] == [
+        tuple(o) for o in sorted(map(_figures, options))
+    ]
+    assert best_from(changed, None, beside) == best_by_enumeration(changed, Deadline())
+    assert _names(changed, best_from(changed, at_hand, beside)) == _names(
+        anew, best_by_enumeration(anew, Deadline())
+    )
+
+
+def _figures(option) -> tuple:
+    return (*option.names, option.error(), option.tau(), option.timeline, option.requires)
+
+
+def _names(problem, design):
+    if design is None:
+        return None
+    roles = zip(problem.roles, design.options, strict=True)
+    return [table.options[i].names for table, i in roles], design.clocks
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory):
+    """A case of three sensors a role whose choice is close to others."""
+    sys.path.insert(0, str(BENCHMARKS))
+    from choice_instances import write_spec
+
+    folder = tmp_path_factory.mktemp("small")
+    path = write_spec(folder, 1, 3, 3, 8, accuracy_m=0.35, sync=1e-4)
+    return load(path)
+
+
+def test_measure_next_as_if_every_figure_were_tried(small) -> None:
+    """20 % to either side of every figure: tables built anew and every design enumerated."""
+    problem = build_problem(small)
+    found = choose(problem, "enumerate")
+    assert isinstance(found, Choice)
+    now = payload(problem, found.design)
+    expected = set()
+    for figure in sigma_figures(small):
+        for share in (Fraction(4, 5), Fraction(6, 5)):
+            end = float(figure.quantity.exact * share)
+            other = build_problem(with_figure(small, figure, quantity(end, figure.dimension)))
+            design = best_by_enumeration(other, Deadline())
+            if design is None or payload(other, design) != now:
+                expected.add((figure.name, end))
+    assert expected
+    assert {(m.figure, m.at) for m in measure_next(small, problem, found.design)} == expected
+
+
+@pytest.mark.parametrize("figure", PLATFORM_FIGURES)
+@pytest.mark.parametrize("share", [0.01, 0.5, 1.0001, 3.0, 1e4])
+def test_a_platform_that_moves_otherwise(small, figure, share: float) -> None:
+    """Columns moved are columns built: figures, exclusions and their reasons."""
+    problem = build_problem(small)
+    value = share * float(platform_figure(small, 0, figure))
+    moved = Moving.of(small, problem, 0).at(problem, figure, value)
+    dimension = PLATFORM_FIGURES[figure][1]
+    anew = build_problem(with_platform_figure(small, 0, figure, quantity(value, dimension)))
+    assert moved == replace(anew, roles=moved.roles)
+    for one, other in zip(moved.roles, anew.roles, strict=True):
+        assert tuple(one.options) == tuple(other.options)
+        assert sorted(map(repr, one.excluded)) == sorted(map(repr, other.excluded))
+        for column in ("error", "added", "tau", "crit"):
+            np.testing.assert_allclose(
+                getattr(one.options, column), [_exact(o, column) for o in other.options], rtol=1e-14
+            )
+
+
+def _exact(option, column: str) -> float:
+    if column == "crit":
+        return option.tau_crit_s
+    error = option.error()
+    figures = {"error": error, "added": error + option.systematic(), "tau": option.tau()}
+    return float(figures[column])
