@@ -16,10 +16,9 @@ from typing import Literal, overload
 
 import numpy as np
 
+from syncline_design.choice.exclusions import Excluded, Exclusions
 from syncline_design.choice.options import (
     RESOURCES,
-    Excluded,
-    Exclusions,
     Floats,
     Indices,
     Option,
@@ -368,15 +367,9 @@ def _impossible(
 ) -> Excluded:
     """The record of what cannot work on its stage, with the options that it takes along."""
     return Excluded(
-        sensor,
-        primitive,
-        method,
-        barred.reason,
-        code=barred.code,
-        figure=barred.figure,
-        limit=barred.limit,
-        impossible=tuple(options),
-    )
+        sensor, primitive, method, barred.reason, code=barred.code, figure=barred.figure,
+        limit=barred.limit, impossible=tuple(options),
+    )  # fmt: skip
 
 
 Priced = SensorEntry | TimestampingEntry | ClockEntry | InfrastructureEntry

@@ -35,11 +35,12 @@ from syncline_design.choice.evaluate import (
     total_error_m,
 )
 from syncline_design.choice.labels import Labels, total_m
-from syncline_design.choice.merge import Ceiling, Merge, lowered
+from syncline_design.choice.merge import Merge
 from syncline_design.choice.narrowed import Narrowed, says_all, stated, whole_of
 from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indices, ResourceName
 from syncline_design.choice.outcome import Deadline, FrontPoint, PriceStep, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
+from syncline_design.choice.remaining import Ceiling, lowered
 from syncline_design.choice.table import ClockOption, Design, Problem, is_empty
 from syncline_design.machine.deadline import in_force, within
 

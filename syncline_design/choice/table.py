@@ -13,14 +13,8 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from syncline_design.choice.options import (
-    Exclusions,
-    Options,
-    Requires,
-    ResourceName,
-    Resources,
-    exactly,
-)
+from syncline_design.choice.exclusions import Exclusions
+from syncline_design.choice.options import Options, Requires, ResourceName, Resources, exactly
 from syncline_design.model.roles import RoleName
 
 NOTHING = Exclusions.of(())
