@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +12,7 @@ from syncline_design import __version__
 from syncline_design.diagnosis.axes import without_still_axes
 from syncline_design.diagnosis.candidates import candidates, directed_parts, noise_of_heading
 from syncline_design.diagnosis.checks import log_checks
-from syncline_design.diagnosis.consequence import promise_of, rms_m, weighed
+from syncline_design.diagnosis.consequence import Promise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.findings import entry_of, findings
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
@@ -116,40 +116,24 @@ def diagnose_measured(
         data, search, result = _searched(inputs, log, settings, progress)
     view = data.view
     progress("testing what remains", 0.7)
-    rest = remainder(data, result.model, search.rng)
-    left = rest.p < REMAINDER_SHARE * settings.false_alarm_rate
     promise = None if case is None else promise_of(case)
-    weights = weighed(promise, data)
-    named = findings(result.final, faults, weights, left)
-    causes = [entry_of(one) for one in named if one.kind != "noise" and one.material]
-    material = left and weights.left(rest.size_m, causes)
-    if material:
-        named = stand_ins(named, data, result.model, rest.size_m)
+    weighed_up = _weighed_up(data, search, result, faults, promise)
     checks = log_checks(view)
     sound = all(c.severity != "contradiction" for c in checks)
-    verdict = outcome(named, sound and not material)
+    verdict = outcome(weighed_up.findings, sound and not weighed_up.remaining.material)
     shown = smallest_seen(search, result)
     progress("measuring the gap", 0.8)
     cells = where_map(view, result.base.error, result.model.precision)
-    after = where_map(view, result.model.error, result.model.precision)
-    whole = _whole_gap(data, search, result)
+    remaining = replace(weighed_up.remaining, unexplained=verdict == "unexplained")
     return Diagnosis(
         verdict=verdict,
         sound=sound,
         checks=checks,
-        findings=named,
-        remaining=Remaining(
-            unexplained=verdict == "unexplained",
-            spec_m=weights.spec_m,
-            beyond_noise=left,
-            p=None if left else rest.p,
-            where=strongest(after),
-            size_m=rest.size_m,
-            material=material,
-        ),
+        findings=weighed_up.findings,
+        remaining=remaining,
         where=strongest(cells),
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
-        gap=whole,
+        gap=_whole_gap(data, search, result),
         steps=_steps(data, result),
         unseen=_unseen(data, search, result, settings.exclude_effects),
         log=_log_read(replace(inputs.log, notes=view.log.notes), data),
@@ -161,6 +145,43 @@ def diagnose_measured(
         informative=informative(promise, shown),
         smallest_seen=tuple(one.record for one in shown),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _WeighedUp:
+    """What was found, and what is left, with what both are worth."""
+
+    findings: tuple[Finding, ...]
+    remaining: Remaining
+
+
+def _weighed_up(
+    data: Data,
+    search: Search,
+    result: SearchResult,
+    faults: Sequence[Gross],
+    promise: Promise | None,
+) -> _WeighedUp:
+    """Findings and remainder of a settled model, each with whether it matters."""
+    rest = remainder(data, result.model, search.rng)
+    left = rest.p < REMAINDER_SHARE * search.settings.false_alarm_rate
+    weights = weighed(promise, data)
+    named = findings(result.final, faults, weights, left)
+    causes = [entry_of(one) for one in named if one.kind != "noise" and one.material]
+    material = left and weights.left(rest.size_m, causes)
+    if material:
+        named = stand_ins(named, data, result.model, rest.size_m)
+    after = where_map(data.view, result.model.error, result.model.precision)
+    remaining = Remaining(
+        unexplained=material,
+        spec_m=weights.spec_m,
+        beyond_noise=left,
+        p=None if left else rest.p,
+        where=strongest(after),
+        size_m=rest.size_m,
+        material=material,
+    )
+    return _WeighedUp(named, remaining)
 
 
 def outcome(named: Sequence[Finding], settled: bool) -> LogOutcome:
