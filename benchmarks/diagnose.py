@@ -90,8 +90,8 @@ from syncline_design.diagnosis import diagnose
 start = time.perf_counter()
 found = diagnose(sys.argv[1], [sys.argv[2]])
 peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024**2
-named = " + ".join(f"{f.effect.name} ({f.sensor})" for f in found.findings)
-value = found.findings[0].parameters["latency_s"] if named else None
+named = " + ".join(f"{f.effect} ({f.sensor})" for f in found.findings)
+value = found.findings[0].parameters["latency_s"].text if named else None
 print(f"{time.perf_counter() - start:.1f} s, {peak:.2f} GiB: {found.verdict}, {named}, {value}")
 """
 
