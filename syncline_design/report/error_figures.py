@@ -27,16 +27,23 @@ LEAD = (
 def error_figures(verdict: Verdict) -> list[Node]:
     """The figures, and what makes the quantiles large."""
     found = verdict.figures
-    if found is None or found.quantile95_3d_m is None:
+    if found is None or found.worst_case_m is None:
         return []
     limit = verdict_figures.lowest_limit(verdict, "accuracy")
     return [
         Text(LEAD),
         *show(_figures(found, limit), silent=True),
-        Group(tuple(show(_shares(found))), "fold", summary="What makes them, where they are worst",
-              reach="page"),
+        *_makers(found),
         *(Text(text, quiet=True) for text in _situation(found)),
     ]  # fmt: skip
+
+
+def _makers(found: ErrorFigures) -> list[Node]:
+    """What makes the statistical figures, folded away."""
+    if not found.worst_at:
+        return []
+    shown = tuple(show(_shares(found)))
+    return [Group(shown, "fold", summary="What makes them, where they are worst", reach="page")]
 
 
 def _figures(found: ErrorFigures, limit: float | None) -> Table:
@@ -48,6 +55,7 @@ def _figures(found: ErrorFigures, limit: float | None) -> Table:
             says,
         )
         for name, over, one, says in _rows(found)
+        if over is not None
     ]
     heads = ("Figure", "Over missions #", "One mission #", "What it says")
     return table("Error figures", heads, rows)

@@ -15,9 +15,10 @@ from typing import Literal
 
 import numpy as np
 
+from syncline_design.effects.acting import by_stage
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
-from syncline_design.model.system import System
+from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation.ascent import Ascent, Index
 from syncline_design.simulation.lattice import POINTS, normal_quantile, sphere_lattice
 from syncline_design.simulation.settings import demand_simulable
@@ -30,8 +31,9 @@ AXES: dict[Axis, slice] = {
     "3d": slice(0, 3),
 }
 _QUICK_NODES = 1021
-_SEARCH_NODES = 31  # where shifts are long
-CLOSE, CLOSE_LONG = 2e-3, 3e-2  # what one search may miss, with long shifts
+_SEARCH_NODES, _CANDIDATES = 31, 3  # where shifts are long
+CLOSE, CLOSE_LONG = 1e-2, 5e-2  # what one search may miss, with long shifts
+_MORE_SEARCHES = 6  # where a figure is that close to its limit
 _POOL, _STARTS, _STARTS_EXACT, _ITERATIONS = 512, 6, 2, 60
 _ROUGH, _SETTLED = 1e-4, 1e-6  # gain of an iteration below which ascents end: all, the best
 
@@ -61,25 +63,61 @@ def statistical_figures(
     one_mission: what is constant in a mission is held at its worst value instead of drawn.
     """
     demand_simulable(system)
+    demand_covered(system)
     situations = Situations(system, one_mission)
     found = _worst_points(situations, wanted, seed)
     return tuple(
-        _evaluated(situations, one, point, seed) for one, point in zip(wanted, found.T, strict=True)
+        max(
+            (_evaluated(situations, one, point, seed) for point in points.T),
+            key=lambda worst: worst.value_m,
+        )
+        for one, points in zip(wanted, _promising(situations, wanted, found), strict=True)
     )
 
 
+def scattering(system: System) -> tuple[str, ...]:
+    """Known effects that scatter (noise, jitter): the statistical figures do not cover them."""
+    acting = (one for own in by_stage(system).values() for one in own)
+    return tuple(dict.fromkeys(a.effect.name for a in acting if a.effect.kind == "stochastic"))
+
+
+def demand_covered(system: System) -> None:
+    """Raise SimulationError where the statistical figures would leave out what scatters."""
+    if found := scattering(system):
+        raise SimulationError(
+            f"the statistical figures do not cover known effects that scatter "
+            f"({', '.join(found)}): require monte_carlo instead"
+        )
+
+
+def _promising(situations: Situations, wanted: Sequence[Wanted], found: Array) -> tuple[Array, ...]:
+    """For each figure its own point and the best of the others', so that none contradicts another.
+
+    What is largest in space is at least as large as what is largest horizontally.
+    """
+    mean, covariance = propagated(situations, found)
+    out = []
+    for k, one in enumerate(wanted):
+        order = np.argsort(-approximate(mean, covariance, one))
+        kept = list(dict.fromkeys([k, *order.tolist()]))[:_CANDIDATES]
+        out.append(found[:, kept])
+    return tuple(out)
+
+
 def figure_m(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> float:
-    """A figure to be held against a limit [m]; near it, the largest of three searches."""
+    """A figure to be held against a limit [m]; near it, the largest of several searches."""
     value = statistical_figures(system, (wanted,), seed=seed)[0].value_m
     near = CLOSE if Situations(system).linear else CLOSE_LONG
     if abs(value - limit_m) <= near * limit_m:
-        again = (statistical_figures(system, (wanted,), seed=seed + k)[0] for k in (1, 2))
-        value = max(value, *(worst.value_m for worst in again))
+        for more in range(1, _MORE_SEARCHES + 1):
+            again = statistical_figures(system, (wanted,), seed=seed + more)[0].value_m
+            value = max(value, again)
     return value
 
 
 def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> bool:
     """Whether some situation at random already exceeds a limit: a quick no, never a yes."""
+    demand_covered(system)
     situations = Situations(system)
     pool = situations.starting_points(seed, _POOL)
     best = int(np.argmax(approximate(*propagated(situations, pool), wanted)))

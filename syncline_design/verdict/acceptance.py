@@ -209,12 +209,12 @@ class _SpecJudge:
 
     def _status(self, system: System, name: str, limit_m: float, *, what_if: bool) -> str:
         requirement = self._requirement(name)
-        if requirement.kind in STATED_KINDS:
-            self.simulations.count(system)
-            wanted = wanted_of(requirement)
-            kept = keeps(_nameless(system), wanted, limit_m, self.simulations.seed)
-            return "pass" if kept else "fail"
         try:
+            if requirement.kind in STATED_KINDS:
+                self.simulations.count(system)
+                wanted = wanted_of(requirement)
+                kept = keeps(_nameless(system), wanted, limit_m, self.simulations.seed)
+                return "pass" if kept else "fail"
             return self._decision(system, name, limit_m, what_if=what_if).status
         except SimulationError as error:
             if self.case.spec.monte_carlo.trajectory is not None:
@@ -237,7 +237,10 @@ class _SpecJudge:
         one = self._requirement(requirement)
         if one.kind in STATED_KINDS:
             system = _nameless(self._system(problem, design)[0])
-            return value_m(system, wanted_of(one), float(one.limit), self.simulations.seed)
+            try:
+                return value_m(system, wanted_of(one), float(one.limit), self.simulations.seed)
+            except SimulationError as error:
+                raise Unfinished(str(error)) from None
         limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
         system, _ = self._system(problem, design)
         return self._decision(system, requirement, limit).estimate.high_m

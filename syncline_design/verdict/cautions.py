@@ -11,6 +11,7 @@ from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
 from syncline_design.simulation.ensemble import outside_words
+from syncline_design.simulation.statistical import scattering
 from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.verdict.tree import Assumption, Caution, ErrorFigures
@@ -79,6 +80,12 @@ def _worst_case(verified: Verified) -> Iterator[Caution]:
 
 def _quantile(verified: Verified, figures: ErrorFigures) -> Iterator[Caution]:
     """A design that keeps an accuracy limit which 95 % of its errors do not, at its worst."""
+    if found := scattering(verified.system):
+        yield Caution(
+            "figures-left-out",
+            f"known effects that scatter ({', '.join(found)}) are charged in the Syncline and "
+            "simulated, but are not in the statistical figures, which are left out",
+        )
     kept = [r for r in verified.requirements if r.kind == "accuracy" and r.status == "pass"]
     quantile = figures.quantile95_3d_m
     if quantile is None or not kept:

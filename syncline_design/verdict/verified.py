@@ -7,12 +7,13 @@ from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.table import Design, Problem
-from syncline_design.machine.deadline import OutOfTime
+from syncline_design.machine.deadline import OutOfTime, in_force
 from syncline_design.model.budget import Budget, SyncModelName
 from syncline_design.model.system import System
 from syncline_design.simulation import MonteCarlo, SimulationError
 from syncline_design.simulation.certified import certified_worst_case_m
 from syncline_design.simulation.figures import error_statistics, worst_case_m
+from syncline_design.simulation.statistical import scattering
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.known_effects import describe
 from syncline_design.spec.load import BadInput, Flaw
@@ -114,15 +115,21 @@ def error_figures(verified: Verified, seed: int, statistics: bool) -> ErrorFigur
     )
     if not statistics or plain.worst_case_1sigma_m is None:
         return plain
+    plain = replace(
+        plain,
+        worst_case_m=finite(worst_case_m(system, system.coverage_factor)),
+        worst_case_k=system.coverage_factor,
+    )
+    if scattering(system):
+        return plain
     try:
+        in_force().doing("working out the statistical budget")
         found = error_statistics(system, seed)
     except OutOfTime:
         return plain
     over = found.over_missions
     return replace(
         plain,
-        worst_case_m=finite(worst_case_m(system, system.coverage_factor)),
-        worst_case_k=system.coverage_factor,
         rmse_m=over.rmse_m,
         thu95_m=over.thu95_m,
         tvu95_m=over.tvu95_m,

@@ -334,7 +334,6 @@ def _verdict(
 ) -> Verdict:
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
-    in_force().doing("working out the statistical budget")
     figures = error_figures(verified, settings.seed, settings.monte_carlo)
     told = sources(entries)
     shown = named_design(case, problem, verified.design, verified.figures)
