@@ -50,4 +50,5 @@ EFFECT = Effect(
     sensitivity=None,
     contribute=_contribute,
     opens="slow",
+    brief=("slow, {std_m} over {time_constant_s}",),
 )

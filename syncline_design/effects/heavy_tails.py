@@ -80,4 +80,5 @@ EFFECT = Effect(
     contribute=_contribute,
     unbudgeted=_unbudgeted,
     opens="tails",
+    brief=("heavy tails ({degrees_of_freedom} degrees of freedom)", "{outlier_rate} outliers"),
 )

@@ -50,4 +50,5 @@ EFFECT = Effect(
     sensitivity=None,
     contribute=_contribute,
     opens="down",
+    brief=("slow in height, {std_m} over {time_constant_s}",),
 )

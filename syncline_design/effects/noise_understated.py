@@ -58,4 +58,5 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=140,
     opens="factor",
+    brief=("{factor} times the spec's",),
 )

@@ -280,6 +280,7 @@ class Effect:
     undoing: a discrete one's.
     bounded_by_k: charged with k times its standard deviation, k the coverage factor.
     sentence: for people, a format string over {sensor} and the parameters.
+    brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
     """
 
     name: str
@@ -304,6 +305,7 @@ class Effect:
     opens: Opening = ""
     undoing: Undoing | None = None
     bounded_by_k: bool = False
+    brief: tuple[str, ...] = ()
 
     @property
     def wanders(self) -> bool:

@@ -20,6 +20,7 @@ from syncline_design.diagnosis.result import (
     Remaining,
     Rival,
 )
+from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.quantity import split_suffix
@@ -149,21 +150,19 @@ def noise_lines(findings: Sequence[Finding]) -> list[str]:
 
 
 def _noise_words(one: Finding) -> str:
-    texts = {name: estimate.text for name, estimate in one.parameters.items()}
-    match one.effect:
-        case "noise_understated":
-            return f"{texts['factor']} times the spec's"
-        case "correlated_noise" | "height_drift":
-            what = "slow" if one.effect == "correlated_noise" else "slow in height"
-            return f"{what}, {texts['std_m']} over {texts['time_constant_s']}"
-        case "heavy_tails":
-            rate = one.parameters["outlier_rate"].value
-            struck = (
-                f", {numbers.percent(rate)} outliers" if isinstance(rate, float) and rate else ""
-            )
-            return f"heavy tails ({texts['degrees_of_freedom']} degrees of freedom){struck}"
-        case _:
-            return _spaced(one.effect)
+    """`slow, 6.4 mm over 22 s`: a noise effect in a few words, shares in percent."""
+    parts = []
+    for part in registry()[one.effect].brief:
+        named = [name for name in one.parameters if f"{{{name}}}" in part]
+        if all(one.parameters[name].value for name in named):
+            parts.append(part.format(**{name: _figure_words(one, name) for name in named}))
+    return ", ".join(parts) or _spaced(one.effect)
+
+
+def _figure_words(one: Finding, name: str) -> str:
+    estimate = one.parameters[name]
+    is_share = name.endswith("_rate") and isinstance(estimate.value, float)
+    return numbers.percent(estimate.value) if is_share else estimate.text
 
 
 def left_text(remaining: Remaining) -> str:
