@@ -222,7 +222,7 @@ def stage_part(system, stage, own, shifts, z, first) -> np.ndarray:  # type: ign
     pitch, roll = -math.asin(down[0]), math.atan2(down[1], down[2])
     pose = Rotation.from_euler("ZYX", [math.atan2(*own["yaw"][::-1]), pitch, roll])
     shift_p, shift_a = shifts
-    nodes, weights = np.polynomial.legendre.leggauss(12)
+    nodes, weights = np.polynomial.legendre.leggauss(6)
     moved = np.zeros((3, shift_p.size))
     for node, weight in zip(nodes, weights, strict=True):
         turned = Rotation.from_rotvec(np.outer(0.5 * (node + 1.0) * shift_p, w)).apply(v)
@@ -249,26 +249,25 @@ def stage_part(system, stage, own, shifts, z, first) -> np.ndarray:  # type: ign
     return error + (np.array(stage.position.sigma)[:, None] * z[:3] if first else 0.0)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(8))
 def test_figures_of_a_situation_against_sampling(seed: int) -> None:
-    """120 000 draws of an own chain: 6 figures at 2 situations each of 6 chains.
+    """80 000 draws of an own chain: 6 figures at a situation of each of 8 chains.
 
     Tolerance 1.5 %: at least 4.5 standard errors of a sampled 95 % quantile, so that one of the
-    144 comparisons fails by chance less than once in 1 000 runs of this file.
+    48 comparisons fails by chance less than once in 1 000 runs of this file.
     """
     system = chain(seed)
     situations = Situations(system)
-    points = situations.starting_points(seed, 2)
-    for k in range(2):
-        moments = situations.moments(points[:, k : k + 1], situations.nodes(4093))
-        error = plain_errors(system, points[:, k], 120_000, seed)
-        for wanted in ALL:
-            rows = {"horizontal": error[:2], "vertical": error[2:], "3d": error}[wanted.axis]
-            length = np.linalg.norm(rows, axis=0)
-            square = math.sqrt(np.mean(length**2))
-            sampled = square if wanted.p is None else float(np.quantile(length, wanted.p))
-            found = exact(moments, wanted, len(situations.free))
-            assert found == pytest.approx(sampled, rel=0.015)
+    point = situations.starting_points(seed, 1)
+    moments = situations.moments(point, situations.nodes(16381))
+    error = plain_errors(system, point[:, 0], 80_000, seed)
+    for wanted in ALL:
+        rows = {"horizontal": error[:2], "vertical": error[2:], "3d": error}[wanted.axis]
+        length = np.linalg.norm(rows, axis=0)
+        square = math.sqrt(np.mean(length**2))
+        sampled = square if wanted.p is None else float(np.quantile(length, wanted.p))
+        found = exact(moments, wanted, len(situations.free))
+        assert found == pytest.approx(sampled, rel=0.015)
 
 
 @pytest.mark.parametrize("seed", [0, 3])

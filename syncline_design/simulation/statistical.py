@@ -20,7 +20,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation.ascent import Ascent, Index
-from syncline_design.simulation.lattice import POINTS, normal_quantile, sphere_lattice
+from syncline_design.simulation.lattice import MANY_POINTS, POINTS, normal_quantile, sphere_lattice
 from syncline_design.simulation.settings import demand_simulable
 from syncline_design.simulation.situations import Moments, Situations
 
@@ -181,7 +181,8 @@ def _ascent(
 
 def _evaluated(situations: Situations, wanted: Wanted, point: Array, seed: int) -> Worst:
     in_force().check()
-    moments = situations.moments(point[:, None], situations.nodes(POINTS), seed)
+    count = POINTS if situations.linear else MANY_POINTS
+    moments = situations.moments(point[:, None], situations.nodes(count), seed)
     skipped = len(situations.free)
     return Worst(wanted, exact(moments, wanted, skipped), point)
 
