@@ -20,6 +20,7 @@ from syncline_design.machine.deadline import in_force
 _STEP = 1e-6  # of the forward differences, in units of each block
 _MOVES = (1.0, 0.5, 0.2, 0.05, 0.01, 0.002)  # fractions of the way to the ascent direction
 _STRIDES = (1.0, 3.0, 10.0, 30.0)  # multiples of the last step to go on by: climbs along ridges
+SYSTEM = -1  # the stage number of blocks that all stages share
 Kind = Literal["ball", "sphere"]
 Index = NDArray[np.intp]
 Objective = Callable[[Array, Index], Array]  # points (p, n), problem of each (n,) -> values (n,)

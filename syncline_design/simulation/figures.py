@@ -12,9 +12,9 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.system import Sensor, Stage, System
-from syncline_design.simulation.ascent import chosen
+from syncline_design.simulation.ascent import SYSTEM, chosen
 from syncline_design.simulation.certified import certified_worst_case_m
-from syncline_design.simulation.situations import SYSTEM, Situations
+from syncline_design.simulation.situations import Situations
 from syncline_design.simulation.statistical import (
     AXES,
     Wanted,
@@ -22,7 +22,7 @@ from syncline_design.simulation.statistical import (
     columns_at,
     statistical_figures,
 )
-from syncline_design.simulation.surroundings import leaning
+from syncline_design.simulation.surroundings import leaning, moment_at
 
 Vector = tuple[float, float, float]
 CONFIDENCE = 0.95
@@ -138,14 +138,13 @@ def _situation(situations: Situations, name: str, worst: Worst) -> WorstSituatio
     point = worst.point[:, None]
     about = chosen(situations.blocks, point, SYSTEM)
     acts = "time" in about
-    horizon = situations.system.horizon
-    time = 0.5 * horizon.duration_s * (1.0 + float(about["time"][0, 0])) if acts else None
-    north, east = (horizon.extent_m * about["place"][:, 0]).tolist() if acts else (0.0, 0.0)
+    moment = moment_at(situations.system.horizon, about, 1)
+    north, east = moment.place_m[:, 0].tolist()
     return WorstSituation(
         figure=f"rmse_m.{name}" if name in AXES else name,
         stages=tuple(_stage(situations, k, point) for k in range(len(situations.system.stages))),
         shares=_shares(situations, worst),
-        elapsed_s=time,
+        elapsed_s=float(moment.elapsed_s[0]) if acts else None,
         place_m=(north, east) if acts else None,
     )
 

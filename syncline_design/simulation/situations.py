@@ -16,7 +16,14 @@ from syncline_design.effects.record import Array
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation import kernel
-from syncline_design.simulation.ascent import FreeVector, Kind, at_length_one, chosen, stacked
+from syncline_design.simulation.ascent import (
+    SYSTEM,
+    FreeVector,
+    Kind,
+    at_length_one,
+    chosen,
+    stacked,
+)
 from syncline_design.simulation.chain import SensorSigma, noise_slopes
 from syncline_design.simulation.draws import Shifts, generator, lever_arms, stage_shifts
 from syncline_design.simulation.known_effects import Carried, departed_error
@@ -24,7 +31,6 @@ from syncline_design.simulation.surroundings import leaning, moment_at, placed_r
 from syncline_design.simulation.timing_variables import SystemTiming, timing_of
 
 SITUATION_STREAM = 4  # first word of the stream key, see draws.generator
-SYSTEM = -1  # the stage number of blocks that all stages share
 _LINEAR_RAD = 0.05  # turns during a shift up to which propagation is right within 0.2 %
 
 
@@ -69,27 +75,24 @@ class Situations:
 
     def errors_m(self, point: Array, nodes: Array) -> Array:
         """The error without noise at points (p, n), each at all nodes: (n, M, 3)."""
-        return self._run(point, nodes, None, None)
+        return self._run(point, nodes, None)
 
-    def moments(self, point: Array, nodes: Array, seed: int | None = None) -> Moments:
-        """The error at points (p, n), each at all nodes (free variables, M) [s].
-
-        seed: of what stochastic effects draw; None: they do not act.
-        """
+    def moments(self, point: Array, nodes: Array) -> Moments:
+        """The error at points (p, n), each at all nodes (free variables, M) [s]."""
         slopes: list[Array] = []
-        mean = self._run(point, nodes, seed, slopes)
+        mean = self._run(point, nodes, slopes)
         return Moments(mean, np.concatenate(slopes, axis=2).reshape(*mean.shape, -1))
 
-    def _run(
-        self, point: Array, nodes: Array, seed: int | None, slopes: list[Array] | None
-    ) -> Array:
-        """The chain at all nodes of all points; the slopes of its stages are added to `slopes`."""
+    def _run(self, point: Array, nodes: Array, slopes: list[Array] | None) -> Array:
+        """The chain at all nodes of all points; the slopes of its stages are added to `slopes`.
+
+        Effects that scatter do not act.
+        """
         count, each = point.shape[1], nodes.shape[1]
         total = count * each
         columns = np.repeat(point, each, axis=1)
         shifts = self.timing.shifts(self._values(columns, np.tile(nodes, count)))
         moment = moment_at(self.system.horizon, chosen(self.blocks, columns, SYSTEM), total)
-        stream = None if seed is None else generator(seed, SITUATION_STREAM)
         carried: Carried | None = None
         for index, stage in enumerate(self.system.stages):
             picked = chosen(self.blocks, columns, index)
@@ -97,7 +100,7 @@ class Situations:
             rows = placed_rows(draw, moment, leaning(self.system.horizon, picked["lean"]))
             state, motion, noise = rows
             acting = self.acting.get(stage.name, ())
-            world = departures(acting, state, stream, systematic_only=stream is None)
+            world = departures(acting, state, None, systematic_only=True)
             carried = departed_error(rows, world, carried)
             if slopes is not None:
                 slopes.append(noise_slopes(state, motion, noise, world, _sigma(stage)))

@@ -11,16 +11,17 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from statistics import NormalDist
 from typing import Literal
 
 import numpy as np
 
-from syncline_design.effects.acting import by_stage
+from syncline_design.effects.acting import acting_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation.ascent import Ascent, Index
-from syncline_design.simulation.lattice import MANY_POINTS, POINTS, normal_quantile, sphere_lattice
+from syncline_design.simulation.lattice import MANY_POINTS, POINTS, sphere_lattice
 from syncline_design.simulation.settings import demand_simulable
 from syncline_design.simulation.situations import Moments, Situations
 
@@ -68,7 +69,7 @@ def statistical_figures(
     found = _worst_points(situations, wanted, seed)
     return tuple(
         max(
-            (_evaluated(situations, one, point, seed) for point in points.T),
+            (_evaluated(situations, one, point) for point in points.T),
             key=lambda worst: worst.value_m,
         )
         for one, points in zip(wanted, _promising(situations, wanted, found), strict=True)
@@ -77,7 +78,7 @@ def statistical_figures(
 
 def scattering(system: System) -> tuple[str, ...]:
     """Known effects that scatter (noise, jitter): the statistical figures do not cover them."""
-    acting = (one for own in by_stage(system).values() for one in own)
+    acting = acting_of(system)
     return tuple(dict.fromkeys(a.effect.name for a in acting if a.effect.kind == "stochastic"))
 
 
@@ -122,7 +123,7 @@ def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0
     pool = situations.starting_points(seed, _POOL)
     best = int(np.argmax(approximate(*propagated(situations, pool), wanted)))
     nodes = situations.nodes(_QUICK_NODES)
-    moments = situations.moments(pool[:, best : best + 1], nodes, seed)
+    moments = situations.moments(pool[:, best : best + 1], nodes)
     least = limit_m * (1.0 + CLOSE)
     if wanted.p is None:
         return exact(moments, wanted, len(situations.free)) > least
@@ -179,10 +180,10 @@ def _ascent(
     return Ascent(situations.blocks, objective)
 
 
-def _evaluated(situations: Situations, wanted: Wanted, point: Array, seed: int) -> Worst:
+def _evaluated(situations: Situations, wanted: Wanted, point: Array) -> Worst:
     in_force().check()
     count = POINTS if situations.linear else MANY_POINTS
-    moments = situations.moments(point[:, None], situations.nodes(count), seed)
+    moments = situations.moments(point[:, None], situations.nodes(count))
     skipped = len(situations.free)
     return Worst(wanted, exact(moments, wanted, skipped), point)
 
@@ -234,7 +235,7 @@ def approximate(mean: Array, covariance: Array, wanted: Wanted) -> Array:
     third = np.einsum("nij,nji->n", squared, c) + 3.0 * np.sum(c_m * c_m, axis=1)
     third_or_1 = np.where(third > 0.0, third, 1.0)
     h = np.where(third > 0.0, second * (second / third_or_1) ** 2, 1.0)
-    z = float(normal_quantile(np.array([wanted.p]))[0])
+    z = NormalDist().inv_cdf(wanted.p)
     chi2 = h * np.maximum(1.0 - 2.0 / (9.0 * h) + z * np.sqrt(2.0 / (9.0 * h)), 0.0) ** 3
     found: Array = np.sqrt(np.maximum(first + (chi2 - h) * np.sqrt(second / h), 0.0))
     return found

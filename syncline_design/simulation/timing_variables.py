@@ -26,6 +26,7 @@ from syncline_design.model.timing import (
     Uniform,
     expected,
     mean,
+    support,
 )
 from syncline_design.simulation.draws import entering
 from syncline_design.simulation.lattice import lattice, normal_row
@@ -62,15 +63,7 @@ class TimingVariable:
 
     def ends_s(self, coverage_factor: float) -> tuple[float, float]:
         """Support [s]; of a normal one k standard deviations to either side."""
-        match self.centred:
-            case Uniform(low, high):
-                return low, high
-            case Normal(_, std):
-                return -coverage_factor * std, coverage_factor * std
-            case Empirical(values):
-                return min(values), max(values)
-            case Constant():
-                return 0.0, 0.0
+        return support(TimingError(self.centred), coverage_factor)
 
     def on_lattice(self, row: int, count: int) -> Array:
         """Equally likely values [s] (count,), by one of the lattice's dimensions."""

@@ -18,6 +18,7 @@ from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation import kernel, known_effects
 from syncline_design.simulation.ascent import (
+    SYSTEM,
     Ascent,
     FreeVector,
     Index,
@@ -34,8 +35,6 @@ from syncline_design.simulation.surroundings import leaning, moment_at
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
 _SETTLED = 0.01  # an ascent has arrived when an iteration gains less than this part of the gap
 
-_SYSTEM = -1  # the stage number of blocks that all stages share
-
 
 def _is_placed(system: System) -> bool:
     """Whether heading, tilt, time or place can matter: else the fast level kernel will do."""
@@ -47,7 +46,7 @@ def blocks(system: System) -> tuple[FreeVector, ...]:
     """What may be chosen: once for the system when and where, then stage by stage."""
     kinds: list[tuple[int, str, Kind, int]] = []
     if system.effects:
-        kinds = [(_SYSTEM, "time", "ball", 1), (_SYSTEM, "place", "ball", 2)]
+        kinds = [(SYSTEM, "time", "ball", 1), (SYSTEM, "place", "ball", 2)]
     for index, stage in enumerate(system.stages):
         kinds += [(index, *one) for one in _stage_blocks(stage, index, _is_placed(system))]
     return stacked(kinds)
@@ -124,7 +123,7 @@ class _Search:
         carried: known_effects.Carried | None = None
         moment = None
         if self.placed:
-            about = chosen(self.blocks, point, _SYSTEM)
+            about = chosen(self.blocks, point, SYSTEM)
             moment = moment_at(self.system.horizon, about, tau_s.shape[0])
         for index, stage in enumerate(self.system.stages):
             picked = chosen(self.blocks, point, index)

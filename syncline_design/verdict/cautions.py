@@ -14,7 +14,7 @@ from syncline_design.simulation.ensemble import outside_words
 from syncline_design.simulation.statistical import scattering
 from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
-from syncline_design.verdict.tree import Assumption, Caution, ErrorFigures
+from syncline_design.verdict.tree import Assumption, Caution, ErrorFigures, RequirementResult
 from syncline_design.verdict.verified import Verified
 
 LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed their bound
@@ -58,17 +58,16 @@ def _length(value: float) -> str:
     return format_quantity(value, Dimension.LENGTH)
 
 
-def _worst_case(verified: Verified) -> Iterator[Caution]:
-    """A design that keeps an accuracy limit which its certified worst case exceeds.
+def _tightest_kept(verified: Verified) -> RequirementResult | None:
+    """The tightest accuracy limit that is kept: a failed one says enough itself."""
+    kept = (r for r in verified.requirements if r.kind == "accuracy" and r.status == "pass")
+    return min(kept, key=lambda row: row.limit, default=None)
 
-    Of several limits the tightest one that is kept: a failed one says enough itself.
-    """
-    kept = [r for r in verified.requirements if r.kind == "accuracy" and r.status == "pass"]
-    worst = verified.worst_case_1sigma_m
-    if worst is None or not kept:
-        return
-    tightest = min(kept, key=lambda row: row.limit)
-    if not worst <= tightest.limit:
+
+def _worst_case(verified: Verified) -> Iterator[Caution]:
+    """A design that keeps an accuracy limit which its certified worst case exceeds."""
+    worst, tightest = verified.worst_case_1sigma_m, _tightest_kept(verified)
+    if worst is not None and tightest is not None and not worst <= tightest.limit:
         yield Caution(
             "worst-case-above-limit",
             f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet with every sensor "
@@ -86,12 +85,8 @@ def _quantile(verified: Verified, figures: ErrorFigures) -> Iterator[Caution]:
             f"known effects that scatter ({', '.join(found)}) are charged in the Syncline and "
             "simulated, but are not in the statistical figures, which are left out",
         )
-    kept = [r for r in verified.requirements if r.kind == "accuracy" and r.status == "pass"]
-    quantile = figures.quantile95_3d_m
-    if quantile is None or not kept:
-        return
-    tightest = min(kept, key=lambda row: row.limit)
-    if not quantile <= tightest.limit:
+    quantile, tightest = figures.quantile95_3d_m, _tightest_kept(verified)
+    if quantile is not None and tightest is not None and not quantile <= tightest.limit:
         yield Caution(
             "quantile-above-limit",
             f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet in the worst "
