@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import importlib.util
 import re
+import tomllib
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -77,6 +78,13 @@ def test_no_import_climbs() -> None:
     arrows = {(a, b) for a, b in drawer.arrows() if b in level}
     assert arrows
     assert [(a, b) for a, b in arrows if level[a] < level[b]] == []
+
+
+def test_every_folder_with_modules_is_in_the_wheel() -> None:
+    packages = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["setuptools"]
+    mapped = set(packages["package-dir"])
+    folders = {".".join(path.parent.relative_to(ROOT).parts) for path in PACKAGE.rglob("*.py")}
+    assert set(packages["packages"]) == folders | mapped
 
 
 def test_the_words_of_the_glossary_are_names_in_the_code() -> None:
