@@ -15,7 +15,7 @@ $(RUN): pyproject.toml
 	touch $@
 
 $(DEV): $(RUN)
-	$(PIP) -e '.[dev,cluster,browser]'
+	$(PIP) -e '.[dev,cluster,browser,logs]'
 	touch $@
 
 demo: $(RUN)

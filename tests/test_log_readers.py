@@ -1,0 +1,55 @@
+"""The contract of readers: found by content, refused in one line, stamps kept as they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.logs.readers import open_recording, registry
+from syncline_design.logs.readers.reader import library
+from syncline_design.logs.readers.stream import UNSET, StampColumn
+from syncline_design.spec.load import BadInput
+
+
+def test_stamps_of_any_size_are_kept() -> None:
+    column = StampColumn()
+    for stamp in (-1, 0, 2**63 - 1, 2**63, 1_432_235_498_025_043_042):
+        column.append(stamp)
+    column.extend(np.arange(3, dtype=np.int32)[::2])
+    values = column.values()
+    assert values.dtype == np.int64
+    assert values.tolist() == [-1, 0, 2**63 - 1, UNSET, 1_432_235_498_025_043_042, 0, 2]
+    assert len(column) == 7
+
+
+def test_a_file_of_no_kind_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "noise.bin"
+    path.write_bytes(bytes(range(256)) * 8)
+    with pytest.raises(BadInput) as caught:
+        open_recording(path)
+    (flaw,) = caught.value.problems
+    assert flaw.file == str(path)
+    assert flaw.message == "no log that can be read"
+
+
+@pytest.mark.parametrize("what", ["missing", "empty", "nowhere/at all"])
+def test_what_is_not_there_is_refused(tmp_path: Path, what: str) -> None:
+    path = tmp_path / what
+    if what == "empty":
+        path.write_bytes(b"")
+    with pytest.raises(BadInput):
+        open_recording(path)
+
+
+def test_a_missing_library_is_one_clear_line(tmp_path: Path) -> None:
+    with pytest.raises(BadInput) as caught:
+        library("no_such_library.part", tmp_path / "a.bag", "ROS 1 bag")
+    (flaw,) = caught.value.problems
+    assert flaw.message == "reading a ROS 1 bag needs the library no-such-library"
+    assert "pip install 'syncline-design[logs]'" in flaw.hint
+
+
+def test_every_reader_says_what_it_reads() -> None:
+    assert all(reader.format for reader in registry().values())
