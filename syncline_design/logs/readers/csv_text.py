@@ -1,0 +1,253 @@
+"""CSV and its relatives as a stream: one file is one stream, named by the file's stem."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.logs import delimited
+from syncline_design.logs.cells import (
+    NO_TIME,
+    BadCellError,
+    iso_times,
+    looks_like_a_date,
+    numbers,
+    trimmed,
+)
+from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts, scaled
+from syncline_design.logs.readers.csv_names import Layout, TimeColumn, layout_of, time_columns
+from syncline_design.logs.readers.decimal_stamps import column as exact_stamps
+from syncline_design.logs.readers.epochs import WEEK_SECONDS, week_start_ns
+from syncline_design.logs.readers.reader import NO, Head, Reader
+from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Timeline
+from syncline_design.logs.readers.timelines import timeline_of
+from syncline_design.logs.refusals import refuse
+from syncline_design.logs.sources import TextSource, demand_plain_file
+
+if TYPE_CHECKING:
+    import polars as pl
+
+BY_HEADER = 2
+NAMED: dict[str, Timeline] = {"gps": "gps", "tai": "tai", "boot": "boot"}
+
+
+class CsvRecording(BatchRecording):
+    """Delimited text with a header."""
+
+    format = "CSV file"
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        demand_plain_file(path)
+        self._source = TextSource(path)
+        self._how = self._source.how
+        self._layout = layout_of(self._how.names)
+        self._name = path.stem
+        self._demand_times()
+        self._text: set[int] = set()  # places of columns that hold names, not figures
+        self._first_line = -1  # of the first row
+        self._calendar = False
+        self._seen: Nanoseconds = np.zeros(0, dtype=np.int64)
+
+    def _demand_times(self) -> None:
+        """One unit of the stamps, and something besides them or two of them."""
+        for stem in ("stamp", "receive"):
+            several = time_columns(self._how.names, stem)
+            if len(several) > 1:
+                raise refuse(
+                    self.path,
+                    f"two columns of {stem}s",
+                    line=self._how.line,
+                    column=several[1].place + 1,
+                    expected=f"one of {stem}_s, {stem}_ms, {stem}_us, {stem}_ns",
+                    found=", ".join(c.name for c in several)[:80],
+                )
+        layout = self._layout
+        if layout.primary is None and "target" not in layout.quantity:
+            raise refuse(
+                self.path,
+                "no column of times",
+                line=self._how.line,
+                column=1,
+                expected="stamp_<unit> and receive_<unit>, or time_s, time_ms, time_us, time_ns, "
+                "or ISO 8601 times in a column `time`",
+                found=", ".join(self._how.names[:12])[:200],
+            )
+
+    def _batches(self, wanted: str | None) -> Iterator[Batch]:
+        seen: list[Nanoseconds] = []
+        rows = 0
+        for block in delimited.blocks(self.path, self._how, self._source.end):
+            rows += int(block.lines.shape[0])
+            primary = self._times(block, self._layout.primary)
+            secondary = self._times(block, self._layout.secondary)
+            if primary is not None and self._layout.week is not None:
+                primary = self._with_week(block, primary)
+            columns = self._columns(block) if wanted is not None or not seen else {}
+            if primary is not None and len(seen) < 50:
+                seen.append(primary)
+            yield Batch(self._name, int(block.lines.shape[0]), primary, secondary, columns)
+        if wanted is None:
+            self._finish(rows, seen)
+
+    def _finish(self, rows: int, seen: list[Nanoseconds]) -> None:
+        if not rows:
+            raise refuse(self.path, "no rows below the header", line=self._how.line, column=1)
+        self._seen = np.concatenate(seen) if seen else np.zeros(0, dtype=np.int64)
+        if self._source.cut:
+            self._cut("the last row is cut", rows)
+
+    def _times(self, block: delimited.RowBlock, column: TimeColumn | None) -> Nanoseconds | None:
+        if column is None:
+            return None
+        text = self._cells(block, column.place)
+        try:
+            if not column.unit and looks_like_a_date(text):
+                self._calendar = True
+                stamps, _ = iso_times(text)
+                found: Nanoseconds = np.where(stamps == NO_TIME, UNSET, stamps)
+                return found
+            return exact_stamps(text, column.unit or self._refuse_bare(column))
+        except BadCellError as bad:
+            raise self._bad(block, column.place, bad) from None
+
+    def _refuse_bare(self, column: TimeColumn) -> str:
+        raise refuse(
+            self.path,
+            "times without a unit",
+            line=self._how.line,
+            column=column.place + 1,
+            field=column.name,
+            expected="a unit in the name, as in time_s or stamp_us, or ISO 8601 times",
+        )
+
+    def _with_week(self, block: delimited.RowBlock, tow: Nanoseconds) -> Nanoseconds:
+        place = self._layout.week
+        week = self._figures(block, place if place is not None else 0, True)
+        if week is None:
+            return tow
+        known = np.isfinite(week) & (week >= 0) & (week < 10_000) & (tow != UNSET)
+        start = np.array([week_start_ns(int(w)) for w in np.where(known, week, 0)], dtype=np.int64)
+        stamps: Nanoseconds = np.where(known, start + np.where(known, tow, 0), UNSET)
+        return stamps
+
+    def _columns(self, block: delimited.RowBlock) -> dict[str, NDArray[Any]]:
+        columns: dict[str, NDArray[Any]] = {}
+        for column in self._layout.columns:
+            if column.name == "target_id":
+                cells = self._cells(block, column.place)
+                columns[column.name] = cells.fill_null("").to_numpy().astype(str)
+                continue
+            values = self._figures(block, column.place, column.known)
+            if values is not None:
+                columns[column.name] = scaled(values, column.factor)
+        return columns
+
+    def _figures(
+        self, block: delimited.RowBlock, place: int, known: bool
+    ) -> NDArray[np.float64] | None:
+        """A column of figures; None for an unknown one of names, which the first block tells."""
+        if place in self._text:
+            return None
+        cells = self._cells(block, place)
+        try:
+            return numbers(cells, self._how.comma_is_decimal)[0]
+        except BadCellError as bad:
+            if not known and self._first_block(block) and any(c.isalpha() for c in bad.text):
+                self._text.add(place)
+                return None
+            raise self._bad(block, place, bad) from None
+
+    def _first_block(self, block: delimited.RowBlock) -> bool:
+        if self._first_line < 0:
+            self._first_line = int(block.lines[0])
+        return int(block.lines[0]) == self._first_line
+
+    def _cells(self, block: delimited.RowBlock, place: int) -> pl.Series:
+        import polars as pl
+
+        try:
+            return trimmed(delimited.parsed(block, self._how, [place], as_text=True).to_series(0))
+        except BadCellError as bad:
+            raise self._bad(block, place, bad) from None
+        except pl.exceptions.PolarsError as error:
+            found = (str(error).splitlines() or [type(error).__name__])[0][:160]
+            raise refuse(self.path, "no readable CSV file", found=found) from None
+
+    def _bad(self, block: delimited.RowBlock, place: int, bad: BadCellError) -> Exception:
+        return refuse(
+            self.path,
+            "text among numbers",
+            line=int(block.lines[bad.row]),
+            column=place + 1,
+            field=self._how.names[place],
+            expected=bad.expected,
+            found=repr(bad.text[:40]),
+            hint=bad.hint,
+        )
+
+    def _facts(self, name: str) -> Facts:
+        layout: Layout = self._layout
+        timeline, label, notes = self._timeline()
+        skipped = [self._how.names[place] for place in sorted(self._text)]
+        if skipped:
+            notes = (*notes, f"not read, as they hold text: {', '.join(skipped)[:200]}")
+        return Facts(
+            quantity=layout.quantity,
+            frame=layout.frame,
+            timeline=timeline,
+            primary=label,
+            secondary=layout.secondary.name if layout.secondary else None,
+            notes=notes,
+            body="frd" if "attitude" in layout.quantity or "rate" in layout.quantity else "unknown",
+            kind="CSV",
+        )
+
+    def _timeline(self) -> tuple[Timeline, str, tuple[str, ...]]:
+        """Of the names of the columns, else of the size of the stamps."""
+        column = self._layout.primary
+        if column is None:
+            return "unknown", "", ()
+        if self._layout.week is not None:
+            return "gps", column.name, ("GPS week and time of week, as the columns say",)
+        if self._calendar:
+            return "utc", column.name, ()
+        low = column.name.lower()
+        if "tow" in low or "time_of_week" in low:
+            return "unknown", WEEK_SECONDS, ("seconds of the GPS week, whose number is not there",)
+        for word, named in NAMED.items():
+            if word in low:
+                return named, column.name, ()
+        timeline, notes = timeline_of(self._seen, "utc")
+        if timeline == "utc" and "utc" not in low:
+            notes = (*notes, f"{column.name} was taken to count from 1970-01-01 UTC")
+        return timeline, column.name, notes
+
+
+def _recognises(head: Head) -> int:
+    """Text whose first line that is no comment, or last comment, holds names we know."""
+    start = head.start
+    text = start.removeprefix(b"\xef\xbb\xbf").decode("utf-8", errors="replace")
+    lines = [line for line in text.splitlines()[:200] if line.strip()]
+    above = [line.lstrip("# \t") for line in lines if line.lstrip().startswith("#")][-1:]
+    first = [line for line in lines if not line.lstrip().startswith("#")][:2]
+    for line in (*above, *first):
+        names, mark = delimited.split_names(line)
+        if "\0" in line:
+            return NO
+        if len(names) > 1 or mark != ",":
+            layout = layout_of(names)
+            if layout.primary is not None or "target" in layout.quantity:
+                return BY_HEADER
+    return NO
+
+
+def _open(path: Path) -> Recording:
+    return CsvRecording(path)
+
+
+READER = Reader(CsvRecording.format, _recognises, _open)
