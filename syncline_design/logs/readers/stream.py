@@ -36,6 +36,8 @@ from numpy.typing import NDArray
 Timeline = Literal["utc", "gps", "tai", "boot", "unknown"]
 Frame = Literal["wgs84", "enu", "ned", "utm", "unknown"]
 Body = Literal["flu", "frd", "unknown"]  # forward, left, up; forward, right, down
+# one sensor's own; an estimate from several, so no reference for them; the truth of a simulation
+Nature = Literal["measured", "fused", "truth", "unknown"]
 
 Nanoseconds = NDArray[np.int64]
 UNSET = int(np.iinfo(np.int64).min)  # a message without the stamp that its stream has otherwise
@@ -85,6 +87,7 @@ class Stream:
     kind: str = ""  # what the format calls it: `sensor_msgs/msg/Imu`
     columns: tuple[str, ...] = ()
     points: PointTimes | None = None
+    nature: Nature = "unknown"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,140 @@
+"""MCAP files, chunk by chunk, within limits on what a chunk may unpack to."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.ros_recording import (
+    Container,
+    DamagedError,
+    RawMessage,
+    RosRecording,
+    UnpackBudget,
+)
+from syncline_design.logs.readers.ros_types import Channel, Encoding, modern
+
+MAGIC = b"\x89MCAP0\r\n"
+FORMAT = "MCAP file"
+MOST_RECORD = 1 << 28
+ENCODINGS: dict[tuple[str, str], Encoding] = {
+    ("cdr", "ros2msg"): "cdr",
+    ("cdr", "ros2idl"): "cdr",
+    ("cdr", ""): "cdr",
+    ("ros1", "ros1msg"): "ros1",
+}
+
+
+class McapFile(Container):
+    """The records of one file, by the mcap library, its chunks unpacked here."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, FORMAT)
+        self._size = path.stat().st_size
+
+    def _read(self) -> Iterator[RawMessage]:
+        self._records: Any = library("mcap.records", self.path, FORMAT)
+        self._stream: Any = library("mcap.stream_reader", self.path, FORMAT)
+        self._schemas: dict[int, tuple[str, str, str]] = {}
+        self._channels: dict[int, Channel] = {}
+        budget = UnpackBudget(self.path, self._size)
+        ended = False
+        with self.path.open("rb") as file:
+            for record in self._of(file, whole=True):
+                if isinstance(record, self._records.Chunk):
+                    data = self._unpacked(record, budget)
+                    for inner in self._of(BytesIO(data), whole=False):
+                        yield from self._one(inner)
+                elif isinstance(record, self._records.DataEnd):
+                    ended = True
+                    break
+                else:
+                    yield from self._one(record)
+        if not ended:
+            raise DamagedError("the file was not closed: its data have no end")
+
+    def _of(self, file: Any, whole: bool) -> Iterator[Any]:
+        """The records of a file, or of an unpacked chunk, which has no magic and simply ends."""
+        exceptions = library("mcap.exceptions", self.path, FORMAT)
+        reader = self._stream.StreamReader(
+            file, skip_magic=not whole, emit_chunks=True, record_size_limit=MOST_RECORD
+        )
+        try:
+            yield from reader.records
+        except exceptions.EndOfFile:
+            if whole:
+                raise DamagedError("cut off within a record") from None
+        except exceptions.McapError as error:
+            raise DamagedError(str(error)[:160] or type(error).__name__) from None
+        except (ValueError, struct.error, UnicodeDecodeError, OverflowError, MemoryError) as error:
+            raise DamagedError(f"a record cannot be read: {str(error)[:120]}") from None
+
+    def _one(self, record: Any) -> Iterator[RawMessage]:
+        if isinstance(record, self._records.Message):
+            channel = self._channels.get(record.channel_id)
+            if channel is None:
+                raise DamagedError("a message of no known channel")
+            yield RawMessage(channel, record.log_time, record.publish_time, record.data)
+        elif isinstance(record, self._records.Schema):
+            text = record.data.decode("utf-8", "replace")
+            self._schemas[record.id] = (record.name, record.encoding, text)
+        elif isinstance(record, self._records.Channel):
+            self._channels[record.id] = self._channel(record)
+
+    def _channel(self, record: Any) -> Channel:
+        name, encoding, text = self._schemas.get(record.schema_id, ("", "", ""))
+        found = ENCODINGS.get((record.message_encoding, encoding), "other")
+        kind = modern(name) if found != "other" else name
+        return Channel(record.topic, kind, found, text, record.message_encoding)
+
+    def _unpacked(self, chunk: Any, budget: UnpackBudget) -> bytes:
+        due = int(chunk.uncompressed_size)
+        budget.spend(due, MOST_RECORD)
+        if chunk.compression == "zstd":
+            plain = _from_zstd(chunk.data, due, self.path)
+        elif chunk.compression == "lz4":
+            plain = _from_lz4(chunk.data, due, self.path)
+        elif chunk.compression == "":
+            plain = bytes(chunk.data)
+        else:
+            raise DamagedError(f"a chunk packed as {str(chunk.compression)[:20]!r}")
+        if len(plain) != due:
+            raise DamagedError("a chunk does not unpack to its size")
+        self._demand_sum(chunk, plain)
+        return plain
+
+    def _demand_sum(self, chunk: Any, plain: bytes) -> None:
+        import zlib
+
+        if chunk.uncompressed_crc and zlib.crc32(plain) != chunk.uncompressed_crc:
+            raise DamagedError("the checksum of a chunk is wrong")
+
+
+def _from_zstd(data: bytes, due: int, path: Path) -> bytes:
+    zstandard = library("zstandard", path, FORMAT)
+    try:
+        with zstandard.ZstdDecompressor().stream_reader(BytesIO(data)) as reader:
+            plain: bytes = reader.read(due + 1)
+    except zstandard.ZstdError:
+        raise DamagedError("a chunk does not unpack") from None
+    return plain
+
+
+def _from_lz4(data: bytes, due: int, path: Path) -> bytes:
+    lz4 = library("lz4.frame", path, FORMAT)
+    try:
+        plain: bytes = lz4.LZ4FrameDecompressor().decompress(data, due + 1)
+    except (RuntimeError, EOFError, ValueError):
+        raise DamagedError("a chunk does not unpack") from None
+    return plain
+
+
+def _recognises(head: Head) -> int:
+    return BY_MAGIC if head.start.startswith(MAGIC) else NO
+
+
+READER = Reader(FORMAT, _recognises, lambda path: RosRecording(McapFile(path)))

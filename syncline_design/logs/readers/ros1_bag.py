@@ -1,0 +1,206 @@
+"""ROS 1 bags (version 2.0), read from front to back, so that a bag without its index reads too.
+
+Format: records of a header (length, then `name=value` fields) and data (length, then bytes); a
+chunk's data are records again, plain or packed.  Source: wiki.ros.org/Bags/Format/2.0.
+"""
+
+from __future__ import annotations
+
+import bz2
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.ros_recording import (
+    Container,
+    DamagedError,
+    RawMessage,
+    RosRecording,
+    UnpackBudget,
+)
+from syncline_design.logs.readers.ros_types import Channel, modern
+from syncline_design.logs.refusals import refuse
+
+MAGIC = b"#ROSBAG V2.0\n"
+FORMAT = "ROS 1 bag"
+MESSAGE, BAG_HEADER, CHUNK, CONNECTION = 2, 3, 5, 7
+MOST_HEADER = 1 << 20
+MOST_RECORD = 1 << 28  # bytes of a chunk, and of what it unpacks to
+_LENGTH = struct.Struct("<I")
+_TIME = struct.Struct("<II")
+Fields = dict[bytes, bytes]
+
+
+class Ros1Bag(Container):
+    """The records of one bag."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, FORMAT)
+        self._size = path.stat().st_size
+
+    def _read(self) -> Iterator[RawMessage]:
+        self._channels: dict[int, Channel] = {}
+        budget = UnpackBudget(self.path, self._size)
+        with self.path.open("rb") as file:
+            file.seek(len(MAGIC))
+            index = self._index_of(file)
+            while file.tell() < (index or self._size):
+                fields, length = _record_head(file)
+                operation = _operation(fields)
+                if length > MOST_RECORD and length <= self._size - file.tell():
+                    most = f"at most {MOST_RECORD} bytes"
+                    raise refuse(self.path, "absurd length", expected=most, found=str(length))
+                if operation == CHUNK:
+                    data = _unpacked(_taken(file, length), fields, budget, self.path)
+                    yield from self._of_chunk(data)
+                elif operation in (MESSAGE, CONNECTION):
+                    yield from self._one(operation, fields, _taken(file, length))
+                else:
+                    _skip(file, length, self._size)
+        if not index:
+            raise DamagedError("the bag was not closed: it has no index")
+
+    def _index_of(self, file: BinaryIO) -> int:
+        """Where the index begins, which is where messages end; 0 in a bag that was not closed."""
+        fields, length = _record_head(file)
+        if _operation(fields) != BAG_HEADER:
+            raise DamagedError("no bag header")
+        _skip(file, length, self._size)
+        at = fields.get(b"index_pos", b"")
+        index = struct.unpack("<Q", at)[0] if len(at) == 8 else 0
+        if index > self._size:
+            self.cut = f"cut off: the index is due at byte {index} of {self._size}"
+        return int(index)
+
+    def _of_chunk(self, data: bytes) -> Iterator[RawMessage]:
+        at, end = 0, len(data)
+        while at < end:
+            fields, at = _fields_of(data, at)
+            length, at = _length_of(data, at)
+            if at + length > end:
+                raise DamagedError("a record reaches beyond its chunk")
+            operation = _operation(fields)
+            if operation in (MESSAGE, CONNECTION):
+                yield from self._one(operation, fields, data[at : at + length])
+            at += length
+
+    def _one(self, operation: int, fields: Fields, data: bytes) -> Iterator[RawMessage]:
+        number = fields.get(b"conn", b"")
+        if len(number) != 4:
+            raise DamagedError("a record without its connection")
+        connection = _LENGTH.unpack(number)[0]
+        if operation == CONNECTION:
+            self._channels[connection] = _channel(fields, data)
+            return
+        time = fields.get(b"time", b"")
+        if connection not in self._channels or len(time) != 8:
+            raise DamagedError("a message of no known connection")
+        seconds, rest = _TIME.unpack(time)
+        yield RawMessage(self._channels[connection], seconds * 1_000_000_000 + rest, None, data)
+
+
+def _record_head(file: BinaryIO) -> tuple[Fields, int]:
+    """The fields of a record and the length of its data."""
+    length = _LENGTH.unpack(_taken(file, 4))[0]
+    if length > MOST_HEADER:
+        raise DamagedError(f"a header of {length} bytes")
+    fields, _ = _fields_of(_LENGTH.pack(length) + _taken(file, length), 0)
+    return fields, int(_LENGTH.unpack(_taken(file, 4))[0])
+
+
+def _fields_of(data: bytes, at: int) -> tuple[Fields, int]:
+    length, at = _length_of(data, at)
+    end = at + length
+    if end > len(data):
+        raise DamagedError("a header reaches beyond its record")
+    fields: Fields = {}
+    while at < end:
+        length, at = _length_of(data, at)
+        name, mark, value = data[at : at + length].partition(b"=")
+        if not mark or at + length > end:
+            raise DamagedError("a header field without a name")
+        fields[name] = value
+        at += length
+    return fields, end
+
+
+def _length_of(data: bytes, at: int) -> tuple[int, int]:
+    if at + 4 > len(data):
+        raise DamagedError("cut off within a record")
+    return int(_LENGTH.unpack_from(data, at)[0]), at + 4
+
+
+def _operation(fields: Fields) -> int:
+    operation = fields.get(b"op", b"")
+    if len(operation) != 1:
+        raise DamagedError("a record without its kind")
+    return operation[0]
+
+
+def _taken(file: BinaryIO, length: int) -> bytes:
+    if length > MOST_RECORD:
+        raise DamagedError(f"a record of {length} bytes")
+    data = file.read(length)
+    if len(data) < length:
+        raise DamagedError("cut off within a record")
+    return data
+
+
+def _skip(file: BinaryIO, length: int, size: int) -> None:
+    if file.tell() + length > size:
+        raise DamagedError("cut off within a record")
+    file.seek(length, 1)
+
+
+def _unpacked(data: bytes, fields: Fields, budget: UnpackBudget, path: Path) -> bytes:
+    size = fields.get(b"size", b"")
+    packing = fields.get(b"compression", b"none").decode("ascii", "replace")
+    if len(size) != 4:
+        raise DamagedError("a chunk without its size")
+    due = int(_LENGTH.unpack(size)[0])
+    budget.spend(due, MOST_RECORD)
+    if packing == "none":
+        plain = data
+    elif packing == "bz2":
+        plain = _from_bz2(data, due)
+    elif packing == "lz4":
+        plain = _from_lz4(data, due, path)
+    else:
+        raise DamagedError(f"a chunk packed as {packing[:20]!r}")
+    if len(plain) != due:
+        raise DamagedError("a chunk does not unpack to its size")
+    return plain
+
+
+def _from_bz2(data: bytes, due: int) -> bytes:
+    try:
+        return bz2.BZ2Decompressor().decompress(data, due + 1)
+    except (OSError, EOFError, ValueError):
+        raise DamagedError("a chunk does not unpack") from None
+
+
+def _from_lz4(data: bytes, due: int, path: Path) -> bytes:
+    lz4 = library("lz4.frame", path, FORMAT)
+    try:
+        plain: bytes = lz4.LZ4FrameDecompressor().decompress(data, due + 1)
+    except (RuntimeError, EOFError, ValueError):
+        raise DamagedError("a chunk does not unpack") from None
+    return plain
+
+
+def _channel(fields: Fields, data: bytes) -> Channel:
+    own, _ = _fields_of(_LENGTH.pack(len(data)) + data, 0)
+    whole = {**own, b"topic": fields.get(b"topic", own.get(b"topic", b""))}
+    text = {k: v.decode("utf-8", "replace") for k, v in whole.items()}
+    by_name = {k.decode("ascii", "replace"): v for k, v in text.items()}
+    kind = modern(by_name.get("type", ""))
+    return Channel(by_name["topic"], kind, "ros1", by_name.get("message_definition", ""))
+
+
+def _recognises(head: Head) -> int:
+    return BY_MAGIC if head.start.startswith(MAGIC) else NO
+
+
+READER = Reader(FORMAT, _recognises, lambda path: RosRecording(Ros1Bag(path)))

@@ -1,0 +1,193 @@
+"""ROS 2 bags: a folder with metadata.yaml, or one of its SQLite files (MCAP has its own reader)."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from syncline_design.logs.readers.mcap_file import MAGIC as MCAP_MAGIC
+from syncline_design.logs.readers.mcap_file import McapFile
+from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Reader, library
+from syncline_design.logs.readers.ros_recording import (
+    Container,
+    DamagedError,
+    RawMessage,
+    RosRecording,
+    UnpackBudget,
+)
+from syncline_design.logs.readers.ros_types import Channel, Encoding, modern
+from syncline_design.logs.refusals import refuse
+from syncline_design.machine.deadline import in_force
+
+MAGIC = b"SQLite format 3\x00"
+FORMAT = "ROS 2 bag"
+METADATA = "metadata.yaml"
+MOST_METADATA = 1 << 24
+MOST_MESSAGE = 1 << 28
+MOST_FILES = 10_000
+STEPS = 100_000  # of SQLite's machine between two looks at the clock
+ZSTD_MAGIC = b"\x28\xb5\x2f\xfd"
+
+
+class Ros2Bag(Container):
+    """Files of one bag, one after the other."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path, FORMAT)
+        self._files = _files_of(path) if path.is_dir() else [path]
+
+    def _read(self) -> Iterator[RawMessage]:
+        """A file that is damaged does not hide the ones behind it."""
+        faults = []
+        for path in self._files:
+            try:
+                yield from self._of(path)
+            except DamagedError as damage:
+                faults.append(str(damage) if self.path == path else f"{path.name}: {damage}")
+        if faults:
+            raise DamagedError("; ".join(faults)[:400])
+
+    def _of(self, path: Path) -> Iterator[RawMessage]:
+        try:
+            with path.open("rb") as file:
+                head = file.read(16)
+        except OSError as error:
+            raise DamagedError(f"cannot be read: {error.strerror}") from None
+        if head.startswith(MCAP_MAGIC):
+            yield from McapFile(path)._read()
+        elif head == MAGIC:
+            yield from _of_database(path)
+        elif head.startswith(ZSTD_MAGIC):
+            hint = f"zstd -d {path.name}"
+            raise refuse(path, "the bag's file is compressed as a whole", found="zstd", hint=hint)
+        else:
+            raise DamagedError("no SQLite and no MCAP file" if head else "an empty file")
+
+
+def _files_of(folder: Path) -> list[Path]:
+    """In the order of metadata.yaml, else by the numbers in their names; all within the folder."""
+    named = _named(folder / METADATA)
+    found = [one for one in folder.iterdir() if one.suffix in (".db3", ".mcap", ".zstd")]
+    if not named:
+        return sorted(found, key=_by_number)
+    root = folder.resolve()
+    files = []
+    for name in named[:MOST_FILES]:
+        path = folder / Path(name).name  # older bags name the folder too
+        if not path.resolve().is_relative_to(root):
+            raise refuse(folder / METADATA, "a file outside the bag's folder", found=name[:80])
+        files.append(path)
+    return files
+
+
+def _by_number(path: Path) -> tuple[list[int], str]:
+    return [int(digits) for digits in re.findall(r"\d{1,9}", path.stem)], path.name
+
+
+def _named(path: Path) -> list[str]:
+    import yaml
+
+    if not path.is_file():
+        return []
+    try:
+        text = path.read_bytes()[: MOST_METADATA + 1]
+        if len(text) > MOST_METADATA or text.count(b"&") > 1000:
+            raise refuse(path, "no metadata of a bag", expected=f"at most {MOST_METADATA} bytes")
+        data = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+        files = data["rosbag2_bagfile_information"]["relative_file_paths"]
+        return [str(name) for name in files]
+    except (OSError, yaml.YAMLError, KeyError, TypeError, RecursionError) as error:
+        short = (str(error).splitlines() or [type(error).__name__])[0][:160]
+        raise refuse(path, "no metadata of a bag", found=short) from None
+
+
+def _of_database(path: Path) -> Iterator[RawMessage]:
+    """Messages by their number, which is their order of arrival; only real tables are asked."""
+    try:
+        file = sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1", uri=True)
+    except sqlite3.Error as error:
+        raise DamagedError(str(error)) from None
+    try:
+        file.text_factory = _decoded
+        file.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, MOST_MESSAGE)
+        file.set_progress_handler(_checked, STEPS)
+        channels, packed = _channels(file, path)
+        budget = UnpackBudget(path, path.stat().st_size)
+        rows = file.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
+        for topic, stamp, data in rows:
+            channel = channels.get(topic)
+            if channel is None or not isinstance(stamp, int) or not isinstance(data, bytes):
+                raise DamagedError("a message of no known topic, or without a time")
+            whole = _plain(data, budget, path) if packed else data
+            yield RawMessage(channel, stamp, None, whole)
+    except sqlite3.Error as error:
+        in_force().check()
+        raise DamagedError(str(error)[:160]) from None
+    finally:
+        file.close()
+
+
+def _decoded(raw: bytes) -> str:
+    return raw.decode("utf-8", "replace")
+
+
+def _checked() -> int:
+    """What SQLite asks now and then: anything but 0 ends the query."""
+    return int(in_force().is_over)
+
+
+def _channels(file: sqlite3.Connection, path: Path) -> tuple[dict[Any, Channel], bool]:
+    kinds = dict(file.execute("SELECT name, type FROM sqlite_master"))
+    if kinds.get("messages") != "table" or kinds.get("topics") != "table":
+        expected = "tables topics and messages"
+        raise refuse(path, "a database, but no bag", expected=expected,
+                     found=", ".join(map(str, sorted(kinds)))[:200])  # fmt: skip
+    definitions: dict[str, str] = {}
+    if kinds.get("message_definitions") == "table":
+        rows = file.execute(
+            "SELECT topic_type, encoded_message_definition FROM message_definitions"
+        )
+        definitions = {str(name): str(text) for name, text in rows}
+    channels = {}
+    for number, name, kind, written in file.execute(
+        "SELECT id, name, type, serialization_format FROM topics"
+    ):
+        encoding: Encoding = "cdr" if written == "cdr" else "other"
+        own = definitions.get(str(kind), "")
+        channels[number] = Channel(str(name), modern(str(kind)), encoding, own, str(written))
+    return channels, _is_packed(path)
+
+
+def _is_packed(path: Path) -> bool:
+    """Whether every message is compressed by itself, as metadata.yaml beside the file tells."""
+    try:
+        text = (path.parent / METADATA).read_bytes()[:MOST_METADATA]
+    except OSError:
+        return False
+    return bool(re.search(rb"compression_mode:\s*['\"]?message", text, re.IGNORECASE))
+
+
+def _plain(data: bytes, budget: UnpackBudget, path: Path) -> bytes:
+    zstandard = library("zstandard", path, FORMAT)
+    try:
+        size = zstandard.frame_content_size(data)
+        most = size if size >= 0 else MOST_MESSAGE
+        budget.spend(most if size >= 0 else len(data), MOST_MESSAGE)
+        plain: bytes = zstandard.ZstdDecompressor().decompress(data, max_output_size=most)
+    except zstandard.ZstdError:
+        raise DamagedError("a message does not unpack") from None
+    return plain
+
+
+def _recognises(head: Head) -> int:
+    if head.folder:
+        bag = any(name.endswith((".db3", ".mcap", ".db3.zstd")) for name in head.names)
+        return BY_MAGIC if METADATA in head.names else (BY_SHAPE if bag else NO)
+    return BY_MAGIC if head.start.startswith(MAGIC) else NO
+
+
+READER = Reader(FORMAT, _recognises, lambda path: RosRecording(Ros2Bag(path)))

@@ -1,0 +1,282 @@
+"""Bags of any container as a recording: the stamps of every topic in one pass, then its values."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from syncline_design.logs.readers.point_times import CloudTimes, cloud_times
+from syncline_design.logs.readers.ros_meaning import Meaning, has_meaning, meaning_of
+from syncline_design.logs.readers.ros_types import Channel, StampOf, stamp_of, unpacker
+from syncline_design.logs.readers.stream import (
+    Incomplete,
+    Nanoseconds,
+    Piece,
+    StampColumn,
+    Stamps,
+    Stream,
+    Timeline,
+)
+from syncline_design.logs.readers.timelines import timeline_of
+from syncline_design.logs.refusals import refuse
+from syncline_design.machine.deadline import in_force
+
+PIECE_ROWS = 20_000
+CHECK_EVERY = 8_192  # messages between two looks at the clock
+MOST_CLOUDS = 12  # of a topic, that are unpacked to see when their points were measured
+MOST_TOPICS = 20_000
+RATIO, FREE_BYTES = 200, 1 << 30  # a file may unpack to this many times its size, and this much
+RECORDED = "log time"
+
+
+class DamagedError(Exception):
+    """The rest of a file cannot be read; says why."""
+
+
+class RawMessage(NamedTuple):
+    """A message as it stands in the file; publish_ns None where the format has no such time."""
+
+    channel: Channel
+    log_ns: int
+    publish_ns: int | None
+    data: bytes
+
+
+class UnpackBudget:
+    """How much a file may unpack to: a few kB must not become gigabytes."""
+
+    def __init__(self, path: Path, size: int) -> None:
+        self._path, self._left = path, FREE_BYTES + RATIO * size
+
+    def spend(self, amount: int, most: int) -> None:
+        """Before `amount` bytes are unpacked, of which at most `most` go at once."""
+        self._left -= amount
+        if amount > most or self._left < 0:
+            found = f"a chunk of {amount} bytes" if amount > most else "more than that"
+            limit = f"chunks of at most {most} bytes, {RATIO} times the file's size in all"
+            raise refuse(self._path, "unpacks to too much", expected=limit, found=found)
+
+
+class Container(ABC):
+    """A file of raw messages, read from front to back."""
+
+    def __init__(self, path: Path, format: str) -> None:  # noqa: A002
+        self.path, self.format = path, format
+        self.incomplete: Incomplete | None = None
+        self.cut = ""  # what is known of a cut before reading comes to it
+
+    @abstractmethod
+    def _read(self) -> Iterator[RawMessage]:
+        """Every message in the order of the file; DamagedError where that ends early."""
+
+    def messages(self) -> Iterator[RawMessage]:
+        """Every message up to the last good one; then `incomplete` is known."""
+        deadline = in_force()
+        count = 0
+        self.incomplete, self.cut = None, ""
+        try:
+            for count, message in enumerate(self._read(), 1):
+                if not count % CHECK_EVERY:
+                    deadline.check()
+                yield message
+        except DamagedError as damage:
+            self.incomplete = Incomplete(self.cut or str(damage), count)
+        else:
+            if self.cut:
+                self.incomplete = Incomplete(self.cut, count)
+        if not count and self.incomplete is not None:
+            raise refuse(self.path, f"no message of this {self.format} can be read",
+                         found=self.incomplete.reason)  # fmt: skip
+
+
+@dataclass(slots=True)
+class _Tally:
+    """What is held of a topic while a bag is read."""
+
+    channel: Channel
+    own_name: str
+    own_of: StampOf | None
+    meaning: Meaning | None
+    unpack: Callable[[bytes], Any] | None
+    logged: StampColumn = field(default_factory=StampColumn)
+    own: StampColumn = field(default_factory=StampColumn)
+    published_apart: bool = False
+    messages: int = 0
+    unread: int = 0
+    clouds: list[CloudTimes] = field(default_factory=list)
+
+
+class RosRecording:
+    """A bag as a recording."""
+
+    def __init__(self, container: Container) -> None:
+        self._container = container
+        self.path, self.format = container.path, container.format
+        self._channels: dict[str, Channel] = {}
+
+    @property
+    def incomplete(self) -> Incomplete | None:
+        return self._container.incomplete
+
+    def streams(self) -> tuple[Stream, ...]:
+        tallies: dict[tuple[str, str], _Tally] = {}
+        for message in self._container.messages():
+            key = (message.channel.topic, message.channel.kind)
+            tally = tallies.get(key)
+            if tally is None:
+                tally = tallies[key] = self._begun(message, len(tallies))
+            _count(tally, message)
+        topics = [topic for topic, _ in tallies]
+        found = []
+        for (topic, kind), tally in tallies.items():
+            name = topic if topics.count(topic) == 1 else f"{topic} ({kind})"
+            self._channels[name] = tally.channel
+            found.append(_stream(name, tally, self.incomplete is not None))
+        return tuple(sorted(found, key=lambda stream: stream.name))
+
+    def _begun(self, message: RawMessage, topics: int) -> _Tally:
+        channel = message.channel
+        if topics >= MOST_TOPICS:
+            raise refuse(self.path, "too many topics", expected=f"at most {MOST_TOPICS}")
+        own = stamp_of(channel, self.path)
+        known = has_meaning(channel.topic, channel.kind)
+        unpack = unpacker(channel, self.path) if known else None
+        first = _unpacked(unpack, message.data)
+        meaning = None if first is None else meaning_of(channel.topic, channel.kind, first)
+        name, read = own or ("", None)
+        return _Tally(channel, name, read, meaning, unpack)
+
+    def samples(self, name: str) -> Iterator[Piece]:
+        if name not in self._channels:
+            self.streams()
+        wanted = self._channels.get(name)
+        if wanted is None:
+            raise refuse(self.path, f"no stream {name}", found=", ".join(sorted(self._channels)))
+        collected: _Rows | None = None
+        for message in self._container.messages():
+            channel = message.channel
+            if (channel.topic, channel.kind) != (wanted.topic, wanted.kind):
+                continue
+            if collected is None:
+                collected = _rows_of(self._begun(message, 0))
+            collected.add(message)
+            if len(collected) >= PIECE_ROWS:
+                yield collected.piece()
+        if collected is not None and len(collected):
+            yield collected.piece()
+
+
+@dataclass(slots=True)
+class _Rows:
+    """Messages of one topic on their way into a piece; what cannot be unpacked is NaN."""
+
+    tally: _Tally
+    width: int
+    values: list[Any] = field(default_factory=list)
+    primary: list[int] = field(default_factory=list)
+    secondary: list[int] = field(default_factory=list)
+
+    def __len__(self) -> int:
+        return len(self.primary)
+
+    def add(self, message: RawMessage) -> None:
+        tally = self.tally
+        row = None
+        if tally.meaning is not None:
+            unpacked = _unpacked(tally.unpack, message.data)
+            row = None if unpacked is None else tally.meaning.row(unpacked)
+        self.values.append(row if row is not None else (float("nan"),) * self.width)
+        own = tally.own_of(message.data) if tally.own_of is not None else message.log_ns
+        self.primary.append(own)
+        self.secondary.append(message.log_ns)
+
+    def piece(self) -> Piece:
+        columns: Mapping[str, Any] = {}
+        if self.tally.meaning is not None:
+            table = np.array(self.values, dtype=float).reshape(len(self), self.width)
+            columns = {n: table[:, k] for k, n in enumerate(self.tally.meaning.columns)}
+        primary = np.array(self.primary, dtype=np.int64)
+        secondary = np.array(self.secondary, dtype=np.int64)
+        self.values, self.primary, self.secondary = [], [], []
+        return Piece(primary, secondary if self.tally.own_of is not None else None, columns)
+
+
+def _rows_of(tally: _Tally) -> _Rows:
+    return _Rows(tally, 0 if tally.meaning is None else len(tally.meaning.columns))
+
+
+def _unpacked(unpack: Callable[[bytes], Any] | None, data: bytes) -> Any:
+    """The message, or None where its bytes are not of its type."""
+    if unpack is None:
+        return None
+    try:
+        return unpack(data)
+    except Exception:  # the generated code raises whatever foreign bytes lead it to
+        return None
+
+
+def _count(tally: _Tally, message: RawMessage) -> None:
+    tally.messages += 1
+    tally.logged.append(message.log_ns)
+    published = message.publish_ns
+    if tally.own_of is not None:
+        tally.own.append(tally.own_of(message.data))
+    elif published is not None:
+        tally.own.append(published)
+        tally.published_apart = tally.published_apart or published != message.log_ns
+    meaning = tally.meaning
+    if meaning is not None and meaning.is_cloud and len(tally.clouds) < MOST_CLOUDS:
+        times = cloud_times(_unpacked(tally.unpack, message.data))
+        tally.clouds += [times] if times is not None else []
+
+
+def _stream(name: str, tally: _Tally, partial: bool) -> Stream:
+    meaning = tally.meaning
+    stamps = _stamps(tally)
+    timeline, said = timeline_of(stamps.primary_ns, "utc")
+    notes = list(said)
+    if stamps.secondary_ns is not None:
+        notes += _recorder(timeline, stamps.secondary_ns)
+    points = None
+    if meaning is None:
+        notes += [_unread(tally.channel)] if tally.channel.encoding == "other" else []
+    else:
+        notes += meaning.notes
+        points = None if not tally.clouds else CloudTimes.median_of(tally.clouds)
+    return Stream(
+        name=name,
+        quantity=() if meaning is None else meaning.quantity,
+        messages=tally.messages,
+        stamps=stamps,
+        frame="unknown" if meaning is None else meaning.frame,
+        timeline=timeline,
+        partial=partial,
+        notes=tuple(notes),
+        body="unknown" if meaning is None else meaning.body,
+        kind=tally.channel.kind,
+        columns=() if meaning is None else meaning.columns,
+        points=points,
+    )
+
+
+def _stamps(tally: _Tally) -> Stamps:
+    logged = tally.logged.values()
+    if tally.own_of is not None:
+        return Stamps(tally.own_name, RECORDED, tally.own.values(), logged)
+    if tally.published_apart:
+        return Stamps("publish time", RECORDED, tally.own.values(), logged)
+    return Stamps(RECORDED, None, logged)
+
+
+def _recorder(timeline: Timeline, logged: Nanoseconds) -> list[str]:
+    own, _ = timeline_of(logged, "utc")
+    return [] if own == timeline else [f"stamps are {timeline}, the recorder's time is {own}"]
+
+
+def _unread(channel: Channel) -> str:
+    return f"written as {channel.encoded or 'something else'}: only the recorder's times are read"
