@@ -329,12 +329,12 @@ def _clock_notes(topic: _Topic, stamps: Nanoseconds) -> list[str]:
     if topic.utc:
         apart = np.array([utc - stamp for stamp, utc in topic.utc], dtype=np.int64)
         middle = int(apart[0]) + round(float(np.median(apart - apart[0])))
-        micro = (middle + 500) // 1000
+        seconds, micro = divmod((middle + 500) // 1000, 10**6)
         spread = (int(apart.max()) - int(apart.min())) / 1e6
         first, last = calendar(topic.utc[0][1]), calendar(topic.utc[-1][1])
         notes.append(
-            f"UTC - boot = {micro // 10**6}.{micro % 10**6:06d} s (median of {len(topic.utc)}, spread "
-            f"{spread:.1f} ms); UTC {first} to {last}"
+            f"UTC - boot = {seconds}.{micro:06d} s (median of {len(topic.utc)}, "
+            f"spread {spread:.1f} ms); UTC {first} to {last}"
         )
     if topic.utc_unset:
         notes.append(f"{topic.utc_unset} messages without UTC: no fix yet")
