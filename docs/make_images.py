@@ -11,8 +11,8 @@ import subprocess
 import tempfile
 from pathlib import Path
 
+import syncline_design as sd
 from syncline_design.report.checks import render_checks
-from syncline_design.verdict.verify import CheckSettings, check_file
 
 SPEC = Path("specs/uav_corridor.yaml")
 IMAGES = Path("docs/images").resolve()
@@ -23,7 +23,7 @@ def main() -> None:
     browser = shutil.which("chromium") or shutil.which("chromium-browser")
     if browser is None:
         raise SystemExit("no Chromium on this machine; the pictures stay as they are")
-    page = render_checks("html", [check_file(SPEC, CheckSettings())])
+    page = render_checks("html", [sd.check(SPEC)])
     plot = re.search(r'<svg[^>]*"fig-syncline-title.*?</svg>', page, re.DOTALL)
     style = re.search(r"<style.*?</style>", page, re.DOTALL)
     if plot is None or style is None:

@@ -30,6 +30,7 @@ from syncline_design.choice.variations import (
     with_platform_figure,
 )
 from syncline_design.choice.what_if import same_design
+from syncline_design.machine.deadline import within_s
 from syncline_design.machine.records import read_as
 from syncline_design.model.known import Known
 from syncline_design.model.quantity import Dimension
@@ -320,19 +321,21 @@ def test_csv_runs_no_formula(name: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "settings"),
+    ("name", "settings", "limit_s"),
     [
-        ("position_track", OptimizeSettings(count=2, pareto=True)),
-        ("position_track", OptimizeSettings(pareto=True, resource="mass")),
-        ("position_track", OptimizeSettings(time_limit_s=1e-6)),
-        ("infeasible_no_option", OptimizeSettings(pareto=True)),
-        ("usv_wire_missing", OptimizeSettings()),
+        ("position_track", OptimizeSettings(count=2, pareto=True), None),
+        ("position_track", OptimizeSettings(pareto=True, resource="mass"), None),
+        ("position_track", OptimizeSettings(), 1e-6),
+        ("infeasible_no_option", OptimizeSettings(pareto=True), None),
+        ("usv_wire_missing", OptimizeSettings(), None),
     ],
 )
 def test_what_optimize_writes_is_what_its_schema_says(
-    name: str, settings: OptimizeSettings
+    name: str, settings: OptimizeSettings, limit_s: float | None
 ) -> None:
-    found = optimize(load(ROOT / "specs" / f"{name}.yaml"), settings).result
+    case = load(ROOT / "specs" / f"{name}.yaml")
+    with within_s(limit_s):
+        found = optimize(case, settings).result
     data = found.to_json()
     jsonschema.validate(data, result_schema("optimisation"))
     again = read_as(Optimisation, json.dumps(data)).to_json()

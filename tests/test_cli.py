@@ -136,10 +136,11 @@ def test_version_and_quiet() -> None:
 
 def test_a_pinned_check_imports_nothing_heavy() -> None:
     code = (
-        "import sys; from pathlib import Path; from syncline_design.verdict.verify import *; "
+        "import sys; from pathlib import Path; from syncline_design.spec.load import load; "
+        "from syncline_design.verdict.verify import *; "
         "from syncline_design.report.on_verdict import on_verdict; "
         "from syncline_design.report.render_console import console; "
-        "console(on_verdict(check_file(Path('specs/usv_mapping.yaml')))); "
+        "console(on_verdict(check_loaded(load(Path('specs/usv_mapping.yaml')), CheckSettings()))); "
         f"print(sorted({HEAVY} & set(sys.modules)))"
     )
     done = subprocess.run(

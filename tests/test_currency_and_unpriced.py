@@ -14,7 +14,8 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.cli.app import app
 from syncline_design.spec.load import BadInput, load
 from syncline_design.verdict.choice_data import left_out
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 QUICK = CheckSettings(monte_carlo=False)
 AMOUNTS = {"cost": "{} EUR", "mass": "{} g", "power": "{} W"}

@@ -19,7 +19,8 @@ from syncline_design.report.render_console import console
 from syncline_design.spec.files import Collection
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import ParsedFile
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 ROOT = Path(__file__).parent.parent
 PLAIN = CheckSettings(monte_carlo=False)

@@ -16,7 +16,8 @@ from typer.testing import CliRunner
 
 from syncline_design.cli.app import app
 from syncline_design.spec.load import BadInput
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 SPEC = """\
 syncline: 1

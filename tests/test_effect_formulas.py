@@ -23,7 +23,8 @@ from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation import SimulationSettings
 from syncline_design.simulation.chain import ConstantTwist, stage_error
 from syncline_design.simulation.sampling import sample_errors
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 from tests.simulation_systems import no_noise
 
 Array = NDArray[np.float64]

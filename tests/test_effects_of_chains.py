@@ -14,7 +14,8 @@ import pytest
 
 from syncline_design.effects import registry
 from syncline_design.spec.load import BadInput
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 STAGE = """\
   - name: {name}

@@ -17,7 +17,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 Array = NDArray[np.float64]
 Path3 = Callable[[Array], tuple[Array, Array, Array]]  # north, east, yaw of the time

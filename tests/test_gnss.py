@@ -23,7 +23,8 @@ from syncline_design.spec.load import BadInput, load
 from syncline_design.spec.selection import ClockSelection, RoleSelection, Selection
 from syncline_design.verdict.recheck import recheck
 from syncline_design.verdict.recheck_facts import impossible
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 QUICK = CheckSettings(monte_carlo=False)
 

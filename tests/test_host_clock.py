@@ -33,7 +33,8 @@ from syncline_design.simulation import SimulationSettings
 from syncline_design.simulation.sampling import sample_errors
 from syncline_design.spec.load import load
 from syncline_design.verdict.recheck import recheck
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 from tests.plain_front import front_by_enumeration
 
 HOST, OTHER = "host:v", "host:w"

@@ -19,6 +19,7 @@ from syncline_design.choice.evaluate import evaluate, rank
 from syncline_design.choice.milp import best_by_milp, is_recent
 from syncline_design.choice.outcome import Choice, Deadline, Infeasible, NoVerdict
 from syncline_design.choice.table import Limits, Problem
+from syncline_design.machine.deadline import within_s
 from test_front import one_stage, option
 
 pytestmark = pytest.mark.filterwarnings("ignore::UserWarning", "ignore::FutureWarning")
@@ -145,12 +146,13 @@ def test_time_limit_is_no_proof() -> None:
     ]  # fmt: skip
     problem = one_stage(roles, Limits(1.0, 4.0), 1.0, 1.0)
     try:
-        found = choose(problem, "milp", time_limit_s=0.05)
+        with within_s(0.05):
+            found = choose(problem, "milp")
     except NoVerdict:  # not even a design in hand by then
         found = None
     assert found is None or (isinstance(found, Choice) and not found.proof.optimal)
-    with pytest.raises(NoVerdict, match="time limit"):
-        choose(problem, "front", time_limit_s=0.0)
+    with within_s(0.0), pytest.raises(NoVerdict, match="time limit"):
+        choose(problem, "front")
 
 
 def test_too_many_timestamp_errors_are_refused_at_once() -> None:

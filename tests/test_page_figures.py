@@ -22,7 +22,8 @@ from syncline_design.verdict.optimise import (
     OptimizeSettings,
     optimize,
 )
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 ROOT = Path(__file__).parent.parent
 PLAIN = CheckSettings(monte_carlo=False)

@@ -18,7 +18,7 @@ from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR, Constant, Empirical, Normal, TimingError, Uniform
 from syncline_design.report import numbers
-from syncline_design.report.on_simulation import CSV_HEADER, grid_csv, on_simulation
+from syncline_design.report.on_simulation import GRID_COLUMNS, grid_csv, on_simulation
 from syncline_design.report.render_console import console
 from syncline_design.simulation import (
     Simulation,
@@ -394,7 +394,7 @@ def test_grid_as_csv() -> None:
     result = simulate(fixed_wing(), SimulationSettings(samples=100, tau_grid_s=(0.0, 1e-3)))
     text = grid_csv(result)
     rows = list(csv.DictReader(io.StringIO(text)))
-    assert text.splitlines()[0] == CSV_HEADER
+    assert text.splitlines()[0] == ",".join(GRID_COLUMNS)
     assert [float(r["tau_s"]) for r in rows] == [0.0, 1e-3]
     assert float(rows[1]["worst_case_m"]) == result.grid[1].worst_case_m
     assert rows[0]["reason"] == result.grid[0].reason

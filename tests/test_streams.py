@@ -26,7 +26,7 @@ from syncline_design.machine.streams import harmless
 from syncline_design.report.on_difference import on_difference
 from syncline_design.report.render_console import console
 from syncline_design.spec.load import BadInput
-from syncline_design.verdict.verify import check_file
+from tests.checked import check_file
 
 ROOT = Path(__file__).resolve().parent.parent
 COMMAND = Path(sys.executable).parent / "syncline-design"

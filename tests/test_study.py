@@ -22,7 +22,8 @@ from syncline_design.studies.definition import figure_of, grid_values, sample_va
 from syncline_design.studies.result import study_verdict
 from syncline_design.studies.summary import boundaries, heat_map, summarise, winners
 from syncline_design.studies.table import columns
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 DATA = parse(SPEC).data
 

@@ -15,7 +15,7 @@ import pytest
 
 from syncline_design.report.studies import render_study
 from syncline_design.studies import StudyResult, StudySettings, run_study
-from syncline_design.verdict.verify import check_file
+from tests.checked import check_file
 
 SPEC = """\
 syncline: 1

@@ -25,7 +25,14 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.choice.ranked import iter_best, lower_bound
 from syncline_design.choice.table import Design, Problem
 from syncline_design.cli.app import app
-from syncline_design.machine.deadline import Deadline, NoVerdict, OutOfTime, in_force, within
+from syncline_design.machine.deadline import (
+    Deadline,
+    NoVerdict,
+    OutOfTime,
+    in_force,
+    within,
+    within_s,
+)
 from syncline_design.spec.load import load
 from test_front_ties import ROLES, as_problem, coarse_options, plain_designs
 
@@ -181,7 +188,8 @@ def test_design_in_hand_meets_and_its_gap_holds(seed: int, monkeypatch: pytest.M
 
     monkeypatch.setattr(decide, "_proven", late)
     try:
-        found = choose(problem, time_limit_s=60.0)
+        with within_s(60.0):
+            found = choose(problem)
     except NoVerdict:
         assert not isinstance(proven, Choice) or problem.limits.sync < 1.0
         return

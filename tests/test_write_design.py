@@ -13,7 +13,8 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.cli.app import app
 from syncline_design.spec.load import load
 from syncline_design.verdict.optimise import pinned_text
-from syncline_design.verdict.verify import CheckSettings, check_file
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
 
 QUICK = CheckSettings(monte_carlo=False)
 ERRORS: list[dict[str, Any]] = [

@@ -36,22 +36,19 @@ SAME = 1e-11  # errors that two roads may call the same: neither sums floats mor
 MOST_STEPS = 4000  # steps of the search that confirms the merge before it is left out
 
 
-def choose(
-    problem: Problem, method: Road = "auto", time_limit_s: float | None = None
-) -> Choice | Infeasible:
+def choose(problem: Problem, method: Road = "auto") -> Choice | Infeasible:
     """The best design in the documented order, or that there is none.
 
     auto: the front by merging, confirmed by best-first search and, where there are few
     combinations, by enumeration; the MILP where merging gives up.  Raises NoVerdict when a road
-    ends without a proof or two roads disagree.  A time limit that ends the search leaves a design
+    ends without a proof or two roads disagree.  A deadline that ends the search leaves a design
     that meets every sum and is not proven optimal, where one was found.
     """
     if method not in METHODS:
         raise ValueError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
-    empty = tuple(r for r, role in enumerate(problem.roles) if not len(role.options))
     if is_empty(problem):
-        return Infeasible(Proof("tables", True, True), empty)
-    deadline = in_force().inner(time_limit_s)
+        return Infeasible(Proof("tables", True, True))
+    deadline = in_force()
     deadline.check()
     found = _by_sums(problem, method, deadline)
     if problem.judge is None or isinstance(found, Infeasible):

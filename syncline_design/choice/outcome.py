@@ -102,11 +102,10 @@ class Choice:
 class Infeasible:
     """No design meets every requirement.
 
-    proof: the road that showed it; empty_roles: roles that have no option at all.
+    proof: the road that showed it.
     """
 
     proof: Proof
-    empty_roles: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from syncline_design.model.system import System
 from syncline_design.report import numbers
+from syncline_design.report.csv_out import plain_csv
 from syncline_design.report.document import (
     Chart,
     Document,
@@ -40,7 +41,7 @@ from syncline_design.verdict.simulated_spec import SimulatedSpec
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
 
-CSV_HEADER: Final = "tau_s,worst_case_m,syncline_m,ratio,bound_m,gap,reason"
+GRID_COLUMNS: Final = ("tau_s", "worst_case_m", "syncline_m", "ratio", "bound_m", "gap", "reason")
 
 
 def on_simulation(result: Simulation, system: System) -> Document:
@@ -177,9 +178,8 @@ def render_simulate(name: str, run: SimulatedSpec) -> str:
 
 def grid_csv(result: Simulation) -> str:
     """The comparison over tau as CSV, one row per tau, numbers at full precision."""
-    lines = [CSV_HEADER]
-    for row in result.grid:
-        figures = (row.tau_s, row.worst_case_m, row.syncline_m, row.ratio, row.bound_m, row.gap)
-        reason = row.reason.replace('"', '""')
-        lines.append(",".join([*(repr(float(f)) for f in figures), f'"{reason}"']))
-    return "\n".join(lines) + "\n"
+    rows = (
+        (row.tau_s, row.worst_case_m, row.syncline_m, row.ratio, row.bound_m, row.gap, row.reason)
+        for row in result.grid
+    )
+    return plain_csv(GRID_COLUMNS, rows)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design import __version__
-from syncline_design.choice.outcome import NoVerdict
+from syncline_design.machine.deadline import NoVerdict, within_s
 from syncline_design.machine.input_files import ReplacedInputError, noting
 from syncline_design.simulation import SimulationError
 from syncline_design.spec.case import Case
@@ -148,16 +148,11 @@ def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> Ca
     simulated = simulates(study, base)
     left_out = () if simulated else base.simulated
     check = study.check
-    verdict = check_loaded(
-        without_simulated(case) if left_out else case,
-        CheckSettings(
-            seed=settings.seed,
-            method=check.method,
-            time_limit_s=None if check.time_limit is None else float(check.time_limit),
-            monte_carlo=simulated,
-            today=settings.today,
-        ),
+    wanted = CheckSettings(
+        seed=settings.seed, method=check.method, monte_carlo=simulated, today=settings.today
     )
+    with within_s(None if check.time_limit is None else float(check.time_limit)):
+        verdict = check_loaded(without_simulated(case) if left_out else case, wanted)
     return _record(verdict, left_out)
 
 

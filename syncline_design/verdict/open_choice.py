@@ -29,7 +29,6 @@ class Picked:
 def pick(
     problem: Problem,
     method: Road,
-    time_limit_s: float | None,
     verify: Callable[[Design], Verified],
 ) -> Picked:
     """The first design in the documented order that meets every requirement, verified.
@@ -39,7 +38,7 @@ def pick(
     from syncline_design.choice.decide import choose
     from syncline_design.choice.outcome import Infeasible, NoVerdict
 
-    choice = choose(problem, method, time_limit_s)
+    choice = choose(problem, method)
     if isinstance(choice, Infeasible):
         return Picked(choice, None)
     verified = verify(choice.design)

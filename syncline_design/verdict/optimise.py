@@ -30,7 +30,7 @@ from syncline_design.choice.tolerance import (
     tolerance_verdict,
 )
 from syncline_design.choice.variations import Build
-from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
+from syncline_design.machine.deadline import OutOfTime, Pieces, in_force
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.simulation.results import SpecName
@@ -68,7 +68,6 @@ class OptimizeSettings:
     pareto: bool = False
     resource: ResourceName = "cost"
     method: Road = "auto"
-    time_limit_s: float | None = None
     seed: int = 0
     every: bool = False
     report: bool = False  # the whole verdict too, for a page
@@ -150,11 +149,6 @@ class Optimised:
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best designs of a spec; pinned roles stay as they are."""
-    with within_s(settings.time_limit_s):
-        return _optimize(case, settings)
-
-
-def _optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     build = Simulations(settings.seed).problem_of
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
@@ -167,7 +161,6 @@ def _optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         picked = pick(
             problem,
             settings.method,
-            None,
             lambda design: verify(case, problem, design, checking),
         )
     except OutOfTime as error:

@@ -14,7 +14,7 @@ from syncline_design.choice.outcome import Proof
 from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.choice.table import Design, Problem
 from syncline_design.effects.acting import known_of
-from syncline_design.machine.deadline import OutOfTime, Pieces, in_force, within_s
+from syncline_design.machine.deadline import OutOfTime, Pieces, in_force
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.system import System
@@ -73,7 +73,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True, slots=True)
 class CheckSettings:
-    """How to check: seed of the random numbers, road of the choice and its time limit.
+    """How to check: seed of the random numbers and road of the choice.
 
     monte_carlo: whether to simulate (a monte_carlo requirement stays undecided without).
     explain: ids of requirements to work out step by step.
@@ -82,17 +82,9 @@ class CheckSettings:
 
     seed: int = 0
     method: Road = "auto"
-    time_limit_s: float | None = None
     monte_carlo: bool = True
     explain: tuple[str, ...] = ()
     today: date | None = None
-
-
-def check_file(path: str | Path, settings: CheckSettings | None = None) -> Verdict:
-    """The verdict of a spec file (schema syncline-design/verdict/v1)."""
-    wanted = settings or CheckSettings()
-    with within_s(wanted.time_limit_s):
-        return check_loaded(load(path), replace(wanted, time_limit_s=None))
 
 
 def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Checked]:
@@ -100,10 +92,8 @@ def check_files(paths: Sequence[Path], settings: CheckSettings) -> list[Checked]
 
     Of a refused file nothing is computed.  A time limit binds all of them together.
     """
-    with within_s(settings.time_limit_s):
-        read = [_or_refused(path, load) for path in paths]  # all before anything is computed
-        alone = replace(settings, time_limit_s=None)
-        return [_check_or_refuse(item, alone) for item in read]
+    read = [_or_refused(path, load) for path in paths]  # all before anything is computed
+    return [_check_or_refuse(item, settings) for item in read]
 
 
 def _check_or_refuse(read: Case | Refused, settings: CheckSettings) -> Checked:
@@ -123,14 +113,13 @@ def check_loaded(case: Case, settings: CheckSettings) -> Verdict:
     """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
     build = _build(settings)
     problem: Problem | None = None
-    with within_s(settings.time_limit_s):
-        try:
-            problem = build(case)
-            if sole_design(problem) is not None:
-                return _sole_verdict(case, problem, settings, build)
-            return _check_open(case, problem, replace(settings, time_limit_s=None), build)
-        except OutOfTime as error:
-            return unfinished_verdict(case, problem, settings, str(error))
+    try:
+        problem = build(case)
+        if sole_design(problem) is not None:
+            return _sole_verdict(case, problem, settings, build)
+        return _check_open(case, problem, settings, build)
+    except OutOfTime as error:
+        return unfinished_verdict(case, problem, settings, str(error))
 
 
 def _sole_verdict(case: Case, problem: Problem, settings: CheckSettings, build: Build) -> Verdict:
@@ -195,7 +184,6 @@ def _check_open(case: Case, problem: Problem, settings: CheckSettings, build: Bu
     picked = pick(
         problem,
         settings.method,
-        settings.time_limit_s,
         lambda design: verify(case, problem, design, settings),
     )
     return open_verdict(case, problem, picked, settings, build)
