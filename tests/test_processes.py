@@ -80,14 +80,20 @@ SIMULATE = ("simulate", "uav.yaml", "--samples", "900000000", "--workers", "2")
 SWEEP = ("study", "study.yaml", "--workers", "2")
 
 
+def heard() -> None:
+    """Hear a hang-up, which tests that run under `nohup` would hand on as ignored."""
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
+
+
 @pytest.mark.parametrize("arguments", [SIMULATE, SWEEP], ids=lambda a: a[0])
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGKILL])
 def test_no_helper_outlives_its_parent(
     folder: Path, arguments: tuple[str, ...], number: signal.Signals
 ) -> None:
     process = subprocess.Popen(
-        [str(COMMAND), *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE
-    )
+        [str(COMMAND), *arguments], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        preexec_fn=heard,
+    )  # fmt: skip
     helpers: set[int] = set()
     try:
         assert within(30, lambda: len(descendants(process.pid)) >= 2)
