@@ -55,6 +55,7 @@ class Facts:
     primary: str = ""
     secondary: str | None = None
     notes: tuple[str, ...] = ()
+    of_times: tuple[str, ...] = ()  # notes that only a stream with times needs
     body: Body = "unknown"
     kind: str = ""
     columns: tuple[str, ...] = ()
@@ -140,7 +141,7 @@ class BatchRecording(ABC):
             stamps=stamps,
             frame=facts.frame,
             timeline=facts.timeline if stamps is not None else "unknown",
-            notes=facts.notes,
+            notes=facts.notes if stamps is None else facts.of_times + facts.notes,
             body=facts.body,
             kind=facts.kind,
             columns=facts.columns or tally.columns,

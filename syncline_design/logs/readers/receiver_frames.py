@@ -1,0 +1,135 @@
+"""Frames of GNSS receivers in a stream of bytes: NMEA sentences, UBX messages, RTCM passed over.
+
+NMEA 0183: `$`, text, `*` and the exclusive or of the text as two hexadecimal digits.  UBX: B5 62,
+class, id, length (2 bytes), payload, and the 8-bit Fletcher sum of all behind B5 62 (u-blox
+interface descriptions).  RTCM 3: D3, length (10 bits), payload, 3 bytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import reduce
+from itertools import accumulate
+from operator import xor
+from typing import BinaryIO, Literal
+
+BLOCK = 1 << 20
+LONGEST_SENTENCE = 1024
+START = re.compile(rb"[$!][A-Z]|\xb5b|\xd3[\x00-\x03]|\n#")
+SENTENCE = re.compile(rb"[$!]([\x20-\x23\x25-\x7e]*)\*([0-9A-Fa-f]{2})\s*\Z")
+UBX = b"\xb5b"
+
+
+@dataclass(slots=True)
+class FrameCount:
+    """What did not become a frame."""
+
+    refused: int = 0  # sentences and messages whose checksum is wrong
+    stray: int = 0  # bytes between frames
+    cut: int = 0  # bytes of a last frame that is not whole
+
+
+Frame = tuple[Literal["nmea", "ubx"], bytes]
+
+
+def frames(file: BinaryIO, count: FrameCount) -> Iterator[Frame]:
+    """Every good frame; UBX as class, id, length and payload, NMEA as its text without `$`."""
+    held, ended = b"", False
+    while not ended:
+        more = file.read(BLOCK)
+        ended = not more
+        held += more
+        at = 0
+        while at < len(held):
+            found, after = _at(held, at, ended, count)
+            if after < 0:
+                break
+            if found is not None:
+                yield found
+            at = after
+        held = held[at:]
+    if held:
+        count.cut = len(held)
+
+
+def _at(held: bytes, at: int, ended: bool, count: FrameCount) -> tuple[Frame | None, int]:
+    """A frame at a place, and the place behind it; negative where more bytes are wanted."""
+    first = held[at]
+    if first in b"$!":
+        return _sentence(held, at, ended, count)
+    if first == 0xB5:
+        return _ubx(held, at, ended, count)
+    if first == 0xD3 and len(held) >= at + 3 and held[at + 1] < 4:
+        after = at + 6 + ((held[at + 1] << 8) | held[at + 2])
+        if after <= len(held) and (after == len(held) or START.match(held, after)):
+            return None, after
+    if first == 0x23:  # a comment of an archive
+        end = held.find(b"\n", at)
+        if end < 0 and not ended and len(held) - at < LONGEST_SENTENCE:
+            return None, -1
+        return None, end + 1 if end >= 0 else len(held)
+    return None, _next(held, at, ended, count)
+
+
+def _next(held: bytes, at: int, ended: bool, count: FrameCount) -> int:
+    """Where the next frame may begin; one byte may be the half of a beginning."""
+    found = START.search(held, at + 1)
+    after = found.start() if found else max(at + 1, len(held) - (0 if ended else 1))
+    if found and held[after] == 0x0A:
+        after += 1
+    count.stray += len(held[at:after].strip(b"\r\n\0\xff \t"))
+    return after
+
+
+def _sentence(held: bytes, at: int, ended: bool, count: FrameCount) -> tuple[Frame | None, int]:
+    end = held.find(b"\n", at, at + LONGEST_SENTENCE)
+    if end < 0:
+        if not ended and len(held) - at < LONGEST_SENTENCE:
+            return None, -1
+        if ended and len(held) - at < LONGEST_SENTENCE:
+            end = len(held)
+        else:
+            return None, _next(held, at, ended, count)
+    text = sentence(held[at:end])
+    if text is not None:
+        return ("nmea", text), min(end + 1, len(held))
+    if end == len(held) and held.find(b"$", at + 1) < 0:
+        count.cut = end - at
+        return None, len(held)
+    count.refused += held[at + 1 : at + 3].isalpha()
+    message = held.find(UBX, at, end)  # a damaged line is lost to its end, a message in it is not
+    return None, message if message >= 0 else min(end + 1, len(held))
+
+
+def sentence(raw: bytes) -> bytes | None:
+    """The text between `$` and `*` of a sentence whose checksum is right."""
+    found = SENTENCE.match(raw)
+    if found is None or reduce(xor, found[1], 0) != int(found[2], 16):
+        return None
+    return found[1]
+
+
+def _ubx(held: bytes, at: int, ended: bool, count: FrameCount) -> tuple[Frame | None, int]:
+    if not held.startswith(UBX, at) and len(held) > at + 1:
+        return None, _next(held, at, ended, count)
+    size = 8 + int.from_bytes(held[at + 4 : at + 6], "little") if len(held) >= at + 6 else 8
+    if len(held) < at + size:
+        if not ended:
+            return None, -1
+        if START.search(held, at + 2) is None:
+            count.cut = len(held) - at
+            return None, len(held)
+        return None, _next(held, at, ended, count)
+    body = held[at + 2 : at + size - 2]
+    if fletcher(body) == held[at + size - 2 : at + size]:
+        return ("ubx", body), at + size
+    count.refused += 1
+    return None, _next(held, at, ended, count)
+
+
+def fletcher(body: bytes) -> bytes:
+    """The two bytes of the 8-bit Fletcher sum."""
+    sums = list(accumulate(body))
+    return bytes(((sums[-1] if sums else 0) & 0xFF, sum(sums) & 0xFF))
