@@ -6,9 +6,11 @@ minus 1e9); where the values cannot be what it says, the values count, and that 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +25,7 @@ from syncline_design.logs.readers.epochs import (
     nanoseconds_of,
 )
 from syncline_design.logs.readers.las_header import MAGIC, TIMED, LasClaims, claims_of
+from syncline_design.logs.readers.laz_cut import mended
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
 from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
@@ -30,6 +33,9 @@ from syncline_design.spec.load import BadInput
 
 FORMAT = "LAS or LAZ cloud"
 PIECE_BYTES = 1 << 25
+PANIC = "PanicException"  # what a library in Rust raises beside all exceptions of Python
+MOST_ROWS = 50_000  # the size of a chunk as most writers pack them
+NARROWER = 30  # times fewer points at once, where a piece cannot be read as a whole
 LAST_WEEK_SECOND = 2.0 * WEEK_S  # seconds may run on past the end of the week
 SHIFT_NS = (ADJUSTED_S + GPS_EPOCH_S) * NANO  # adjusted standard time to `gps`
 
@@ -76,44 +82,57 @@ class LasRecording(BatchRecording):
     def _clouds(self) -> Iterator[Any]:
         """Points, up to the last that can be read."""
         claims = self._claims
-        rows = max(1, PIECE_BYTES // claims.record)
-        count = 0
-        try:
-            with self._laspy.open(self.path) as reader:
-                self._frame = _frame(reader.header)
-                for points in reader.chunk_iterator(rows):
+        size = self.path.stat().st_size
+        there = claims.points
+        if not claims.packed:
+            there = min(there, (size - claims.offset) // claims.record)
+        rows, count, said = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record)), 0, ""
+        while rows and count < there:
+            try:
+                for points in self._from(count, there, rows):
                     count += len(points)
                     yield points
-        except BadInput:
-            raise
-        except Exception as error:  # lazrs and laspy raise many kinds; all are the file's fault
-            said = (str(error).splitlines() or [type(error).__name__])[0][:120]
-            if not count:
-                count += yield from self._one_by_one(rows)
-            if not count:
-                raise refuse(self.path, "no readable LAS or LAZ cloud", found=said) from None
-            self._cut(f"{count} of {claims.points} points could be read: {said}", count)
-            return
+            except BadInput:
+                raise
+            except BaseException as error:  # lazrs and laspy raise many kinds, lazrs panics too
+                if not isinstance(error, Exception) and type(error).__name__ != PANIC:
+                    raise
+                said = said or (str(error).splitlines() or [type(error).__name__])[0][:120]
+                if not claims.packed:
+                    break
+                rows = rows // NARROWER if rows > NARROWER else rows // 2
+            else:
+                break
+        if not count and said:
+            raise refuse(self.path, "no readable LAS or LAZ cloud", found=said)
         if count < claims.points:
-            self._cut(f"{count} of {claims.points} points are there", count)
+            reason = f"{count} of {claims.points} points are there"
+            self._cut(f"{reason}: {said}" if said else reason, count)
 
-    def _one_by_one(self, rows: int) -> Generator[Any, None, int]:
-        """Whole points of a cut LAS, whose last piece the library does not give."""
-        claims = self._claims
-        size = self.path.stat().st_size
-        whole = min((size - claims.offset) // claims.record, claims.points)
-        if claims.packed or whole <= 0:
-            return 0
-        read = 0
-        try:
-            with self._laspy.open(self.path) as reader:
-                while read < whole:
-                    points = reader.read_points(min(rows, whole - read))
-                    read += len(points)
-                    yield points
-        except Exception:  # as above
-            return read
-        return read
+    def _from(self, first: int, end: int, rows: int) -> Iterator[Any]:
+        """Points from one on, some at a time; those before are unpacked once more."""
+        with self.path.open("rb") as file, quiet("laspy"):
+            reader = self._reader(file)
+            self._frame = _frame(reader.header)
+            at = 0
+            while at < first:
+                at += len(reader.read_points(min(first - at, MOST_ROWS)))
+            while at < end:
+                points = reader.read_points(min(rows, end - at))
+                if not len(points):
+                    return
+                at += len(points)
+                yield points
+
+    def _reader(self, file: BinaryIO) -> Any:
+        """laspy's, unpacking from front to back: a cut file has lost its table of chunks."""
+        if not self._claims.packed:
+            return self._laspy.open(file, closefd=False)
+        header = self._laspy.LasHeader.read_from(file)
+        record = header.vlrs.get("LasZipVlr")[0].record_data_bytes()
+        source = mended(self.path, file, self._claims, bytes(record))
+        source.seek(0)
+        return self._laspy.open(source, closefd=False, laz_backend=self._laspy.LazBackend.Lazrs)
 
     def _stamps(self, times: NDArray[np.float64]) -> Nanoseconds:
         stamps = nanoseconds_of(times)
@@ -162,6 +181,18 @@ class LasRecording(BatchRecording):
         if self._back:
             said.append(f"points are not in the order of their times: {self._back} steps back")
         return tuple(said)
+
+
+@contextmanager
+def quiet(name: str) -> Iterator[None]:
+    """Without what a library logs of an error that it also raises."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
 
 
 _NAMES = ("point_x_m", "point_y_m", "point_z_m", "intensity", "point_source_id")
