@@ -152,6 +152,11 @@ def slopes(view: Scene, acting: Sequence[Acting]) -> Array:
     Columns in the order of the effects and their `slopes()`; the sign is that of the error of an
     uncorrected log, so minus the slope of `Scene.error`.
     """
+    asked = tuple((one.label, tuple(sorted(one.values.items()))) for one in acting)
+    return view.slopes.of(asked, lambda: _slopes(view, acting))
+
+
+def _slopes(view: Scene, acting: Sequence[Acting]) -> Array:
     columns = []
     for i, one in enumerate(acting):
         for p in one.effect.slopes():

@@ -134,11 +134,11 @@ def fit(
     sizes = tuple(o.directed for o in opened if o.directed >= 0)
     level = start or first_guess(data.structure)
     now = tuple(acting)
-    error = data.error(now)
+    error, columns = data.error(now), None
     iterations = LONG if start is None else SHORT
     for _ in range(passes):
         if now:
-            now, error, _ = adjusted(data, now, precision(data.structure, level), error)
+            now, error, _, columns = stepped(data, now, precision(data.structure, level), error)
         starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
         fits = [
             fit_noise(data.noise_structure, error[data.noise_rows], bounds, s, sizes, iterations)
@@ -146,7 +146,7 @@ def fit(
         ]
         level, _ = min(fits, key=lambda found: found[1])
     factored = precision(data.structure, level)
-    now, error, covariance = adjusted(data, now, factored, error)
+    now, error, covariance, _ = stepped(data, now, factored, error, columns=columns)
     nll = factored.negative_log_likelihood(error)
     return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
 
@@ -187,9 +187,22 @@ def adjusted(
     data: Data, acting: tuple[Acting, ...], known: Precision, error: Array, steps: int = 3
 ) -> tuple[tuple[Acting, ...], Array, Array]:
     """Parameters of least e' C^-1 e at a known C; (effects, their error, covariance (P, P))."""
+    return stepped(data, acting, known, error, steps)[:3]
+
+
+def stepped(
+    data: Data,
+    acting: tuple[Acting, ...],
+    known: Precision,
+    error: Array,
+    steps: int = 3,
+    columns: Array | None = None,
+) -> tuple[tuple[Acting, ...], Array, Array, Array]:
+    """The same, with the slopes that it ends with; columns: slopes found nearby to start from."""
     if not acting:
-        return acting, error, np.zeros((0, 0))
-    columns = np.nan_to_num(slopes(data.view, acting))
+        return acting, error, np.zeros((0, 0)), np.zeros((*error.shape, 0))
+    if columns is None:
+        columns = np.nan_to_num(slopes(data.view, acting))
     for _ in range(steps):
         weighted = known.solve(columns)
         normal, right = inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0]
@@ -200,7 +213,8 @@ def adjusted(
             break
         if size2 > FAR**2:  # the slopes of the old place may not hold in the new one
             columns = np.nan_to_num(slopes(data.view, acting))
-    return acting, error, inverse_scaled(inner(columns, known.solve(columns)))
+            weighted = known.solve(columns)
+    return acting, error, inverse_scaled(inner(columns, weighted)), columns
 
 
 def inner(first: Array, second: Array) -> Array:

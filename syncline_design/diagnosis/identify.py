@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, slopes
-from syncline_design.diagnosis.fitting import Data, Model, fit, inner, inverse_scaled
+from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
 from syncline_design.diagnosis.trials import freedom_of, plausible, with_effect
 from syncline_design.effects.record import Array, Effect
 
@@ -72,19 +72,19 @@ def competed(
     """The model with the best effect in a named one's place, and the rest against that one.
 
     Its class competes, and whatever fits as well to first order: with the other effects of the
-    model fitted again, an effect of quite another signature may be the better one by far.
+    model fitted again, an effect of quite another signature may be the better one by far.  The
+    model has to be fitted.
     """
-    named = fit(data, model.acting, model.opened, start=model.level)
-    screened, found = _screened(data, named, label, others)
+    screened, found = _screened(data, model, label, others)
     near = [a for a in screened if a.cosine > SAME or a.fit < RIVAL_NATS]
     near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]
-    rest = without(named, label)
+    rest = without(model, label)
     fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)
             for a in near}  # fmt: skip
-    best = _best(data, named, label, fits)
+    best = _best(data, model, label, fits)
     if best != label and again:
         return competed(data, fits[best], best, others, again - 1)
-    return named, _sorted_out(data, named, label, screened, fits)
+    return model, _sorted_out(data, model, label, screened, fits)
 
 
 def _price(data: Data, effect: Effect) -> float:

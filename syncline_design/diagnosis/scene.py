@@ -10,11 +10,12 @@ Without departures this is the georeferencing error itself.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from syncline_design.diagnosis.past import LoggedPast
+from syncline_design.diagnosis.recent import Recent
 from syncline_design.diagnosis.trajectory import LoggedMotion, pieces, smooth_slope
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
@@ -25,6 +26,7 @@ from syncline_design.model import timing
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.chain import rotation_exp
 
+SLOPES = 8  # sets of effects whose slopes are kept
 NO_LEVER = (0.0, 0.0, 0.0)
 
 
@@ -37,6 +39,7 @@ class Scene:
     motions: tuple[LoggedMotion, ...]
     rows: tuple[StageRows, ...]
     known: tuple[Acting, ...]  # the spec's own effects and mean timestamp errors
+    slopes: Recent = field(default_factory=lambda: Recent(SLOPES), repr=False, compare=False)
 
     def __len__(self) -> int:
         return len(self.log)
@@ -56,7 +59,7 @@ class Scene:
     def part(self, index: Rows) -> Scene:
         """The scene on some of the rows (rising); the motions keep all of the log."""
         times = self.log.time_s[index]
-        motions = tuple(replace(m, time_s=times) for m in self.motions)
+        motions = tuple(m.at(times) for m in self.motions)
         rows = tuple(cut_rows(r, index) for r in self.rows)
         return Scene(self.system, self.log.rows(index), motions, rows, self.known)
 

@@ -27,7 +27,7 @@ from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settling import Settled, settle
-from syncline_design.diagnosis.slow_states import Judged, States, slow_states
+from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, slow_states
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import (
     freedom_of,
@@ -48,6 +48,7 @@ WANDER_NATS = (
 )
 TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
+MOVED = 2.0  # standard uncertainties by which an effect has to move for its rivals to be tried
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
 Label = tuple[str, str, int]
@@ -123,7 +124,7 @@ class Search:
             trial = self.best(model, scores, threshold)
             if trial is None:
                 break
-            model = self.exchanged(trial.model)
+            model = self.exchanged(trial.model, model)
             in_force().doing("searching beyond " + ", ".join(name for name, *_ in model.labels))
             self.progress(len(model.labels) / self.settings.max_effects)
         return SearchResult(base, self.settled(model))
@@ -233,16 +234,15 @@ class Search:
         opened = (*model.opened[:-1], Opened(tails[0], "tails"))
         return [Trial(tails[0], replace(model, opened=opened), understated.gain + gain, 2)]
 
-    def exchanged(self, model: Model) -> Model:
-        """Try every earlier effect's rivals in its place now that there is company."""
-        if len(model.acting) < 2:
-            return model
-        for k, one in enumerate(model.acting[:-1]):
+    def exchanged(self, model: Model, before: Model) -> Model:
+        """Try the rivals of every earlier effect that its new company moves, in its place."""
+        for one in moved(model, before):
+            k = [a.label for a in model.acting].index(one)
             rest = tuple(a for i, a in enumerate(model.acting) if i != k)
             without = fit(self.data, rest, model.opened, start=model.level)
             scores = gram(self.data, without, self.free_signatures(without), without.level)
             for s, level in self.screened(without, scores):
-                if s.candidate.label == one.label:
+                if s.candidate.label == one:
                     break  # what gains less to first order is no better
                 if s.candidate.effect.kind == "stochastic":
                     continue
@@ -251,6 +251,21 @@ class Search:
                     model = trial.model
                     break
         return model
+
+
+def moved(model: Model, before: Model) -> list[Label]:
+    """Effects whose values another effect beside them moves by more than MOVED uncertainties."""
+    old = {a.label: fitted_of(a) for a in before.acting}
+    spread = np.sqrt(np.maximum(np.diag(before.covariance), 0.0))
+    spreads, at = {}, 0
+    for a in before.acting:
+        spreads[a.label] = spread[at : at + len(old[a.label])]
+        at += len(old[a.label])
+    return [
+        a.label
+        for a in model.acting
+        if a.label in old and np.any(np.abs(fitted_of(a) - old[a.label]) > MOVED * spreads[a.label])
+    ]
 
 
 def clearly_better(new: Model, old: Model) -> bool:

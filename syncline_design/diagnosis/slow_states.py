@@ -16,12 +16,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, f, t
+from scipy.special import betainc, gammaincc
+from scipy.stats import t
 
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
@@ -85,12 +86,26 @@ class Judged:
         if size == 0:
             return 0.0
         values = self.values[seen]
-        found = float(chi2.logsf(_square(values, self.model[seen][:, seen]), size))
+        found = _log_chi2(_square(values, self.model[seen][:, seen]), size)
         for covariance, count in self.jackknives:
             own = count - size
             share = _square(values, covariance[seen][:, seen]) * own / (size * (count - 1))
-            found = max(found, float(f.logsf(share, size, own)))
-        return found if math.isfinite(found) else LEAST_LOG_P
+            found = max(found, _log_f(share, size, own))
+        return found
+
+
+def _log_chi2(square: float, freedom: int) -> float:
+    """log of the upper tail of chi-square."""
+    return _log(float(gammaincc(0.5 * freedom, 0.5 * square)))
+
+
+def _log_f(share: float, first: int, second: int) -> float:
+    """log of the upper tail of Fisher's F, by the incomplete beta function."""
+    return _log(float(betainc(0.5 * second, 0.5 * first, second / (second + first * share))))
+
+
+def _log(chance: float) -> float:
+    return math.log(chance) if chance > 0.0 else LEAST_LOG_P
 
 
 def _square(values: Array, covariance: Array) -> float:
@@ -119,7 +134,7 @@ def _course(own: Array, weight: Array) -> Course:
     whole = float(np.sum(total * means) / np.sum(total))
     between = float(np.sum(total * (means - whole) ** 2)) / (QUARTERS - 1)
     inside = float(np.sum(weight * (own - means[groups]) ** 2)) / (own.shape[0] - QUARTERS)
-    log_p = float(f.logsf(between / max(inside, 1e-300), QUARTERS - 1, own.shape[0] - QUARTERS))
+    log_p = _log_f(between / max(inside, 1e-300), QUARTERS - 1, own.shape[0] - QUARTERS)
     return Course(tuple(float(v) for v in means), log_p)
 
 
@@ -164,15 +179,15 @@ class States:
         whole = _freed(normal, score, nuisance, wanted, prior)
         seen = np.diag(whole[0]) > LOST * np.diag(normal)[wanted]
         less = [
-            [
+            _each(
                 _freed(normal - n, score - s, nuisance, wanted, prior)
                 for n, s in zip(part.normal, part.score, strict=True)
-            ]
+            )
             for part in parts
             if len(part.normal) >= LEAST_BLOCKS
         ]
         places = [slice(a - width, b - width) for a, b in itertools.pairwise(ends)]
-        return [_one(place, whole, less, seen[place]) for place in places]
+        return [_one(place, whole, less, seen) for place in places]
 
     def own(self, model: Model) -> list[Judged]:
         """The model's own effects, all together: one entry for each, marginal over the others."""
@@ -297,19 +312,25 @@ def _parted(part: NDArray[np.int64], columns: Array, weight: Array, error: Array
     return _Sums(np.array(normals), np.array(scores))
 
 
+def _each(found: Iterable[tuple[Array, Array]]) -> tuple[Array, Array]:
+    """Normal matrices (G, m, m) and scores (G, m) of the log less each part."""
+    normals, scores = zip(*found, strict=True)
+    return np.array(normals), np.array(scores)
+
+
 def _one(
     place: slice,
     whole: tuple[Array, Array],
-    less: Sequence[Sequence[tuple[Array, Array]]],
+    less: Sequence[tuple[Array, Array]],
     seen: NDArray[np.bool_],
 ) -> Judged:
     """One group of columns: its values, and what the log less each part makes of them."""
-    values, covariance = _solved(whole, place, seen)
+    values, covariance = _solved(*whole, place, seen)
     jackknives = []
-    for parts in less:
-        off = np.array([_solved(one, place, seen)[0] for one in parts])
+    for normals, scores in less:
+        off, _ = _solved(normals, scores, place, seen)
         off -= off.mean(axis=0)
-        count = len(parts)
+        count = len(off)
         spread = (count - 1) / count * off.T @ off
         least = np.maximum(STEADY * np.diag(covariance) - np.diag(spread), 0.0)
         jackknives.append((spread + np.diag(least), count))
@@ -389,13 +410,13 @@ def _freed(
 
 
 def _solved(
-    whole: tuple[Array, Array], place: slice, seen: NDArray[np.bool_]
+    normal: Array, score: Array, place: slice, seen: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """Values and covariance of some columns; zero for those that are not seen."""
-    both = seen[:, None] & seen
-    normal, score = np.where(both, whole[0][place, place], 0.0), whole[1][place] * seen
-    scale = np.sqrt(np.maximum(np.diag(normal), 0.0))
-    scale[scale == 0.0] = 1.0
-    inverse = np.linalg.pinv(normal / scale[:, None] / scale, rcond=1e-10)
-    inverse = inverse / scale[:, None] / scale
-    return inverse @ score, inverse
+    """Values (..., p) and covariance of some columns; zero for those that are not seen."""
+    both = seen[place, None] & seen[place]
+    normal = np.where(both, normal[..., place, place], 0.0)
+    scale = np.sqrt(np.maximum(np.diagonal(normal, axis1=-2, axis2=-1), 0.0))
+    scale = np.where(scale == 0.0, 1.0, scale)
+    squares = scale[..., :, None] * scale[..., None, :]
+    inverse = np.linalg.pinv(normal / squares, rcond=1e-10, hermitian=True) / squares
+    return np.einsum("...ab,...b->...a", inverse, score[..., place] * seen[place]), inverse

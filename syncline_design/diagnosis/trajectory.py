@@ -7,7 +7,7 @@ time shift, and a fit would prefer shifts half way between rows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.diagnosis.recent import Recent
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.logs.stamps import per_stamp
@@ -25,6 +26,7 @@ NEAR_S = 5.0  # of a series around the stamps, that their slopes rest on
 LEAST_SMOOTHED = 20  # rows of a stretch
 MOST_TRIED = 1000  # rows on which the penalty is chosen
 PENALTIES = np.geomspace(1e-3, 1e4, 15)  # over the cube of the time between rows
+SHIFTS = 24  # of the stamps, whose turns and displacements are kept
 FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
 
 
@@ -33,7 +35,7 @@ class SplinePieces:
     """Cubic splines of a series (n, k), one per stretch without a gap.
 
     Beyond a stretch's ends the values there are held.  All stretches are one table of polynomials
-    in (t - knot): coefficients (4, m, k) and those of the antiderivative (5, m, k), highest power
+    in (t - knot): coefficients (m, 4, k) and those of the antiderivative (m, 5, k), highest power
     first; first, last: intervals of each stretch.
     """
 
@@ -59,7 +61,7 @@ class SplinePieces:
 
     def slope(self, at_s: Array, home_s: Array) -> Array:
         """First derivative of the series."""
-        slopes = self.values[:-1] * np.arange(len(self.values) - 1, 0, -1)[:, None, None]
+        slopes = self.values[:, :-1] * np.array([3.0, 2.0, 1.0])[:, None]
         return self._evaluated(slopes, at_s, self._stretch(home_s))
 
     def _stretch(self, home_s: Array) -> Index:
@@ -77,9 +79,10 @@ class SplinePieces:
         found = np.searchsorted(self.knots_s, at_s, side="right") - 1
         interval = np.clip(found, self.first[stretch], self.last[stretch])
         off = (at_s - self.knots_s[interval])[:, None]
-        total: Array = coefficients[0, interval]
-        for power in coefficients[1:]:
-            total = total * off + power[interval]
+        own = coefficients[interval]
+        total: Array = own[:, 0]
+        for power in range(1, own.shape[1]):
+            total = total * off + own[:, power]
         return total
 
 
@@ -107,10 +110,15 @@ def pieces(time_s: Array, series: Array) -> SplinePieces:
         counts[:-1],
         counts[1:] - 1,
         np.concatenate([s.x[:-1] for s in splines]),
-        np.concatenate([s.c for s in splines], axis=1),
-        np.concatenate([s.antiderivative().c for s in splines], axis=1),
+        _by_interval([s.c for s in splines]),
+        _by_interval([s.antiderivative().c for s in splines]),
         tuple(splines),
     )
+
+
+def _by_interval(coefficients: list[Array]) -> Array:
+    """Coefficients (m, powers, k) of all intervals, those of one side by side in memory."""
+    return np.ascontiguousarray(np.moveaxis(np.concatenate(coefficients, axis=1), 0, 1))
 
 
 def smooth_slope(time_s: Array, series: Array, at_s: Array) -> Array:
@@ -183,11 +191,20 @@ class LoggedMotion:
     stamps_s: Array
     attitude: Array
     follows_position: bool = False
+    recent: Recent = field(default_factory=lambda: Recent(SHIFTS), repr=False, compare=False)
+
+    def at(self, time_s: Array) -> LoggedMotion:
+        """The same motion, asked about at other stamps."""
+        return replace(self, time_s=time_s, recent=Recent(SHIFTS))
 
     def displacement(self, from_s: Array, to_s: Array, position_shift_s: Array) -> Array:
         """p(to) - p(from) [m], NED, (n, 3)."""
         own = position_shift_s if self.follows_position else np.zeros(1)
-        return self.velocity.integral(from_s - own, to_s - own, self.time_s)
+        start_s, stop_s = from_s - own, to_s - own
+        return self.recent.of(
+            ("displacement", start_s.tobytes(), stop_s.tobytes()),
+            lambda: self.velocity.integral(start_s, stop_s, self.time_s),
+        )
 
     def turn(self, from_s: Array, to_s: Array) -> Array:
         """Rotation vector theta [rad], R(to) = R(from) exp(S(theta)), (n, 3).
@@ -206,8 +223,15 @@ class LoggedMotion:
             return rotation
         if float(np.max(np.abs(to_s - from_s))) > FAR_S:
             return self._far(to_s)
-        carried: Array = rotation @ rotation_exp(self.turn(from_s, to_s))
+        carried: Array = rotation @ self._carried(from_s, to_s)
         return carried
+
+    def _carried(self, from_s: Array, to_s: Array) -> Array:
+        """exp(S(theta)), (n, 3, 3)."""
+        return self.recent.of(
+            ("turn", from_s.tobytes(), to_s.tobytes()),
+            lambda: rotation_exp(self.turn(from_s, to_s)),
+        )
 
     def _far(self, to_s: Array) -> Array:
         """R(to) from the logged pose next to it; over many seconds the series does not hold."""
