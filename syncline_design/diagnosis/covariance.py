@@ -7,14 +7,14 @@ processes is banded, so by the matrix inversion lemma
     log|C| = log|Sigma| + log|P| - log|K^-1|.
 Uneven stamps and gaps need no care: correlation over dt is exp(-dt / T).  Rows of one stamp share
 its states, so B' Sigma^-1 B is summed over them; T = 0 is noise that is new at every stamp and
-common to its rows.
+common to its rows.  Constants that rows of a kind share (`Lasting`) are added as U U'.
 Source: Rue and Held, Gaussian Markov Random Fields (2005), ch. 2; Woodbury's identity.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,6 +50,47 @@ def inverse_3x3(matrix: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, slots=True)
+class Lasting:
+    """Unit-variance constants, each common to all rows of a kind: C = A + U U'.
+
+    loading (n, 3, q) U [m]; weighted A^-1 U; inverse of G = I + U' A^-1 U, its log determinant.
+    """
+
+    loading: Array
+    weighted: Array
+    inverse: Array
+    log_determinant: float
+
+    def held(self, solved: Array) -> Array:
+        """A^-1 U G^-1 U' A^-1 Y, for A^-1 Y (n, 3, c)."""
+        return _times(self.weighted, self.inverse @ _summed(self.loading, solved))
+
+    def mean(self, solved: Array) -> Array:
+        """U G^-1 U' A^-1 Y."""
+        return _times(self.loading, self.inverse @ _summed(self.loading, solved))
+
+
+def _summed(first: Array, second: Array) -> Array:
+    product: Array = first.reshape(-1, first.shape[2]).T @ second.reshape(-1, second.shape[2])
+    return product
+
+
+def _times(columns: Array, values: Array) -> Array:
+    product: Array = columns.reshape(-1, columns.shape[2]) @ values
+    return product.reshape(*columns.shape[:2], values.shape[1])
+
+
+def with_lasting(known: Precision, loading: Array) -> Precision:
+    """The covariance with constants added, by Woodbury's identity once more."""
+    weighted = known.solve(loading)
+    inner = np.eye(loading.shape[2]) + _summed(loading, weighted)
+    inverse: Array = np.asarray(np.linalg.inv(inner), dtype=float)
+    log_det = float(np.linalg.slogdet(inner)[1])
+    lasting = Lasting(loading, weighted, inverse, log_det)
+    return replace(known, log_determinant=known.log_determinant + log_det, lasting=lasting)
+
+
+@dataclass(frozen=True, slots=True)
 class Precision:
     """The factored covariance of one series."""
 
@@ -60,9 +101,15 @@ class Precision:
     slow: NDArray[np.bool_]  # (m,) which processes last from stamp to stamp
     first: Index | None = None  # first row of every stamp, where rows share stamps
     group: Index | None = None  # (n,) the stamp of every row
+    lasting: Lasting | None = None
 
     def solve(self, series: Array) -> Array:
         """C^-1 Y, Y (n, 3, c)."""
+        found = self._in_time(series)
+        return found if self.lasting is None else found - self.lasting.held(found)
+
+    def _in_time(self, series: Array) -> Array:
+        """The same without what lasts."""
         weighted: Array = self.white_inverse @ series
         if self.loading.shape[2] == 0:
             return weighted
@@ -80,12 +127,20 @@ class Precision:
         return states if self.group is None else states[self.group]
 
     def slow_part(self, error: Array) -> Array:
-        """B x of the lasting processes, x their posterior mean given the series (n, 3); (n, 3)."""
+        """B x + U s of what is slow and what lasts, posterior means given the series (n, 3)."""
+        constant = self.constant_part(error)
         if not np.any(self.slow):
-            return np.zeros_like(error)
-        states = self.states(self.white_inverse @ error[:, :, None])
+            return constant
+        states = self.states(self.white_inverse @ (error - constant)[:, :, None])
         slow: Array = (self.loading[:, :, self.slow] @ states[:, self.slow])[:, :, 0]
-        return slow
+        return constant + slow
+
+    def constant_part(self, error: Array) -> Array:
+        """U s, s the posterior mean of what lasts given the series (n, 3); (n, 3)."""
+        if self.lasting is None:
+            return np.zeros_like(error)
+        found: Array = self.lasting.mean(self._in_time(error[:, :, None]))[:, :, 0]
+        return found
 
     def negative_log_likelihood(self, error: Array) -> float:
         """-log N(e; 0, C) [nat], e (n, 3)."""

@@ -280,7 +280,7 @@ def _wander(
 
 def _log_spread(data: Data, model: Model, where: tuple[str, int, int]) -> float:
     """Standard uncertainty of the logarithm of one noise figure, from the likelihood's curve."""
-    error = model.error[data.noise_rows]
+    error = model.scatter[data.noise_rows]
     share = len(data.noise_rows) / max(len(data.view), 1)
     step = 0.1
     nll = [

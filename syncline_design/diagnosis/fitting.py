@@ -56,7 +56,12 @@ def data_of(view: Scene, structure: Structure) -> Data:
     """A scene ready for fitting."""
     index = windows(len(view), NOISE_ROWS, STRETCH)
     axes = varying_axes(view.error(), structure)
-    return Data(view, structure, index, structure.rows(index), axes)
+    return Data(view, structure, index, _in_time(structure, index), axes)
+
+
+def _in_time(structure: Structure, index: NDArray[np.int64]) -> Structure:
+    """The structure that noise is fitted with: what the survey's errors leave."""
+    return replace(structure.rows(index), survey=None)
 
 
 def windows(rows: int, most: int, length: int) -> NDArray[np.int64]:
@@ -104,6 +109,11 @@ class Model:
         return tuple(dict.fromkeys([*moved, *(o.candidate.label for o in self.opened)]))
 
     @property
+    def scatter(self) -> Array:
+        """What is left less the targets' survey errors (n, 3) [m]: what the noise is fitted to."""
+        return self.error - self.precision.constant_part(self.error)
+
+    @property
     def free_sizes(self) -> tuple[int, ...]:
         return tuple(o.directed for o in self.opened if o.directed >= 0)
 
@@ -138,17 +148,25 @@ def fit(
     iterations = LONG if start is None else SHORT
     for _ in range(passes):
         if now:
-            now, error, _, columns = stepped(data, now, precision(data.structure, level), error)
+            known = precision(data.structure, level)
+            now, error, _, columns = stepped(data, now, known, error)
+        scatter = _without_survey(data, level, error)[data.noise_rows]
         starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
         fits = [
-            fit_noise(data.noise_structure, error[data.noise_rows], bounds, s, sizes, iterations)
-            for s in starts
+            fit_noise(data.noise_structure, scatter, bounds, s, sizes, iterations) for s in starts
         ]
         level, _ = min(fits, key=lambda found: found[1])
     factored = precision(data.structure, level)
     now, error, covariance, _ = stepped(data, now, factored, error, columns=columns)
     nll = factored.negative_log_likelihood(error)
     return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
+
+
+def _without_survey(data: Data, level: NoiseLevel, error: Array) -> Array:
+    """The error less the posterior mean of the targets' survey errors at a noise level."""
+    if data.structure.survey is None:
+        return error
+    return error - precision(data.structure, level).constant_part(error)
 
 
 def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:
@@ -165,7 +183,7 @@ def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:
 def finely(data: Data) -> Data:
     """The data with the noise fitted on POLISH_ROWS rows, for the final figures."""
     index = windows(len(data.view), POLISH_ROWS, STRETCH)
-    return replace(data, noise_rows=index, noise_structure=data.structure.rows(index))
+    return replace(data, noise_rows=index, noise_structure=_in_time(data.structure, index))
 
 
 def slow_guess(level: NoiseLevel, time_s: float | None) -> NoiseLevel:
@@ -253,9 +271,10 @@ def _moved(acting: Sequence[Acting], change: Array) -> tuple[Acting, ...]:
 def solve_scaled(normal: Array, right: Array) -> Array:
     """Solve normal x = right with columns scaled alike; directions the log cannot see stay put."""
     scale = _scale(normal)
+    seen = np.diag(normal) > 0.0
     scaled = normal / scale[:, None] / scale
     solution: Array = np.asarray(np.linalg.lstsq(scaled, right / scale, rcond=1e-10)[0]) / scale
-    return solution
+    return np.where(seen, solution, 0.0)
 
 
 def _scale(normal: Array) -> Array:
@@ -265,8 +284,9 @@ def _scale(normal: Array) -> Array:
 
 
 def inverse_scaled(normal: Array) -> Array:
-    """Inverse of the normal matrix, columns scaled alike first."""
+    """Inverse of the normal matrix, columns scaled alike first; zero for what no row depends on."""
     scale = _scale(normal)
+    seen = np.diag(normal) > 0.0
     scaled = normal / scale[:, None] / scale
     inverse: Array = np.asarray(np.linalg.pinv(scaled, rcond=1e-12)) / scale[:, None] / scale
-    return inverse
+    return np.where(seen[:, None] & seen, inverse, 0.0)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import LinAlgError
 
-from syncline_design.diagnosis.covariance import Precision, factored
+from syncline_design.diagnosis.covariance import Precision, factored, with_lasting
 from syncline_design.diagnosis.noise_slopes import noise_slopes, summed_over
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import Rows
@@ -85,7 +85,8 @@ class Structure:
     """All parts that the covariance of a series can be made of, on its rows.
 
     fixed (n, 3, 3) [m2]: what is known and not fitted, each row's own.  stamped (n, 3, k) [m]: the
-    same, common to the rows of a stamp: the spec's timing errors.
+    same, common to the rows of a stamp: the spec's timing errors.  survey (n, 3, q) [m]: errors of
+    the targets' survey, one standard deviation each, common to all rows of a target.
     """
 
     time_s: Array
@@ -95,6 +96,7 @@ class Structure:
     directed: tuple[Directed, ...] = ()
     stamped: Array | None = None
     one_reading: bool = True  # of the vehicle for all rows of a stamp
+    survey: Array | None = None
 
     @property
     def shared(self) -> bool:
@@ -111,6 +113,7 @@ class Structure:
             tuple(Directed(d.key, d.direction[index]) for d in self.directed),
             None if self.stamped is None else self.stamped[index],
             self.one_reading,
+            None if self.survey is None else self.survey[index],
         )
 
 
@@ -248,6 +251,12 @@ def loadings(structure: Structure, level: NoiseLevel) -> tuple[Array, Array]:
 
 def precision(structure: Structure, level: NoiseLevel) -> Precision:
     """The factored covariance of the structure at a noise level."""
+    known = _in_time(structure, level)
+    return known if structure.survey is None else with_lasting(known, structure.survey)
+
+
+def _in_time(structure: Structure, level: NoiseLevel) -> Precision:
+    """The same without the errors of the survey."""
     loading, times = loadings(structure, level)
     if not structure.shared:
         return factored(white_covariance(structure, level), loading, structure.time_s, times)

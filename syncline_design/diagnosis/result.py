@@ -310,12 +310,16 @@ class Likelihoods(Record):
 
 @dataclass(frozen=True, slots=True)
 class Noise(Record):
-    """The fitted noise, by `stage/sensor`; white_factor: standard deviation over the spec's."""
+    """The fitted noise, by `stage/sensor`; white_factor: standard deviation over the spec's.
+
+    survey_m: standard deviation of a coordinate of the surveyed targets; None where none shows.
+    """
 
     white_factor: Mapping[str, float]
     slow: Mapping[str, SlowNoise]
     rows_fitted: int
     remainder: Likelihoods
+    survey_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

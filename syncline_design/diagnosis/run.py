@@ -10,7 +10,12 @@ import numpy as np
 
 from syncline_design import __version__
 from syncline_design.diagnosis.axes import without_still_axes
-from syncline_design.diagnosis.candidates import candidates, directed_parts, noise_of_heading
+from syncline_design.diagnosis.candidates import (
+    candidates,
+    directed_parts,
+    noise_of_heading,
+    signatures,
+)
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.consequence import Promise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
@@ -49,6 +54,7 @@ from syncline_design.diagnosis.search import (
 )
 from syncline_design.diagnosis.sight import informative, smallest_seen
 from syncline_design.diagnosis.slow_states import slow_states
+from syncline_design.diagnosis.survey import survey_m, with_shown_survey
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.effects.acting import Acting
 from syncline_design.logs.log import Log
@@ -215,8 +221,10 @@ def _searched(
     plain = structure_of(scene(inputs.system, log, inputs.known))
     log = without_still_axes(inputs.system, log, inputs.known, plain)
     view = scene(inputs.system, log, inputs.known)
-    parts = directed_parts(view, candidates(view, settings.exclude_effects))
+    found = candidates(view, settings.exclude_effects)
+    parts = directed_parts(view, found)
     data = with_shown_ranging(data_of(view, structure_of(view, parts)))
+    data = with_shown_survey(data, signatures(view, found))
     progress("searching", 0.15)
     search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
     return data, search, search.run()
@@ -347,6 +355,7 @@ def _noise(data: Data, result: SearchResult) -> Noise:
         {"/".join(part.sensor): SlowNoise(v, t[:1]) for part, v, t in slow},
         len(data.noise_rows),
         Likelihoods(result.base.nll, result.model.nll),
+        survey_m(data),
     )
 
 

@@ -127,6 +127,7 @@ def _decided(
     """The model with the best of every class, and what each is compared with."""
     classes: dict[Label, Comparison] = {}
     for _ in range(ROUNDS):
+        model = fit(data, model.acting, model.opened, start=model.level)  # as its rivals will be
         before, classes = set(model.labels), {}
         for label in [a.label for a in model.acting]:
             known = set(model.labels)

@@ -32,6 +32,7 @@ from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 
 Channel = tuple[Sensor, int]
+SURVEY: Sensor = ("", "target")  # channel of the targets' survey errors
 WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
 QUARTERS = 4
@@ -269,7 +270,7 @@ class States:
     def _limits(self, level: NoiseLevel) -> Array:
         """Most that a channel's variance may be, over the spec's."""
         structure = self.data.structure
-        most = {
+        most: dict[Sensor, float] = {SURVEY: 1.0} | {
             w.sensor: max(x, 1.0) ** 2 for w, x in zip(structure.white, level.factor, strict=True)
         }
         for part, slow in zip(structure.slow, level.slow, strict=True):
@@ -337,14 +338,20 @@ def _one(
     return Judged(values, covariance, tuple(jackknives))
 
 
-def _few_targets(data: Data) -> NDArray[np.int64] | None:
-    """Groups of targets where they are few: an error of a target's survey is in all its rows."""
+def few_targets(data: Data) -> NDArray[np.int64] | None:
+    """The target of every row where they are few: an error of its survey is in all its rows."""
     log = data.view.log
     if log.kind == "position":
         return None
     _, index = np.unique(np.nan_to_num(log.truth_m), axis=0, return_inverse=True)
     count = int(index.max()) + 1
-    return index.ravel() % BLOCKS if FEW[0] <= count <= FEW[1] else None
+    return index.ravel() if FEW[0] <= count <= FEW[1] else None
+
+
+def _dealt(data: Data) -> NDArray[np.int64] | None:
+    """Groups of targets, as many as there are blocks."""
+    target = few_targets(data)
+    return None if target is None else target % BLOCKS
 
 
 def names_of(one: Acting) -> list[str]:
@@ -378,11 +385,16 @@ def slow_states(data: Data) -> States:
             channel += [len(roles)] * (WAVES + 1)
             wave += list(range(WAVES + 1))
             roles.append((sensor, k))
+    if data.structure.survey is not None:
+        courses.append(data.structure.survey)
+        channel += [len(roles)] * courses[-1].shape[2]
+        wave += [1] * courses[-1].shape[2]
+        roles.append((SURVEY, 0))
     count = int(np.clip(len(view) // LEAST_ROWS, 1, BLOCKS))
     block = np.minimum(np.arange(len(view)) * count // max(len(view), 1), count - 1)
     whole = np.concatenate(courses, axis=2) if courses else np.zeros((len(view), 3, 0))
     channels_of, waves_of = np.array(channel, int), np.array(wave, int)
-    return States(data, whole, channels_of, waves_of, block, _few_targets(data), tuple(roles))
+    return States(data, whole, channels_of, waves_of, block, _dealt(data), tuple(roles))
 
 
 def _scale2(left: Array, freedom: float) -> float:

@@ -104,7 +104,7 @@ def scatter_candidates(
     """
     result = []
     least = max(1.0, least * len(data.noise_rows) / len(data.view))
-    error = model.error[data.noise_rows]
+    error = model.scatter[data.noise_rows]
     base = precision(data.noise_structure, model.level).negative_log_likelihood(error)
     for candidate in found:
         if candidate.label in model.labels or candidate.effect.sensitivity is not None:
