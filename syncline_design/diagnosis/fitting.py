@@ -147,10 +147,10 @@ def fit(
     error, columns = data.error(now), None
     iterations = LONG if start is None else SHORT
     for _ in range(passes):
+        known = precision(data.structure, level)
         if now:
-            known = precision(data.structure, level)
             now, error, _, columns = stepped(data, now, known, error)
-        scatter = _without_survey(data, level, error)[data.noise_rows]
+        scatter = (error - known.constant_part(error))[data.noise_rows]
         starts = [level] if start is not None else [slow_guess(level, t) for t in FIRST_TIMES_S]
         fits = [
             fit_noise(data.noise_structure, scatter, bounds, s, sizes, iterations) for s in starts
@@ -160,13 +160,6 @@ def fit(
     now, error, covariance, _ = stepped(data, now, factored, error, columns=columns)
     nll = factored.negative_log_likelihood(error)
     return Model(now, tuple(opened), bounds, level, nll, covariance, error, factored)
-
-
-def _without_survey(data: Data, level: NoiseLevel, error: Array) -> Array:
-    """The error less the posterior mean of the targets' survey errors at a noise level."""
-    if data.structure.survey is None:
-        return error
-    return error - precision(data.structure, level).constant_part(error)
 
 
 def thinned(data: Data, model: Model, most: int) -> tuple[Data, Model]:

@@ -10,6 +10,7 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Signature
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.identify import Comparison, Label, competed, effect_of, without
+from syncline_design.diagnosis.noise import as_specified
 from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted_of, names_of
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance
@@ -111,9 +112,17 @@ def _valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judge
 def _standing(
     data: Data, model: Model, states: States, standing: Callable[[Judged, Effect], bool]
 ) -> Model:
-    """The model without the effects that noise of another kind shows as well, weakest first."""
+    """The model without the effects that noise of another kind shows as well, weakest first.
+
+    What stands by the fitted noise has to stand by the spec's as well, larger where it is larger: a
+    sensor whose noise is fitted far too small lends its weight to whatever moves that sensor.
+    """
     while model.acting:
-        judged = zip(model.acting, states.own(model), strict=True)
+        stated = as_specified(data.structure)
+        larger = tuple(max(own, 1.0) for own in model.level.factor)
+        by_spec = replace(model, level=replace(stated, factor=larger, size=model.level.size))
+        both = zip(model.acting, states.own(model), states.own(by_spec), strict=True)
+        judged = [(a, max(pair, key=lambda one: one.log_p)) for a, *pair in both]
         fallen = [(one.log_p, a.label) for a, one in judged if not standing(one, a.effect)]
         if not fallen:
             break
