@@ -127,7 +127,10 @@ def diagnose(
         say(f"spec with the findings written to {write_spec}")
     elif write_spec is not None:
         found_any = bool(found.effects_entries())
-        say(f"{'the time was over' if found_any else 'nothing was found'}: no spec written")
+        nothing = (
+            "nothing was found that belongs into a spec" if found.findings else "nothing found"
+        )
+        say(f"{'the time was over' if found_any else nothing}: no spec written")
     text = console(on_diagnosis(whole))
     emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
     return found.demanded_exit_code(informative=require_informative)

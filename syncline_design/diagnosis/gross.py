@@ -1,20 +1,25 @@
 """Gross faults first: frames, units, signs, whole-second slips.
 
 They are discrete, so each is tried on the whole log by re-simulation; it is taken when the usual
-size of the error falls to a third or less and was far from noise before.
+size of the error falls to a third or less and was far from noise before.  Beside the usual ones all
+axes, units, zeros and shifts of stamps are searched (`conventions`, `slips`); such a one has to
+bring the error down to a tenth, or to a third where nothing but noise is left.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from syncline_design.diagnosis.conventions import best_repairs
 from syncline_design.diagnosis.scene import Scene, scene
+from syncline_design.diagnosis.slips import Shift, attitude_restamped, best_shifts
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
-from syncline_design.effects.record import Array, Effect
+from syncline_design.effects.record import Array, Effect, Target
 from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
 from syncline_design.logs.merging import hermite
 from syncline_design.logs.stamps import per_stamp
@@ -27,6 +32,11 @@ ROWS = 3000
 LEAST_LEFT = 10  # rows
 WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
 SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of seconds
+SEARCHED_TO = 0.1  # what is searched so widely has to help so much
+FAR_BETTER = 0.5  # of the error of the best fault of the list
+SHORT_SHIFT_S = 0.5  # a shorter shift of stamps is a latency, to be fitted
+CONVENTION, SLIP = "frame_convention", "integer_second_slip"
+NEARLY_FREE = 2.0  # the same for what is searched
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
 
 Reread = Callable[[float], Log]
@@ -99,10 +109,14 @@ def unslipped(log: Log, seconds: float) -> Log:
 
 
 def mended(log: Log, one: Acting, reread: Reread | None = None) -> Log:
-    """The log with one gross fault undone."""
+    """The log with a listed gross fault undone."""
     if not _restamps(one):
         return undone(log, one)
-    seconds = float(_value(one))
+    return restamped(log, float(_value(one)), reread)
+
+
+def restamped(log: Log, seconds: float, reread: Reread | None = None) -> Log:
+    """The log with its positions' stamps set back, by pairing rows anew or reading anew."""
     return unslipped(log, seconds) if reread is None else reread(seconds)
 
 
@@ -132,16 +146,50 @@ def gross_faults(
         if not size > FAR_FROM_NOISE * expected_m:
             break
         taken = [g.acting.label for g in found]
-        trials = _trials(system, log, base, taken, exclude)
-        sizes = [(usual_size(trial()), k, one) for k, (one, trial) in enumerate(trials)]
-        best, _, one = min(sizes, key=lambda entry: entry[:2], default=(size, 0, None))
-        if one is None or not best < FALLS_TO * size:
+        listed = _best(_trials(system, log, base, taken, exclude, reread))
+        if not _clear(listed, size, expected_m):
+            listed = None
+        wide = _best(_searched(system, log, base, exclude))
+        shift = _best(_shifts(system, log, base, exclude, reread))
+        if wide is not None and not _far_down(wide.size_m, size, expected_m):
+            wide = None
+        if not _clear(shift, size, expected_m):
+            shift = None
+        best = _preferred(_preferred(listed, shift), wide)
+        if best is None:
             break
-        if _is_short_slip(one) and not best < NEARLY_NOISE * expected_m:
-            break
-        found.append(Gross(one, size / max(best, 1e-300)))
-        log = mended(log, one, reread)
+        found.append(Gross(best.acting, size / max(best.size_m, 1e-300)))
+        log = best.mend(log)
     return tuple(found), log
+
+
+def _far_down(left_m: float, size_m: float, expected_m: float) -> bool:
+    """Whether one of so many conventions helps enough: to a tenth, or to a third and noise."""
+    return left_m < SEARCHED_TO * size_m or left_m < min(
+        FALLS_TO * size_m, NEARLY_FREE * expected_m
+    )
+
+
+def _preferred(listed: _Tried | None, wide: _Tried | None) -> _Tried | None:
+    """A fault of the list, unless the wide search has found a far better one."""
+    if listed is None or wide is None:
+        return listed or wide
+    return wide if wide.size_m < FAR_BETTER * listed.size_m else listed
+
+
+def _clear(best: _Tried | None, size_m: float, expected_m: float) -> bool:
+    if best is None or not best.size_m < FALLS_TO * size_m:
+        return False
+    if _restamps(best.acting):
+        return not _is_short_slip(best.acting) or best.size_m < NEARLY_NOISE * expected_m
+    short = best.acting.effect.undoing is None and abs(float(_value(best.acting))) <= SHORT_SLIP
+    return not short or best.size_m < NEARLY_FREE * expected_m
+
+
+def _best(trials: Sequence[Trial]) -> _Tried | None:
+    """The trial of least error, the first of equals."""
+    tried = [_Tried(t.acting, t.mend, usual_size(t.error())) for t in trials]
+    return min(tried, key=lambda one: one.size_m, default=None)
 
 
 def _is_short_slip(one: Acting) -> bool:
@@ -170,7 +218,20 @@ def _instead_of(found: Acting) -> Effect | None:
     return None
 
 
-Trials = list[tuple[Acting, Callable[[], Array]]]
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """A gross fault to be tried: the error of the log with it undone, and how to undo it."""
+
+    acting: Acting
+    error: Callable[[], Array]
+    mend: Callable[[Log], Log]
+
+
+@dataclass(frozen=True, slots=True)
+class _Tried:
+    acting: Acting
+    mend: Callable[[Log], Log]
+    size_m: float
 
 
 def _trials(
@@ -179,15 +240,61 @@ def _trials(
     base: Scene,
     taken: Sequence[tuple[str, str, int]],
     exclude: Sequence[str],
-) -> Trials:
-    """Every gross fault with a function that re-simulates the log under it."""
+    reread: Reread | None,
+) -> list[Trial]:
+    """Every listed gross fault with a function that re-simulates the log under it."""
     faults = [e for e in registry().values() if e.undoing is not None and e.name not in exclude]
     return [
-        (one, _resimulated(system, base, one))
+        Trial(one, _resimulated(system, base, one), partial(mended, one=one, reread=reread))
         for effect in faults
         for one in _tried(system, log, effect)
         if one.label not in taken
     ]
+
+
+def _searched(system: System, log: Log, base: Scene, exclude: Sequence[str]) -> list[Trial]:
+    """The best of all conventions, to be re-simulated."""
+    found = []
+    effect = registry()[CONVENTION]
+    for one in best_repairs(system, base.log) if CONVENTION not in exclude else []:
+        acting = Acting(effect, one.sensor, 0, {"convention": one.convention})  # type: ignore[dict-item]
+        found.append(Trial(acting, partial(_error, system, log, base, one.mend), one.mend))
+    return found
+
+
+def _error(system: System, log: Log, base: Scene, mend: Callable[[Log], Log]) -> Array:
+    """The error of a log once mended."""
+    left = mend(log)
+    thin = left.rows(slice(None, None, max(1, len(left) // ROWS)))
+    return scene(system, thin, base.known).error()
+
+
+def _shifts(
+    system: System, log: Log, base: Scene, exclude: Sequence[str], reread: Reread | None
+) -> list[Trial]:
+    """The best shifts of stamps."""
+    found = []
+    for shift in best_shifts(system, log):
+        acting = _shift_named(shift)
+        if acting.effect.name not in exclude and abs(shift.seconds) > SHORT_SHIFT_S:
+            seconds = float(next(iter(acting.values.values())))
+            mend = partial(_shifted, sensor=shift.sensor, seconds=seconds, reread=reread)
+            found.append(Trial(acting, partial(_error, system, log, base, mend), mend))
+    return found
+
+
+def _shift_named(shift: Shift) -> Acting:
+    """Whole seconds of the positions are a slip, anything else a delay."""
+    seconds = float(round(shift.seconds)) if shift.whole else shift.seconds
+    if shift.whole and shift.sensor == "position":
+        return Acting(registry()[SLIP], shift.sensor, 0, {"seconds": seconds})
+    return Acting(registry()["latency"], shift.sensor, 0, {"latency_s": seconds})
+
+
+def _shifted(log: Log, sensor: Target, seconds: float, reread: Reread | None) -> Log:
+    if sensor == "attitude":
+        return attitude_restamped(log, seconds)
+    return restamped(log, seconds, reread)
 
 
 def _tried(system: System, log: Log, effect: Effect) -> Iterator[Acting]:
@@ -196,7 +303,7 @@ def _tried(system: System, log: Log, effect: Effect) -> Iterator[Acting]:
     name = effect.parameters[0].name
     for k, stage in enumerate(system.stages):
         for sensor, values in effect.undoing.tried.items():
-            held = log.kind != "position" or sensor == "position"
+            held = log.kind != "position" or sensor != "ranging"
             if held and effect.applies(stage, sensor):
                 # a convention's value is its name
                 yield from (Acting(effect, sensor, k, {name: v}) for v in values)  # type: ignore[dict-item]

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
+from syncline_design.effects import registry
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.spec.effects_listed import EffectChoice
 
@@ -117,6 +118,14 @@ class Finding(Record):
     size_m: float | None = optional()
     probability: float | None = optional()
     varying: tuple[Stretch, ...] | None = optional()
+
+    @property
+    def fits_a_spec(self) -> bool:
+        """Whether a spec can hold it."""
+        effect = registry()[self.effect]
+        return self.sensor in effect.sensors and all(
+            p.misfit(self.parameters[p.name].value, self.sensor) is None for p in effect.parameters
+        )
 
     def as_entry(self) -> EffectChoice:
         """The finding as an entry of a spec's `effects:`."""
@@ -440,5 +449,12 @@ class Diagnosis(Record):
         return NOT_SHOWN if hidden else self.exit_code
 
     def effects_entries(self) -> tuple[EffectChoice, ...]:
-        """The findings as entries of a spec's `effects:`."""
-        return tuple(finding.as_entry() for finding in self.findings)
+        """What was found as entries of a spec's `effects:`.
+
+        Without stand-ins, what does not matter, and conventions that are to be mended in the log.
+        """
+        return tuple(
+            finding.as_entry()
+            for finding in self.findings
+            if finding.material and finding.kind != "stand_in" and finding.fits_a_spec
+        )

@@ -1,0 +1,114 @@
+"""Clocks that are seconds apart: the shift of a sensor's stamps at which a log fits best.
+
+The places (or attitudes) of the whole log are moved along its stamps, and the usual error is taken
+on some rows for every shift of a grid, then more finely about the best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.diagnosis.scene import levers
+from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
+from syncline_design.effects.record import Array, Target
+from syncline_design.logs.log import Log
+from syncline_design.logs.stamps import per_stamp
+from syncline_design.model.system import System
+from syncline_design.simulation.chain import rotation_exp
+
+ROWS = 150
+MOST_S = 300.0  # and no more than leaves enough rows
+STEP_S = 0.2
+FINER, TIMES = 25, 3  # shifts to either side of the best, and how often
+LEAST_INSIDE = 0.4  # of the rows
+WHOLE_S = 0.03  # a shift this near to whole seconds is one
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """stamp = true + seconds, of one sensor."""
+
+    sensor: Target
+    seconds: float
+    size_m: float
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is a number of whole seconds."""
+        return bool(round(self.seconds)) and abs(self.seconds - round(self.seconds)) < WHOLE_S
+
+
+def best_shifts(system: System, log: Log) -> list[Shift]:
+    """The best shift of the positions and of the attitudes of a log of one stage."""
+    held = log.stages[0]
+    if len(system.stages) != 1 or held.antenna_m is None or len(log) < ROWS // 10:
+        return []
+    rows = np.linspace(0, len(log) - 1, min(ROWS, len(log))).astype(int)
+    few = log.rows(rows)
+    antenna, ranging = levers(system.stages[0], 0)
+    vector: Array = np.broadcast_to(-antenna, (len(few), 3))
+    one = few.stages[0]
+    if one.range_m is not None and one.azimuth_rad is not None and one.elevation_rad is not None:
+        pointing = bearing(one.azimuth_rad, one.elevation_rad)
+        vector = ranging - antenna + one.range_m[:, None] * pointing
+    times, places = per_stamp(log.time_s, held.antenna_m)
+    swung = rotate(euler_to_rotation(few.stages[0].euler_rad), vector)
+    turns = euler_to_rotation(held.euler_rad)
+    middle = 0.5 * (log.time_s[1:] + log.time_s[:-1])
+    assert one.antenna_m is not None
+    off = one.antenna_m - few.truth_m
+
+    def of_position(wanted: Array) -> Array:
+        place = np.stack([np.interp(wanted, times, places[:, k]) for k in range(3)], axis=1)
+        return place + swung - few.truth_m
+
+    def of_attitude(wanted: Array) -> Array:
+        near = np.searchsorted(middle, wanted)
+        ahead = (wanted - log.time_s[near])[:, None] * held.rate_radps[near]
+        return off + rotate(turns[near] @ rotation_exp(ahead), vector)
+
+    found = [_best("position", few.time_s, of_position, log)]
+    if np.any(vector):
+        found.append(_best("attitude", few.time_s, of_attitude, log))
+    return found
+
+
+def _best(sensor: Target, stamps_s: Array, error: Callable[[Array], Array], log: Log) -> Shift:
+    most = min(MOST_S, (1.0 - LEAST_INSIDE) * log.duration_s)
+    first, last = log.time_s[0], log.time_s[-1]
+
+    def size(seconds: float) -> float:
+        wanted = stamps_s + seconds
+        inside = (wanted >= first) & (wanted <= last)
+        if np.mean(inside) < LEAST_INSIDE:
+            return np.inf
+        left = error(wanted)[inside]
+        return float(np.median(np.sqrt(np.nansum(left**2, axis=1))))
+
+    step = max(STEP_S, most / 2000.0)
+    grid = np.arange(-most, most + step, step)
+    for _ in range(TIMES):
+        sizes = [size(float(s)) for s in grid]
+        centre = float(grid[int(np.argmin(sizes))])
+        grid = centre + step * np.linspace(-1.0, 1.0, 2 * FINER + 1)
+        step /= FINER
+    return Shift(sensor, centre, min(sizes))
+
+
+def attitude_restamped(log: Log, seconds: float) -> Log:
+    """The log with every attitude paired with the rows it belongs to; rates go with it."""
+    from scipy.spatial.transform import Rotation, Slerp
+
+    held = log.stages[0]
+    times = np.unique(log.time_s)
+    wanted = log.time_s + seconds
+    inside = (wanted >= times[0]) & (wanted <= times[-1])
+    first = np.searchsorted(log.time_s, times)
+    turns = Slerp(times, Rotation.from_matrix(euler_to_rotation(held.euler_rad[first])))
+    found = turns(np.clip(wanted, times[0], times[-1])).as_matrix()
+    rates = np.stack([np.interp(wanted, log.time_s, held.rate_radps[:, k]) for k in range(3)], 1)
+    moved = replace(held, euler_rad=rotation_to_euler(found), rate_radps=rates)
+    return replace(log, stages=(moved, *log.stages[1:])).rows(inside)
