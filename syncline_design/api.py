@@ -20,6 +20,7 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, load
 
 if TYPE_CHECKING:
+    from syncline_design.auditing.result import Audit
     from syncline_design.choice.options import ResourceName
     from syncline_design.choice.outcome import Road
     from syncline_design.clocks.study import TimingSettings
@@ -37,6 +38,7 @@ __all__ = [
     "Case",
     "NoVerdict",
     "OutOfTime",
+    "audit",
     "check",
     "diagnose",
     "diff",
@@ -202,6 +204,20 @@ def timing(
             return with_spec(found.timing, None)
         means = timing_meaning(_case(spec), found, chosen.kind, "measured", seed)
         return with_spec(found.timing, means)
+
+
+def audit(
+    logs: str | Path | Sequence[str | Path], *, spec: SpecOrPath | None = None, seed: int = 0,
+    time_limit_s: float | None = None,
+) -> Audit:  # fmt: skip
+    """Every fault of the stamps in logs, by name; spec: hold the streams against its tau_crit."""
+    from syncline_design.auditing.run import audit as audit_files
+    from syncline_design.comparison.stamp_meaning import held_against
+
+    seed, files = _seed(seed), _files(logs)
+    with _limited(time_limit_s):
+        found = audit_files(files)
+        return found if spec is None else held_against(found, _case(spec), seed)
 
 
 def reproduce(*, seed: int = 0, time_limit_s: float | None = None) -> Reproduction:

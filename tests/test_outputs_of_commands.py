@@ -24,6 +24,7 @@ COMMANDS = {
                                                  "sarif", "github", "markdown"}),
     "diff": ([TRACK, TRACK], {"json", "html", "markdown", "github"}),
     "reproduce": ([], {"json", "html"}),
+    "audit": (["x.csv"], {"json", "html", "markdown"}),
     "timing": (["x.csv"], {"json", "html", "markdown"}),
 }  # fmt: skip
 

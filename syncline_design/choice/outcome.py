@@ -22,7 +22,6 @@ FixKind = Literal[
     "monte_carlo",
     "platform",
     "timestamping",
-    "facts",
     "worst_case",
     "thu",
     "tvu",

@@ -14,6 +14,7 @@ STUDY_FORMATS: Final = (
 DIFF_FORMATS: Final = ("json", "html", "markdown", "github")
 REPRODUCE_FORMATS: Final = ("json", "html")
 TIMING_FORMATS: Final = ("json", "html", "markdown")
+AUDIT_FORMATS: Final = ("json", "html", "markdown")
 CATALOG_FORMATS: Final = ("json",)
 
 # Pages and binary tables are for files; a bare format name does not send them to a terminal.
@@ -22,6 +23,7 @@ NOT_FOR_A_TERMINAL: Final = ("html", "parquet")
 # Kinds of files and of results that have a JSON Schema.
 FileName = Literal["spec", "catalog", "study"]
 ResultName = Literal[
+    "audit",
     "catalog-check",
     "catalog-entry",
     "catalog-list",

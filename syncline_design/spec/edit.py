@@ -79,6 +79,22 @@ def _pinned_keys(case: Case, pinned: PinnedRole) -> dict[str, Any]:
     return keys
 
 
+def with_timestamping_text(case: Case, errors: Sequence[tuple[int, RoleName, float, str]]) -> str:
+    """The spec with roles' timestamp errors in place: uniform from minus a bound to 0.
+
+    errors: stage index, role, bound [s], and the stream that it was seen in.
+    """
+    changes: list[tuple[KeyPath, dict[str, Any]]] = []
+    for stage, role, bound_s, stream in errors:
+        choice = case.spec.stages[stage].role(role)
+        own = choice.note if choice is not None else ""
+        said = f"timestamping: upper bound from audit of {stream}, transport included"
+        error = {"distribution": "uniform", "low": f"{-bound_s:.6g} s", "high": "0 s"}
+        keys = {"timestamping": {"error": error}, "note": f"{own}; {said}" if own else said}
+        changes.append((("stages", stage, role), keys))
+    return _changed(case, changes, "with the residuals that `audit` found")
+
+
 def with_effects(case: Case, effects: Sequence[EffectChoice]) -> Case:
     """The case with known effects added; its spec is the one that `with_effects_text` writes."""
     spec = case.spec.model_copy(update={"effects": (*case.spec.effects, *effects)})

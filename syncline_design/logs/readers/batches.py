@@ -21,9 +21,7 @@ from syncline_design.logs.readers.stream import (
     Frame,
     Incomplete,
     Nanoseconds,
-    Nature,
     Piece,
-    PointTimes,
     StampColumn,
     Stamps,
     Stream,
@@ -61,8 +59,6 @@ class Facts:
     body: Body = "unknown"
     kind: str = ""
     columns: tuple[str, ...] = ()
-    nature: Nature = "unknown"
-    points: PointTimes | None = None
 
 
 @dataclass(slots=True)
@@ -149,8 +145,6 @@ class BatchRecording(ABC):
             body=facts.body,
             kind=facts.kind,
             columns=facts.columns or tally.columns,
-            nature=facts.nature,
-            points=facts.points,
         )
 
     def samples(self, name: str) -> Iterator[Piece]:

@@ -202,7 +202,6 @@ class PosRecording(BatchRecording):
             primary=header.system or "time",
             notes=tuple(notes),
             kind="RTKLIB " + header.place,
-            nature="measured",
         )
 
 

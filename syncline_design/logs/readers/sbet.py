@@ -122,7 +122,6 @@ class SbetRecording(BatchRecording):
             ),
             body="frd",
             kind="SBET",
-            nature="fused",
         )
 
 

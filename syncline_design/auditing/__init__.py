@@ -1,0 +1,1 @@
+"""What the two times of every message say of its stamps: each fault by name, and what is left."""

@@ -1,0 +1,193 @@
+"""How stamps follow one another: the rhythm of a sensor, messages that are missing from it.
+
+A regular sensor measures at a + k T.  Its stamps show it, however late messages arrive: what moves
+against the rhythm is the clock of the stamps, what does not is transport or the recorder.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from syncline_design.auditing.result import StampFault
+from syncline_design.auditing.series import Array, Mask, Series, scatter, seconds, spread
+
+_UNEVEN: Final = 0.03  # of an interval: from here on a late message may look like a lost one
+REGULAR: Final = 0.35  # of an interval: larger irregularities are no rhythm
+_PLACED: Final = 0.2  # of an interval: how near to its place a message after a loss is
+_LAG: Final = 16
+_STRETCH: Final = 24  # messages over which a rhythm is followed
+_GROWTH: Final = 2.0  # of irregularity over 16 intervals against over one: a rhythm 1, a walk 4
+_HOLE: Final = 0.85  # of an interval: more than a late message
+_WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
+LONG_GAP: Final = 4  # missing in a row; fewer may be single losses
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Cadence:
+    """The rhythm of the good messages' stamps.
+
+    period_s: median interval, of regular stamps the fitted one.  regular: stamps follow a rhythm.
+    jitter_s: scatter of a stamp about it.  steps: intervals between neighbours in whole periods.
+    uneven: whether the intervals vary beyond the clock's own resolution.
+    """
+
+    period_s: float
+    regular: bool
+    jitter_s: float
+    steps: Array
+    interval: Array  # s
+    places: np.ndarray
+
+
+def cadence(series: Series) -> Cadence:
+    places = series.places()
+    interval = seconds(np.diff(series.stamp[places]))
+    forward = interval[interval > 0.0]
+    if forward.size < 4:
+        period = float(np.median(forward)) if forward.size else 0.0
+        return Cadence(period, False, 0.0, np.ones(interval.size), interval, places)
+    period = _period(forward)
+    steps = np.maximum(np.round(interval / period), 0.0)
+    off = interval - steps * period
+    usual = (steps > 0) & (steps < 3)
+    jitter = scatter(off[usual]) / np.sqrt(2.0)
+    within = float(np.mean(np.abs(off[usual]) < REGULAR * period)) if usual.any() else 0.0
+    # how an irregular sensor betrays itself: its intervals do not add up
+    regular = within > 0.93 and not _walks(off, usual, period)
+    return Cadence(period, regular, float(jitter), steps, interval, places)
+
+
+def _period(forward: Array) -> float:
+    """The median interval, made finer by the mean of those that are near it."""
+    middle = float(np.median(forward))
+    near = forward[np.abs(forward - middle) < 0.25 * middle]
+    return float(near.mean()) if near.size > 0.5 * forward.size else middle
+
+
+def _walks(off: Array, usual: Mask, period: float) -> bool:
+    """Whether irregularities add up over 16 intervals instead of making good for one another."""
+    clean = np.where(usual & (np.abs(off) < REGULAR * period), off, 0.0)
+    if clean.size < 4 * _LAG:
+        return False
+    total = np.concatenate([[0.0], np.cumsum(clean)])
+    one, sixteen = scatter(clean), scatter(total[_LAG:] - total[:-_LAG])
+    return sixteen > _WALK * one and sixteen > 0.05 * period
+
+
+def about_rhythm(when: Array) -> Array | None:
+    """How far each message is from an even rhythm of the messages around it [s].
+
+    None where there is no rhythm: irregularities that add up.  Stretches in which messages are
+    missing are left out.
+    """
+    if when.size < 4 * _STRETCH:
+        return None
+    count = np.arange(when.size, dtype=np.float64)
+    usual = float(np.median(when[_LAG:] - when[:-_LAG])) / _LAG
+    dev = when - usual * count
+    one, far = scatter(np.diff(dev)), scatter(dev[_LAG:] - dev[:-_LAG])
+    if usual <= 0.0 or far > _GROWTH * one or one > usual:
+        return None
+    kept = []
+    for piece in np.array_split(dev, when.size // _STRETCH):
+        if np.max(np.abs(np.diff(piece))) < _HOLE * usual:
+            k = np.arange(piece.size) - 0.5 * (piece.size - 1)
+            level = piece - k * float(k @ piece) / float(k @ k)
+            kept.append(level - np.median(level))
+    return np.concatenate(kept) if len(kept) > 3 else None
+
+
+def missing(series: Series, pace: Cadence, level_s: float) -> tuple[StampFault, ...]:
+    """Gaps and single losses: stamps and receipts leave out what should have come.
+
+    level_s: scatter of receipts minus stamps; an interval that only the stamps show is a step.
+    """
+    if pace.interval.size < 8 or pace.period_s <= 0.0:
+        return ()
+    lost = _lost(series, pace, level_s) if pace.regular else _holes(pace)
+    if not lost.any():
+        return ()
+    singles = lost[(lost > 0) & (lost < LONG_GAP)]
+    share = float(singles.sum()) / (pace.interval.size + float(lost.sum()))
+    long_ = (lost >= LONG_GAP) if pace.regular else lost > 0
+    if singles.size > 5 and pace.regular:  # how long a chance run of single losses may be
+        run = LONG_GAP
+        while pace.interval.size * share**run > 0.02 and run < 50:
+            run += 1
+        long_ = lost >= run
+    return (*_gaps(series, pace, long_), *_losses(series, pace, np.where(long_, 0.0, lost)))
+
+
+def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
+    """Missing messages of every interval, those taken out as unusable not counted."""
+    between = np.diff(pace.places) - 1.0
+    lost = np.maximum(pace.steps - 1.0 - between, 0.0)
+    if series.receive is not None:
+        late = seconds(np.diff((series.receive - series.stamp)[pace.places]))
+        shifted = np.abs(late) > np.maximum(6.0 * level_s + 1e-6, 0.5 * lost * pace.period_s)
+        lost[shifted & (late < 0.0)] = 0.0
+    off = np.abs(pace.interval - pace.steps * pace.period_s)
+    lost[off > np.maximum(_PLACED * pace.period_s, 0.02 * pace.interval)] = 0.0
+    if pace.jitter_s > _UNEVEN * pace.period_s:
+        for k in np.flatnonzero(lost):
+            if not _stays(series, pace, int(k)):
+                lost[k] = 0.0
+    return lost
+
+
+def _stays(series: Series, pace: Cadence, k: int) -> bool:
+    """Whether messages after an interval are all later by it, not only the next one."""
+    around = np.arange(max(0, k - 5), min(pace.places.size, k + 7))
+    stamp = series.stamp[pace.places[around]]
+    dev = seconds(stamp - stamp[0]) - (around - around[0]) * pace.period_s
+    after = around > k
+    moved = float(np.median(dev[after]) - np.median(dev[~after]))
+    return moved > 0.6 * pace.period_s
+
+
+def _holes(pace: Cadence) -> Array:
+    """Of irregular stamps: intervals far beyond the tail of all others."""
+    usual = float(np.percentile(pace.interval, 99.0))
+    second = np.sort(pace.interval)[-min(pace.interval.size, 1 + pace.interval.size // 200)]
+    far = pace.interval > max(6.0 * usual, 4.0 * float(second) if pace.interval.size > 400 else 0.0)
+    return np.where(far, np.round(pace.interval / pace.period_s), 0.0)
+
+
+def _gaps(series: Series, pace: Cadence, long_: Mask) -> tuple[StampFault, ...]:
+    times = series.seconds[pace.places]
+    return tuple(
+        StampFault(
+            "gap", {"interval_s": float(pace.interval[k])}, float(times[k]), float(times[k + 1]),
+            f"no message for {pace.interval[k]:.4g} s; usually one every {pace.period_s:.4g} s",
+        )
+        for k in np.flatnonzero(long_)
+    )  # fmt: skip
+
+
+def _losses(series: Series, pace: Cadence, lost: Array) -> tuple[StampFault, ...]:
+    count = int(lost.sum())
+    if not count:
+        return ()
+    places = np.flatnonzero(lost)
+    times = series.seconds[pace.places]
+    share = count / (pace.interval.size + 1 + count)
+    return (StampFault(
+        "lost_messages", {"count": float(count)}, float(times[places[0]]),
+        float(times[places[-1] + 1]),
+        f"{count} of {pace.interval.size + 1 + count} messages ({100 * share:.2g} %) are missing "
+        f"from the rhythm of {pace.period_s:.4g} s, {places.size} times",
+    ),)  # fmt: skip
+
+
+def level_scatter(series: Series) -> float:
+    """Interquartile range of receipt minus stamp after its slow changes are taken off [s]."""
+    if series.receive is None:
+        return 0.0
+    places = series.places()
+    late = seconds(series.receive[places] - series.stamp[places])
+    if late.size < 8:
+        return spread(late)
+    return float(min(spread(late), 1.0 * spread(np.diff(late))))

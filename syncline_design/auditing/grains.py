@@ -1,0 +1,172 @@
+"""Stamps on a grid: cut off to milliseconds and the like, or taken when a packet comes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from syncline_design.auditing.cadence import Cadence, about_rhythm
+from syncline_design.auditing.result import Consequence, StampFault
+from syncline_design.auditing.series import NS, Array, Series, spread
+
+GRAINS: Final = (
+    10**9, 5 * 10**8, 2 * 10**8, 10**8, 5 * 10**7, 2 * 10**7, 15_625_000, 10**7, 5 * 10**6,
+    2 * 10**6, 10**6,
+)  # fmt: skip
+ROUNDING_NS: Final = 600  # of a file that keeps microseconds, or doubles of Unix seconds
+TIMERS: Final = (0.016, 0.008, 0.004, 0.005, 0.01, 0.02, 0.0125, 0.025, 0.032, 0.04, 0.05, 0.1)
+_COHERENT: Final = 0.75
+_BUNCHED: Final = 0.25  # share of neighbours that come together
+_TOGETHER: Final = 0.1  # of the mean interval
+
+
+@dataclass(frozen=True, slots=True)
+class Grain:
+    """Stamps on a grid of so many seconds, as a fault."""
+
+    fault: StampFault
+    size_s: float
+    explains_duplicates: bool
+
+
+def truncated(series: Series, pace: Cadence, file_step_ns: float) -> Grain | None:
+    """All stamps on a grid of a millisecond or more, while the sensor keeps none of it.
+
+    A sensor that measures at exact epochs is on the grid as well, but its intervals are all alike:
+    what shows truncation is intervals that alternate between neighbouring places of the grid.
+    """
+    stamp = series.stamp[pace.places]
+    if stamp.size < 20:
+        return None
+    for grain in GRAINS:
+        if grain <= file_step_ns:
+            return None
+        rest = stamp % grain
+        rest = np.minimum(rest, grain - rest)
+        if float(np.mean(rest <= ROUNDING_NS)) < 0.995:
+            continue
+        if not _alternates(stamp, grain) or _ticks(stamp, grain):
+            return None
+        return _grain(series, pace, grain)
+    return None
+
+
+def _ticks(stamp: np.ndarray, grain: int) -> bool:
+    """Whether stamps on a grid are in truth ticks of a slower timer, such as 16 ms."""
+    timers = [round(t * NS) for t in TIMERS if round(t * NS) not in GRAINS]
+    return any(t > grain and not np.any((stamp - stamp[0]) % t) for t in timers)
+
+
+def _alternates(stamp: np.ndarray, grain: int) -> bool:
+    counts = np.round(np.diff(stamp) / grain)
+    values, often = np.unique(counts, return_counts=True)
+    usual = values[int(np.argmax(often))]
+    if usual == 0:
+        return True
+    near = (np.abs(counts - usual) <= 1) & (counts != usual)
+    multiples = counts % usual == 0
+    odd = int(np.sum(near & ~multiples)) + (int(np.sum(near)) if usual == 1 else 0)
+    if usual == 1:  # an interval of 0 or 2 grains beside 1: 0 cannot be a lost message
+        odd = int(np.sum(counts == 0))
+    return odd >= 3
+
+
+def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
+    stamp = series.stamp[pace.places]
+    same = int(np.sum(np.diff(stamp) == 0))
+    twice = Consequence("duplicates", {"count": float(same)},
+                        f"{same} messages within the resolution of the one before")  # fmt: skip
+    size = grain / NS
+    name = " (1/64 s, the tick of a system clock)" if grain == 15_625_000 else ""
+    fault = StampFault(
+        "truncated_stamps", {"resolution_s": size}, None, None,
+        f"every stamp is a multiple of {size * 1e3:.6g} ms{name}, though messages are not",
+        (twice,) if same else (),
+    )  # fmt: skip
+    return Grain(fault, size, same > 0)
+
+
+def packetised(series: Series, pace: Cadence) -> Grain | None:
+    """Stamps that come in bunches, or on the grid of a timer with a phase of its own."""
+    stamp = series.stamp[pace.places]
+    if stamp.size < 40:
+        return None
+    when = (stamp - stamp[0]) / NS
+    interval = np.diff(when)
+    mean = float(when[-1]) / (when.size - 1)
+    if mean <= 0.0:
+        return None
+    together = interval < _TOGETHER * mean
+    bunched = float(np.mean(together))
+    if bunched >= _BUNCHED:
+        return _bunches(series, when, interval, together, pace)
+    return _timer(series, when, interval, pace)
+
+
+def _bunches(
+    series: Series, when: Array, interval: Array, together: np.ndarray, pace: Cadence
+) -> Grain | None:
+    heads = when[np.concatenate([[True], ~together])]
+    apart = np.diff(heads)
+    if apart.size < 20:
+        return None
+    sizes = np.diff(np.flatnonzero(np.concatenate([[True], ~together])))
+    size, often = np.unique(sizes, return_counts=True)
+    constant = often.max() > 0.97 * sizes.size
+    timer = best_timer(heads)
+    if timer is None and (sizes.mean() < 1.8 or spread(apart) > 0.3 * np.median(apart)):
+        return None  # messages that wait for one another
+    if constant and int(size[int(np.argmax(often))]) > 1 and timer not in (0.016, 0.008, 0.004):
+        return None  # several messages of one epoch, as designed
+    grid = timer if timer is not None else float(np.median(apart))
+    return _packets(series, interval, grid, timer is not None, float(sizes.mean()), pace)
+
+
+def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain | None:
+    """A slow stream: every stamp is a tick of the timer, its intervals alternate."""
+    about = about_rhythm(when)
+    if about is None:
+        return None
+    period = float(interval[interval < 2.5 * np.median(interval)].mean())
+    uneven = float(np.percentile(about, 95) - np.percentile(about, 5))
+    if uneven < 0.5 * min(TIMERS):
+        return None
+    timer = best_timer(when)
+    if timer is None or uneven < 0.5 * timer or timer > 1.5 * period:
+        return None
+    return _packets(series, interval, timer, True, 1.0, pace)
+
+
+def best_timer(when: Array) -> float | None:
+    """The timer that all moments are ticks of; the longest of those that fit best."""
+    fits = {t: _coherence(when, t) for t in TIMERS}
+    best = max(fits.values())
+    if best < _COHERENT:
+        return None
+    return max(t for t, c in fits.items() if c > best - 0.03)
+
+
+def _coherence(when: Array, period: float) -> float:
+    """|mean exp(2 pi i t / T)|: 1 where all moments are ticks of T; the best of short stretches,
+    for a timer that drifts."""
+    turns = np.exp(2j * np.pi * (when / period))
+    pieces = np.array_split(turns, max(1, min(8, turns.size // 40)))
+    return float(np.mean([abs(np.mean(piece)) for piece in pieces]))
+
+
+def _packets(
+    series: Series, interval: Array, grid: float, sure: bool, size: float, pace: Cadence
+) -> Grain:
+    same = int(np.sum(interval == 0.0))
+    twice = Consequence("duplicates", {"count": float(same)},
+                        f"{same} messages share their packet's stamp")  # fmt: skip
+    known = " (the latency timer of FTDI's serial chips)" if abs(grid - 0.016) < 1e-5 else ""
+    words = f"stamps are ticks of {grid * 1e3:.4g} ms{known}" if sure else (
+        f"stamps come in bunches, {grid * 1e3:.4g} ms apart in the median")  # fmt: skip
+    if size > 1.05:
+        words += f", {size:.3g} messages to a packet"
+    fault = StampFault("packetised", {"interval_s": grid}, None, None, words,
+                       (twice,) if same else ())  # fmt: skip
+    return Grain(fault, grid, same > 0)

@@ -1,0 +1,351 @@
+"""Which shapes a clock's offset has over a log: drift, steps, episodes, a lock that settles.
+
+The low quantiles of stretches are fitted by least squares with one shape after another, each time
+the one that explains most, as long as it explains far more than noise would.  Shapes are those that
+clocks have; an episode of longer delays has another spread and was left out before.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import Final, Literal
+
+import numpy as np
+
+from syncline_design.auditing.blocks import Blocks
+from syncline_design.auditing.series import Array, Mask
+from syncline_design.machine.deadline import in_force
+
+Kind = Literal["drift", "step", "episode", "relock", "holdover"]
+_LEAST_BLOCKS: Final = 3  # of an episode
+MOST_SHAPES: Final = 6
+SURE: Final = 8.0  # sigma of a size that is believed
+_PENALTY: Final = {"drift": 0.0, "step": 6.0, "episode": 14.0, "relock": 14.0, "holdover": 20.0}
+_EXTRA: Final = 0.004  # of what a shape explains: its freedom also fits what is nearly right
+_STEP_SHARE: Final = 0.25  # of the delays' spread: smaller steps are not named
+_DRIFT_SHARE: Final = 0.4  # of the delays' spread, over the whole log
+_KNOTS: Final = 36
+_SETTLINGS: Final = (0.01, 0.02, 0.04, 0.08, 0.16)  # of the log
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """An offset over time; size: seconds of receipt minus stamp (drift: over the whole log).
+
+    begin_s, end_s: of a step its place and the end of the log; settle_s: time constant.
+    """
+
+    kind: Kind
+    size_s: float = 0.0
+    sigma_s: float = 0.0
+    begin_s: float = 0.0
+    end_s: float = 0.0
+    settle_s: float = 0.0
+
+    def at(self, time_s: Array) -> Array:
+        """Its course for a size of 1."""
+        if self.kind == "drift":
+            return (time_s - self.begin_s) / (self.end_s - self.begin_s)
+        if self.kind == "step":
+            return np.where(time_s >= self.begin_s, 1.0, 0.0)
+        if self.kind == "episode":
+            return np.where((time_s >= self.begin_s) & (time_s < self.end_s), 1.0, 0.0)
+        back = np.exp(-np.maximum(time_s - self.end_s, 0.0) / self.settle_s)
+        if self.kind == "relock":
+            return np.where(time_s >= self.begin_s, back, 0.0)
+        away = np.clip((time_s - self.begin_s) / (self.end_s - self.begin_s), 0.0, 1.0)
+        return np.asarray(away * back)
+
+
+Family = tuple[list[Shape], Array]
+
+
+def course(shapes: tuple[Shape, ...], time_s: Array) -> Array:
+    """Sum of all shapes [s]."""
+    total = np.zeros(time_s.size)
+    for shape in shapes:
+        total += shape.size_s * shape.at(time_s)
+    return total
+
+
+def shapes_of(blocks: Blocks, *, least_s: float = 0.0) -> tuple[Shape, ...]:
+    """The shapes that the levels show; least_s: smaller ones cannot be told from transport."""
+    use = blocks.usable
+    time_s, low = blocks.time_s[use], blocks.low_s[use]
+    if time_s.size < 8:
+        return ()
+    found: tuple[Shape, ...] = ()
+    families = tuple(_families(time_s))
+    for _ in range(MOST_SHAPES):
+        in_force().check()
+        keep = ~_straddling(found, time_s, blocks.length_s)
+        best = _best(time_s[keep], low[keep], found, blocks, families, keep)
+        if best is None:
+            break
+        better = (*found, _refined(time_s[keep], low[keep], found, best))
+        grown = polished(better, [True] * len(better), blocks)
+        if not _believed(grown[-1], blocks, least_s):
+            break
+        found = grown
+    keep = ~_straddling(found, time_s, blocks.length_s)
+    kept = _pruned(time_s[keep], low[keep], found, blocks)
+    return tuple(s for s in kept if _believed(s, blocks, least_s))
+
+
+def _believed(shape: Shape, blocks: Blocks, least_s: float) -> bool:
+    share = _DRIFT_SHARE if shape.kind == "drift" else _STEP_SHARE
+    floor = max(share * blocks.spread_s, least_s, SURE * shape.sigma_s)
+    return abs(shape.size_s) > floor and (shape.kind in ("drift", "step") or _seen(shape, blocks))
+
+
+def _seen(shape: Shape, blocks: Blocks) -> bool:
+    """Whether what an episode does is seen in enough blocks, and not while the host was busy."""
+    away = np.abs(shape.at(blocks.time_s)) > 0.1
+    return int(away.sum()) >= _LEAST_BLOCKS and float(np.mean(blocks.usable[away])) > 0.75
+
+
+def _columns(shapes: tuple[Shape, ...], time_s: Array) -> Array:
+    return np.stack([np.ones(time_s.size), *(s.at(time_s) for s in shapes)], axis=1)
+
+
+def _fitted(
+    time_s: Array, low: Array, shapes: tuple[Shape, ...], blocks: Blocks
+) -> tuple[Shape, ...]:
+    """All sizes anew, with what they are worth."""
+    columns = _columns(shapes, time_s)
+    sizes, *_ = np.linalg.lstsq(columns, low, rcond=None)
+    rest = low - columns @ sizes
+    noise = max(blocks.noise_s, float(np.sqrt(np.mean(np.minimum(rest**2, 9 * blocks.noise_s**2)))))
+    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(columns.T @ columns)), 0.0)) * noise
+    return tuple(
+        replace(shape, size_s=float(sizes[k + 1]), sigma_s=float(spread[k + 1]))
+        for k, shape in enumerate(shapes)
+    )
+
+
+def _rest(time_s: Array, low: Array, shapes: tuple[Shape, ...]) -> Array:
+    columns = _columns(shapes, time_s)
+    sizes, *_ = np.linalg.lstsq(columns, low, rcond=None)
+    return np.asarray(low - columns @ sizes)
+
+
+def _best(
+    time_s: Array, low: Array, found: tuple[Shape, ...], blocks: Blocks,
+    families: tuple[Family, ...], keep: Mask,
+) -> Shape | None:  # fmt: skip
+    """The shape that explains most of what is left, in units of the noise."""
+    base = np.linalg.qr(_columns(found, time_s))[0]
+    rest = low - base @ (base.T @ low)
+    best, gained = None, SURE**2
+    for shapes, all_courses in families:
+        courses = all_courses[:, keep]
+        own = courses - (courses @ base) @ base.T
+        norm = np.einsum("ij,ij->i", own, own)
+        usable = norm > 0.5
+        gain = np.zeros(norm.size)
+        gain[usable] = (own[usable] @ rest) ** 2 / norm[usable] / blocks.noise_s**2
+        k = int(np.argmax(gain))
+        penalty = _PENALTY[shapes[k].kind]
+        worth = float(gain[k]) * (1.0 - _EXTRA * penalty) - penalty
+        if worth > gained:
+            best, gained = shapes[k], worth
+    return best
+
+
+def _families(time_s: Array) -> Iterator[Family]:
+    first, last = float(time_s[0]), float(time_s[-1])
+    edges = 0.5 * (time_s[1:] + time_s[:-1])
+    drift = [Shape("drift", begin_s=first, end_s=last)]
+    yield drift, _courses(drift, time_s)
+    steps = [Shape("step", begin_s=float(e), end_s=last) for e in edges[1:-1]]
+    yield steps, _courses(steps, time_s)
+    knots = edges[:: max(1, edges.size // _KNOTS)]
+    episodes = [Shape("episode", begin_s=float(a), end_s=float(b))
+                for i, a in enumerate(knots) for b in knots[i + 1 :]]  # fmt: skip
+    yield episodes, _courses(episodes, time_s)
+    length = last - first
+    relocks = [
+        Shape("relock", begin_s=float(e), end_s=float(e), settle_s=share * length)
+        for e in edges[1:-3] for share in _SETTLINGS
+    ]  # fmt: skip
+    yield relocks, _courses(relocks, time_s)
+    coarse = knots[::2]
+    holdovers = [
+        Shape("holdover", begin_s=float(a), end_s=float(b), settle_s=share * length)
+        for i, a in enumerate(coarse) for b in coarse[i + 1 : -1] for share in _SETTLINGS[1:4]
+    ]  # fmt: skip
+    if holdovers:
+        yield holdovers, _courses(holdovers, time_s)
+
+
+def _courses(shapes: list[Shape], time_s: Array) -> Array:
+    """One row a shape."""
+    begin = np.asarray([s.begin_s for s in shapes])[:, None]
+    end = np.asarray([s.end_s for s in shapes])[:, None]
+    settle = np.asarray([s.settle_s or 1.0 for s in shapes])[:, None]
+    row = time_s[None, :]
+    kind = shapes[0].kind
+    if kind == "drift":
+        return np.asarray((row - begin) / (end - begin))
+    if kind == "step":
+        return np.where(row >= begin, 1.0, 0.0)
+    if kind == "episode":
+        return np.where((row >= begin) & (row < end), 1.0, 0.0)
+    back = np.exp(-np.maximum(row - end, 0.0) / settle)
+    if kind == "relock":
+        return np.where(row >= begin, back, 0.0)
+    return np.asarray(np.clip((row - begin) / (end - begin), 0.0, 1.0) * back)
+
+
+def _refined(time_s: Array, low: Array, found: tuple[Shape, ...], shape: Shape) -> Shape:
+    """Begin, end and settling of a shape, made finer one after another."""
+    if shape.kind == "drift":
+        return shape
+    base = np.linalg.qr(_columns(found, time_s))[0]
+    rest = low - base @ (base.T @ low)
+    width = float(np.median(np.diff(time_s)))
+    knot = max(width, float(time_s[-1] - time_s[0]) / _KNOTS)
+    best, gained = shape, _gain(shape, time_s, base, rest)
+    for scale in (1.0, 0.5, 0.25):
+        for trial in list(_around(best, scale * knot, scale)):
+            gain = _gain(trial, time_s, base, rest)
+            if gain > gained * (1.0 + 1e-9):
+                best, gained = trial, gain
+    return best
+
+
+def _around(shape: Shape, width: float, scale: float) -> Iterator[Shape]:
+    moves = (-2.0, -1.0, 0.0, 1.0, 2.0)
+    if shape.kind == "step":
+        return
+    if shape.kind == "relock":
+        for factor in (0.55, 0.75, 0.9, 1.1, 1.35, 1.8):
+            settle = shape.settle_s * (1.0 + (factor - 1.0) * scale)
+            for move in (-0.5, 0.0, 0.5):
+                begin = shape.begin_s + move * width
+                yield replace(shape, begin_s=begin, end_s=begin, settle_s=settle)
+        return
+    for a in moves:
+        for b in moves:
+            begin, end = shape.begin_s + a * width, shape.end_s + b * width
+            if end - begin < 0.5 * width:
+                continue
+            for factor in (0.6, 1.0, 1.6) if shape.kind == "holdover" else (1.0,):
+                settle = shape.settle_s * (1.0 + (factor - 1.0) * scale)
+                yield replace(shape, begin_s=begin, end_s=end, settle_s=settle)
+
+
+def _gain(shape: Shape, time_s: Array, base: Array, rest: Array) -> float:
+    own = shape.at(time_s)
+    own = own - base @ (base.T @ own)
+    norm = float(own @ own)
+    return float(own @ rest) ** 2 / norm if norm > 0.5 else 0.0
+
+
+def _pruned(
+    time_s: Array, low: Array, shapes: tuple[Shape, ...], blocks: Blocks
+) -> tuple[Shape, ...]:
+    """Shapes that later ones made needless are left out."""
+    kept = shapes
+    changed = True
+    while changed and kept:
+        changed = False
+        kept = _fitted(time_s, low, kept, blocks)
+        full = float(np.sum(_rest(time_s, low, kept) ** 2))
+        for shape in kept:
+            others = tuple(s for s in kept if s is not shape)
+            worse = float(np.sum(_rest(time_s, low, others) ** 2)) - full
+            if worse < SURE**2 * blocks.noise_s**2:
+                kept, changed = others, True
+                break
+    return kept
+
+
+def polished(shapes: tuple[Shape, ...], fixed: Sequence[bool], blocks: Blocks) -> tuple[Shape, ...]:
+    """Sizes and time constants by robust least squares, begins kept where they are known.
+
+    Blocks in which something begins or ends hold both sides of it and are left out.
+    """
+    from scipy.optimize import least_squares
+
+    curved = [k for k, s in enumerate(shapes) if s.kind in ("relock", "holdover")]
+    use = blocks.usable & ~_straddling(shapes, blocks.time_s, 0.5 * blocks.length_s)
+    time_s, low = blocks.time_s[use], blocks.low_s[use]
+    if not curved:
+        return _fitted(time_s, low, shapes, blocks)
+    start, scale = _free(shapes, fixed, blocks)
+    if time_s.size < start.size + len(shapes) + 4:
+        return _fitted(time_s, low, shapes, blocks)
+
+    limits = math.log(blocks.length_s), math.log(float(np.ptp(time_s)))
+
+    def rest(values: Array) -> Array:
+        moved = _set(shapes, fixed, start + values * scale, limits)
+        return _rest(time_s, low, moved) / blocks.noise_s
+
+    found = least_squares(rest, np.zeros(start.size), loss="soft_l1", f_scale=2.0, max_nfev=60)
+    best = _set(shapes, fixed, start + found.x * scale, limits)
+    return _fitted(time_s, low, best, blocks)
+
+
+def _straddling(shapes: tuple[Shape, ...], time_s: Array, within_s: float) -> Mask:
+    """Blocks near a jump: they hold both sides of it."""
+    out = np.zeros(time_s.size, bool)
+    for shape in shapes:
+        edges = {"step": (shape.begin_s,), "relock": (shape.begin_s,),
+                 "episode": (shape.begin_s, shape.end_s)}  # fmt: skip
+        for edge in edges.get(shape.kind, ()):
+            out |= np.abs(time_s - edge) <= within_s
+    return out
+
+
+def _free(
+    shapes: tuple[Shape, ...], fixed: Sequence[bool], blocks: Blocks
+) -> tuple[Array, Array]:  # fmt: skip
+    """What is free of curved shapes, and how far a unit of it goes."""
+    values, scale = [], []
+    for shape, known in zip(shapes, fixed, strict=True):
+        if shape.kind in ("relock", "holdover"):
+            values.append(math.log(shape.settle_s))
+            scale.append(0.1)
+            if not known:
+                values.append(shape.end_s)
+                scale.append(blocks.length_s)
+            if shape.kind == "holdover":
+                values.append(shape.begin_s)
+                scale.append(blocks.length_s)
+    return np.asarray(values), np.asarray(scale)
+
+
+def _set(
+    shapes: tuple[Shape, ...], fixed: Sequence[bool], values: Array, limits: tuple[float, float]
+) -> tuple[Shape, ...]:
+    """The shapes with those values, in the order of `_free`; limits: of log settling times."""
+    left = [float(v) for v in values]
+    shortest, longest = limits
+    out = []
+    for shape, known in zip(shapes, fixed, strict=True):
+        if shape.kind in ("relock", "holdover"):
+            settle = math.exp(min(max(left.pop(0), shortest), longest))
+            end = shape.end_s if known else left.pop(0)
+            begin = min(left.pop(0), end - 1e-6) if shape.kind == "holdover" else end
+            shape = replace(shape, settle_s=settle, begin_s=begin, end_s=end)
+        out.append(shape)
+    return tuple(out)
+
+
+def smallest(blocks: Blocks) -> tuple[float, float]:
+    """The smallest step in the middle of the log [s] and drift over it [s] that would be named."""
+    time_s = blocks.time_s[blocks.usable]
+    if time_s.size < 8:
+        return np.inf, np.inf
+    middle = float(np.median(time_s))
+    step = _fitted(time_s, 0.0 * time_s, (Shape("step", begin_s=middle),), blocks)[0].sigma_s
+    drift = Shape("drift", begin_s=float(time_s[0]), end_s=float(time_s[-1]))
+    over = _fitted(time_s, 0.0 * time_s, (drift,), blocks)[0].sigma_s
+    return (
+        max(SURE * step, _STEP_SHARE * blocks.spread_s),
+        max(SURE * over, _DRIFT_SHARE * blocks.spread_s),
+    )

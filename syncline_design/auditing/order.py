@@ -1,0 +1,242 @@
+"""Stamps that are missing, that come twice, that go back, and counters that begin anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.auditing.result import Consequence, StampFault
+from syncline_design.auditing.series import NS, Mask, Series, scatter, seconds
+from syncline_design.logs.readers.stream import UNSET
+
+# where counters of devices begin anew [ns]: 16, 24, 31 and 32 bits of ns, us, ms and 10 us
+_BITS: Final = tuple(
+    2**bits * unit for bits in (16, 24, 31, 32) for unit in (1, 1000, 10_000, 1_000_000)
+)
+_CALENDAR: Final = tuple(int(s * NS) for s in (60, 3600, 43_200, 86_400, 604_800))
+WRAPS: Final = tuple(sorted(w for w in {*_BITS, *_CALENDAR} if w > 100_000_000))
+LONGEST_SPIKE: Final = 5  # messages that go back and return
+MOST_SPIKES: Final = 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class Repaired:
+    """A series after one kind of fault was taken out, and what was found."""
+
+    series: Series
+    faults: tuple[StampFault, ...] = ()
+
+
+def without_unset(series: Series) -> Repaired:
+    """Stamps of zero among others that are far from it, and those that the reader calls unset."""
+    stamp = series.stamp
+    zero = (stamp == 0) | (stamp == UNSET)
+    others = stamp[~zero]
+    near = others.size and float(np.median(np.abs(others))) < 5 * NS
+    if near:  # a counter that begins here passes zero once
+        zero = stamp == UNSET
+        isolated = _runs_of(stamp == 0)
+        for begin, end in isolated:
+            if end - begin > 2:
+                zero[begin:end] = True
+    count = int(zero.sum())
+    if not count:
+        return Repaired(series)
+    whole = count == stamp.size
+    places = np.flatnonzero(zero)
+    times = series.seconds
+    fault = StampFault(
+        "unset_stamps", {"count": float(count)}, None if whole else float(times[places[0]]),
+        None if whole else float(times[places[-1]]),
+        f"{count} of {stamp.size} stamps are zero, missing or no number",
+    )  # fmt: skip
+    return Repaired(replace(series, good=series.good & ~zero), (fault,))
+
+
+def _runs_of(mask: Mask) -> Iterator[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return ((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
+def unwrapped(series: Series) -> Repaired:
+    """Counters made continuous.
+
+    A wrap: the stamp falls by the counter's range (known, or the same at every fall) against the
+    receipt, and stays inside that range.
+    """
+    places = series.places()
+    stamp = series.stamp[places]
+    change = np.diff(stamp)
+    falls = np.flatnonzero(change < 0)
+    if not falls.size:
+        return Repaired(series)
+    expected = _expected(series, places)
+    fallen = (expected - change)[falls]
+    tolerance = _tolerance(change - expected)
+    found = _range(fallen, tolerance, stamp)
+    if found is None:
+        return Repaired(series)
+    wrap, matching = found
+    turns = np.zeros(stamp.size, np.int64)
+    turns[falls[matching] + 1] = 1
+    whole = series.stamp.copy()
+    whole[places] = stamp + np.cumsum(turns) * wrap
+    times = series.seconds[places]
+    at = times[falls[matching] + 1]
+    count = int(matching.sum())
+    said = "once" if count == 1 else f"{count} times, each time"
+    back = Consequence("backward_jump", {"count": float(count), "seconds": -wrap / NS},
+                       "the stamp goes back where the counter begins anew")  # fmt: skip
+    fault = StampFault(
+        "counter_wrap", {"wrap_s": wrap / NS, "count": float(count)}, float(at[0]), float(at[-1]),
+        f"stamps fall by {wrap / NS:.9g} s {said} while receipts go on"
+        + (f": {_words(wrap)}" if _words(wrap) else ""),
+        (back,),
+    )  # fmt: skip
+    return Repaired(replace(series, stamp=whole), (fault,))
+
+
+def _expected(series: Series, places: NDArray[np.intp]) -> NDArray[np.int64]:
+    """How far each stamp should be from the one before: as receipts, else the median interval."""
+    if series.receive is not None:
+        return np.diff(series.receive[places])
+    change = np.diff(series.stamp[places])
+    return np.full(change.size, int(np.median(change)), np.int64)
+
+
+def _tolerance(excess: NDArray[np.int64]) -> float:
+    usual = np.abs(excess[np.abs(excess) < np.quantile(np.abs(excess), 0.98) + 1])
+    return max(1e6, 4.0 * float(usual.max(initial=0)))
+
+
+def _range(
+    fallen: NDArray[np.int64], tolerance: float, stamp: NDArray[np.int64]
+) -> tuple[int, Mask] | None:
+    """The range of a counter whose falls these are, and which of the falls are its wraps."""
+    for wrap in WRAPS:
+        matching = np.abs(fallen - wrap) < min(tolerance, 0.05 * wrap)
+        inside = bool(np.all((stamp >= 0) & (stamp < wrap)))
+        odd = wrap not in _CALENDAR and wrap > 4 * NS and bool(matching.all())
+        if matching.any() and (inside or odd):
+            return wrap, matching
+    size = int(np.median(fallen))
+    same = np.abs(fallen - size) < max(1e3, 1e-6 * size)
+    inside = bool(np.all((stamp >= 0) & (stamp <= size)))
+    if fallen.size > 1 and same.all() and inside and size > 0:
+        return size, same
+    return None
+
+
+def _words(wrap: int) -> str:
+    units = ((1, "ns"), (1000, "us"), (10_000, "10 us"), (1_000_000, "ms"))
+    for bits in (16, 24, 31, 32):
+        for unit, name in units:
+            if 2**bits * unit == wrap:
+                return f"{bits} bits of {name}"
+    names = {60: "a minute", 3600: "an hour", 43_200: "half a day", 86_400: "a day",
+             604_800: "a week"}  # fmt: skip
+    return names.get(round(wrap / NS), "") if wrap in _CALENDAR else ""
+
+
+def without_duplicates(series: Series) -> Repaired:
+    """Messages with the stamp of the one before."""
+    places = series.places()
+    same = np.concatenate([[False], np.diff(series.stamp[places]) == 0])
+    count = int(same.sum())
+    if not count:
+        return Repaired(series)
+    good = series.good.copy()
+    good[places[same]] = False
+    times = series.seconds[places[same]]
+    fault = StampFault(
+        "duplicates", {"count": float(count)}, float(times[0]), float(times[-1]),
+        f"{count} messages carry the stamp of the message before",
+    )  # fmt: skip
+    return Repaired(replace(series, good=good), (fault,))
+
+
+def without_spikes(series: Series) -> Repaired:
+    """Single messages whose stamps are out of order: back and at once forward again."""
+    places = series.places()
+    stamp = series.stamp[places]
+    falls = np.flatnonzero(np.diff(stamp) < 0)
+    if not falls.size:
+        return Repaired(series)
+    out = np.zeros(stamp.size, bool)
+    late = _lateness(series, places)
+    count, deepest = 0, 0
+    for fall in falls[:MOST_SPIKES]:
+        span = _spike(stamp, int(fall), out)
+        if span is None or not _returns(late, span):
+            continue
+        count += 1
+        deepest = min(deepest, int(stamp[fall + 1] - stamp[fall]))
+        out[span] = True
+    if not count:
+        return Repaired(series)
+    good = series.good.copy()
+    good[places[out]] = False
+    times = series.seconds[places[out]]
+    fault = StampFault(
+        "backward_jump", {"count": float(count), "seconds": deepest / NS}, float(times[0]),
+        float(times[-1]), f"{count} times a stamp lies before the one of the message before, by "
+        f"up to {-deepest / NS:.6g} s, and the next go on as if nothing were",
+    )  # fmt: skip
+    return Repaired(replace(series, good=good), (fault,))
+
+
+def _spike(stamp: NDArray[np.int64], fall: int, out: Mask) -> slice | None:
+    """The messages to leave out so that stamps rise again; None where they stay behind."""
+    for length in range(1, LONGEST_SPIKE + 1):
+        after = fall + 1 + length
+        if after >= stamp.size:
+            return slice(fall + 1, stamp.size) if length <= 2 else None
+        if stamp[after] >= stamp[fall]:
+            return slice(fall + 1, after)
+        before = fall - length
+        if before < 0:
+            continue
+        if stamp[fall + 1] >= stamp[before] and not out[before]:
+            return slice(before + 1, fall + 1)
+    return None
+
+
+def _lateness(series: Series, places: NDArray[np.intp]) -> NDArray[np.float64]:
+    """How late each message is against its stamp [s]; without receipts against an even rhythm."""
+    stamp = series.stamp[places]
+    if series.receive is not None:
+        return seconds(series.receive[places] - stamp)
+    usual = float(np.median(np.diff(stamp)))
+    return np.asarray((np.arange(stamp.size) * usual - (stamp - stamp[0])) / NS)
+
+
+def _returns(late: NDArray[np.float64], span: slice) -> bool:
+    """Whether messages after a spike are as late as those before it."""
+    before = late[max(0, span.start - 5) : span.start]
+    after = late[span.stop : span.stop + 5]
+    if not before.size or not after.size:
+        return True
+    away = abs(float(np.median(late[span])) - float(np.median(before)))
+    return abs(float(np.median(after)) - float(np.median(before))) < 0.5 * away
+
+
+def remaining_falls(series: Series) -> StampFault | None:
+    """Stamps that went back and stayed behind, where no other cause was found."""
+    places = series.places()
+    change = np.diff(series.stamp[places])
+    noise = 0.0 if change.size < 3 else scatter(seconds(change))
+    falls = np.flatnonzero(seconds(change) < -min(1e-9, noise))
+    if not falls.size:
+        return None
+    times = series.seconds[places]
+    deepest = int(change[falls].min())
+    return StampFault(
+        "backward_jump", {"count": float(falls.size), "seconds": deepest / NS},
+        float(times[falls[0] + 1]), float(times[falls[-1] + 1]),
+        f"{falls.size} times a stamp lies before the one of the message before, by up to "
+        f"{-deepest / NS:.6g} s",
+    )  # fmt: skip

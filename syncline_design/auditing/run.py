@@ -1,0 +1,212 @@
+"""Files to an audit: opened by content, every stream examined, streams held against each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from syncline_design import __version__
+from syncline_design.auditing.result import (
+    Audit,
+    IncompleteFile,
+    ResidualTime,
+    SmallestSeen,
+    StampFault,
+    StampNames,
+    StreamAudit,
+)
+from syncline_design.auditing.stream import Examined, examined
+from syncline_design.auditing.together import held_together
+from syncline_design.logs.readers import open_recording
+from syncline_design.logs.readers.stream import UNSET, Incomplete, Stream
+from syncline_design.machine.deadline import in_force
+from syncline_design.machine.input_files import FileRead, content_of, note_read
+from syncline_design.spec.load import BadInput
+
+_RECORDED: Final = ("log time", "record time", "receive", "capture", "arrival")
+_CSV: Final = "CSV"
+
+
+@dataclass(frozen=True, slots=True)
+class _Opened:
+    """One file's streams."""
+
+    path: Path
+    format: str
+    streams: tuple[Stream, ...]
+    incomplete: Incomplete | None
+
+
+def audit(paths: Sequence[Path]) -> Audit:
+    """Audit all files; BadInput where none could be read."""
+    opened, refused, problems = _open(paths)
+    if not opened:
+        raise BadInput(tuple(flaw for error in problems for flaw in error.problems))
+    rows: list[StreamAudit] = []
+    for group in _recordings(opened):
+        rows += _rows(group)
+    damaged = tuple(
+        IncompleteFile(str(o.path), o.incomplete.reason, o.incomplete.messages)
+        for o in opened if o.incomplete is not None
+    )  # fmt: skip
+    return Audit(
+        verdict="sound" if all(row.sound for row in rows) else "faults",
+        streams=tuple(rows),
+        incomplete=damaged[0] if damaged else None,
+        damaged=damaged,
+        unreadable=refused,
+        evidence=tuple(_evidence(o.path) for o in opened),
+        notes=_notes(rows),
+        version=__version__,
+    )
+
+
+def _open(
+    paths: Sequence[Path],
+) -> tuple[list[_Opened], tuple[IncompleteFile, ...], list[BadInput]]:
+    opened: list[_Opened] = []
+    refused: list[IncompleteFile] = []
+    problems: list[BadInput] = []
+    for path in paths:
+        in_force().doing(f"reading {path.name}")
+        try:
+            recording = open_recording(path)
+            streams = recording.streams()
+            note_read(path)
+        except BadInput as error:
+            problems.append(error)
+            refused.append(IncompleteFile(str(path), str(error), 0))
+            continue
+        if not any(one.messages for one in streams):
+            refused.append(IncompleteFile(str(path), "no message in it", 0))
+            problems.append(_nothing(path))
+            continue
+        opened.append(_Opened(path, recording.format, streams, recording.incomplete))
+    return opened, tuple(refused), problems
+
+
+def _nothing(path: Path) -> BadInput:
+    from syncline_design.logs.refusals import refuse
+
+    return refuse(path, "no message in it", expected="at least one message with a stamp")
+
+
+def _recordings(opened: Sequence[_Opened]) -> list[list[_Opened]]:
+    """Files of one recorder: every CSV file is one stream of it, other files stand alone."""
+    tables = [one for one in opened if one.format.startswith(_CSV)]
+    others = [[one] for one in opened if not one.format.startswith(_CSV)]
+    return ([tables] if tables else []) + others
+
+
+def _rows(group: Sequence[_Opened]) -> list[StreamAudit]:
+    in_force().doing("auditing stamps")
+    starts = [s for o in group for stream in o.streams if (s := _first(stream)) is not None]
+    start = min(starts) if starts and max(starts) - min(starts) < 10**15 else None
+    told = [(o, s) for o in group for s in o.streams if _is_told(s)]
+    found = held_together([examined(stream, start) for _, stream in told])
+    rows = [_row(o, one) for (o, _), one in zip(told, found, strict=True)]
+    rows += [_untold(o, s) for o in group for s in o.streams if not _is_told(s)]
+    return sorted(rows, key=lambda row: (row.file, row.name))
+
+
+def _first(stream: Stream) -> int | None:
+    if stream.stamps is None or not stream.messages:
+        return None
+    times = stream.stamps.secondary_ns
+    times = stream.stamps.primary_ns if times is None else times
+    known = times[times != UNSET]
+    return int(known[0]) if known.size else None
+
+
+def _is_told(stream: Stream) -> bool:
+    """Whether messages carry a time of their own."""
+    stamps = stream.stamps
+    if stamps is None or stamps.primary_ns.size == 0:
+        return False
+    return stamps.secondary_ns is not None or not _is_recorders(stamps.primary)
+
+
+def _is_recorders(name: str) -> bool:
+    return name.replace("_", " ").lower().startswith(_RECORDED)
+
+
+def _untold(opened: _Opened, stream: Stream) -> StreamAudit:
+    """A stream whose messages carry no time."""
+    stamps = stream.stamps
+    names = StampNames(None, None) if stamps is None else StampNames(None, stamps.primary)
+    duration = None
+    if stamps is not None and stamps.primary_ns.size > 1:
+        duration = float(np.ptp(stamps.primary_ns)) / 1e9
+    return StreamAudit(
+        name=stream.name, file=str(opened.path), messages=stream.messages, duration_s=duration,
+        rate_hz=(stream.messages - 1) / duration if duration else None, shape="unknown",
+        stamps=names, timeline=stream.timeline, quantity=stream.quantity, faults=(), offset_s=None,
+        residual_s=ResidualTime(None, None, None), smallest_seen=SmallestSeen(None, None),
+        tau_crit_s=None, error_m=None,
+        cannot_show=("anything: its messages carry no stamp of their own",), notes=stream.notes,
+        trace=(), partial=stream.partial,
+    )  # fmt: skip
+
+
+def _row(opened: _Opened, one: Examined) -> StreamAudit:
+    stream = one.stream
+    assert stream.stamps is not None
+    times = one.raw.seconds[one.raw.good]
+    duration = float(times.max() - times.min()) if times.size > 1 else None
+    return StreamAudit(
+        name=stream.name, file=str(opened.path), messages=stream.messages, duration_s=duration,
+        rate_hz=(times.size - 1) / duration if duration else None,
+        shape="regular" if one.pace.regular else "irregular" if times.size > 20 else "unknown",
+        stamps=StampNames(stream.stamps.primary, stream.stamps.secondary),
+        timeline=stream.timeline, quantity=stream.quantity,
+        faults=_ordered(one), offset_s=one.offset_s,
+        residual_s=one.residual, smallest_seen=one.smallest, tau_crit_s=None, error_m=None,
+        cannot_show=_cannot_show(one), notes=stream.notes, trace=one.trace, partial=stream.partial,
+    )  # fmt: skip
+
+
+def _ordered(one: Examined) -> tuple[StampFault, ...]:
+    """Faults that count first, whole-stream ones before episodes, episodes by time."""
+    return tuple(sorted(one.faults, key=_rank))
+
+
+def _rank(fault: StampFault) -> tuple[bool, bool, float]:
+    return (not fault.counts, fault.from_s is not None, fault.from_s or 0.0)
+
+
+def _cannot_show(one: Examined) -> tuple[str, ...]:
+    """What these stamps leave open, in words."""
+    names = {f.fault for f in one.faults}
+    if one.series.receive is None:
+        return ("offset, drift, steps and delays: the file tells one time only",)
+    said = []
+    if names & {"stamped_on_arrival", "packetised"}:
+        said.append("how long the data were on their way before they were stamped")
+    elif one.constant_s is not None and one.constant_s > 0.0:
+        apart = f"{one.constant_s * 1e3:.4g} ms"
+        said.append(f"its constant latency: the fastest receipts come {apart} after their stamps, "
+                    "which is latency or a clock's offset")  # fmt: skip
+    else:
+        said.append("its constant latency, nor how far its clock is from the recorder's")
+    if not one.pace.regular and "packetised" not in names:
+        said.append("single lost messages, and whether it was stamped on arrival: it has no rhythm")
+    if one.smallest.step_s is None:
+        said.append("steps and drift: too few messages")
+    return tuple(said)
+
+
+def _notes(rows: Sequence[StreamAudit]) -> tuple[str, ...]:
+    notes = []
+    if any(row.residual_s.bound is not None for row in rows):
+        notes.append("what receipt minus stamp shows is transport as well as stamp error: every "
+                     "residual is an upper bound, and a constant latency is in none of them "
+                     "(`diagnose` finds it)")  # fmt: skip
+    return tuple(notes)
+
+
+def _evidence(path: Path) -> FileRead:
+    return FileRead(str(path), content_of(path))

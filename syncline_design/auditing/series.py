@@ -1,0 +1,72 @@
+"""The two times of a stream's messages while they are being audited."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.logs.readers.stream import UNSET, Nanoseconds
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+NS = 1e9
+UNIX_S = 6e8  # later than this since 1970: a calendar's clock (1989)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Series:
+    """Messages in the order of the file.
+
+    stamp, receive: nanoseconds; receive None: the file tells one time only.  good: those whose
+    stamp is usable.  start: receipt (or stamp) of the run's first message.
+    """
+
+    stamp: Nanoseconds
+    receive: Nanoseconds | None
+    good: Mask
+    start: int
+
+    @property
+    def times(self) -> Nanoseconds:
+        """Receipts, where there are none the stamps."""
+        return self.stamp if self.receive is None else self.receive
+
+    @property
+    def seconds(self) -> Array:
+        """Seconds of receipt since the first message of the run."""
+        return seconds(self.times - self.start)
+
+    def places(self) -> NDArray[np.intp]:
+        return np.flatnonzero(self.good)
+
+
+def series_of(stamp: Nanoseconds, receive: Nanoseconds | None, start: int | None = None) -> Series:
+    """A series of all messages; of those without a stamp none is good."""
+    good = stamp != UNSET
+    if receive is not None:
+        good &= receive != UNSET
+    times = stamp if receive is None else receive
+    first = int(times[good][0]) if bool(good.any()) else 0
+    return Series(stamp, receive, good, first if start is None else start)
+
+
+def seconds(whole: Nanoseconds) -> Array:
+    """Differences in nanoseconds as seconds."""
+    return whole / NS
+
+
+def spread(values: Array) -> float:
+    """Interquartile range; 0 of nothing."""
+    if not values.size:
+        return 0.0
+    low, high = np.percentile(values, [25, 75])
+    return float(high - low)
+
+
+def scatter(values: Array) -> float:
+    """1.4826 times the median absolute deviation: sigma of a normal law, blind to outliers."""
+    if not values.size:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(values - np.median(values))))

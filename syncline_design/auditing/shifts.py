@@ -1,0 +1,328 @@
+"""Names for how an offset moves: slips of whole seconds, steps, drift, a lock that settles.
+
+A shift counts as the stamps' own where the rhythm of a regular sensor shows it too; where the
+stamps keep their rhythm and receipts move, it is the recorder or transport.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final, Literal
+
+import numpy as np
+
+from syncline_design.auditing.blocks import Blocks, blocks_of
+from syncline_design.auditing.cadence import Cadence, cadence
+from syncline_design.auditing.grains import best_timer
+from syncline_design.auditing.levels import Shape, course, polished, shapes_of
+from syncline_design.auditing.result import Consequence, StampFault
+from syncline_design.auditing.series import NS, Array, Series, seconds, spread
+
+Side = Literal["stamp", "receipt", "unknown"]
+_WHOLE: Final = 0.1  # s that a slip may be from whole seconds
+_LEAST_RUN: Final = 3  # messages of a slip
+_TRANSPORT_S: Final = 0.05
+_DRIFTING_S: Final = 0.03  # over the log: slower drifts do not blur whole seconds
+_TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
+_LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """A change of receipt minus stamp that is not the stamps' own, or may not be."""
+
+    at_s: float
+    to_s: float | None
+    size_s: float  # of receipt minus stamp
+    side: Side
+    window_s: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shifts:
+    """What was found, the series without it, and shifts to hold against other streams."""
+
+    series: Series
+    faults: tuple[StampFault, ...]
+    shifts: tuple[Shift, ...]
+    drift_ppm: float | None
+    blocks: Blocks | None
+
+
+def without_slips(series: Series, known_s: float | None) -> Shifts:
+    """Stretches whose stamps are off by whole seconds; known_s: constant offset of the stream.
+
+    Which stretch is right: the one whose stamps lie just before their receipts, where the constant
+    is known; else the longest.
+    """
+    nothing = Shifts(series, (), (), None, None)
+    if series.receive is None or series.good.sum() < 2 * _LEAST_RUN:
+        return nothing
+    places = series.places()
+    late = seconds((series.receive - series.stamp)[places])
+    middle = float(np.median(late))
+    late = late - _slope(series.seconds[places], late)
+    turns = np.round(late - middle)
+    if not turns.any():
+        return nothing
+    base = _right(late + (known_s or 0.0), turns, known_s is not None)
+    turns = np.round(late - float(np.median(late[turns == base])))
+    pace = cadence(series)
+    found = [r for r in _runs(turns) if _is_slip(late, turns, r, pace, series, places)]
+    if not found:
+        return nothing
+    own = [r for r in found if _side_of(series, places, pace, r[0], r[1]) != "receipt"]
+    moved = series.stamp.copy()
+    for begin, end in own:
+        moved[places[begin:end]] += round(turns[begin]) * 10**9
+    faults = tuple(_slip(series.seconds[places], turns, run, series.stamp[places]) for run in own)
+    others = tuple(
+        Shift(float(series.seconds[places[b]]), None, float(turns[b]), "receipt", 1.0)
+        for b, e in found if (b, e) not in own and e == places.size
+    )  # fmt: skip
+    return Shifts(replace(series, stamp=moved), faults, others, None, None)
+
+
+def _slope(time_s: Array, late: Array) -> Array:
+    """The drift of most messages, as seconds from the middle of the log; 0 where it is small."""
+    lag = max(1, late.size // 10)
+    passed = time_s[lag:] - time_s[:-lag]
+    use = passed > 0.0
+    if not use.any():
+        return np.zeros(late.size)
+    slope = float(np.median((late[lag:] - late[:-lag])[use] / passed[use]))
+    drift = slope * (time_s - time_s[time_s.size // 2])
+    return drift if abs(slope) * float(np.ptp(time_s)) > _DRIFTING_S else np.zeros(late.size)
+
+
+def _right(late: Array, turns: Array, known: bool) -> float:
+    values, often = np.unique(turns, return_counts=True)
+    frequent = values[often >= max(_LEAST_RUN, 0.01 * turns.size)]
+    if known and frequent.size:
+        lows = [(float(np.percentile(late[turns == v], 10)), v) for v in frequent]
+        causal = [(low, v) for low, v in lows if low > -_TRANSPORT_S]
+        if causal:
+            return float(min(causal)[1])
+    return float(values[int(np.argmax(often))])
+
+
+def _runs(turns: Array) -> Iterator[tuple[int, int]]:
+    """Stretches of one number of seconds that is not 0."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[np.nan], turns, [np.nan]])) != 0)
+    for begin, end in pairwise(edges):
+        if turns[begin] != 0:
+            yield int(begin), int(end)
+
+
+def _is_slip(
+    late: Array, turns: Array, run: tuple[int, int], pace: Cadence, series: Series,
+    places: np.ndarray,
+) -> bool:  # fmt: skip
+    """Long enough, whole seconds off, and level: waiting messages come ever less late."""
+    begin, end = run
+    if end - begin < _LEAST_RUN:
+        return False
+    right = late[turns == 0]
+    inside = late[begin:end] - turns[begin]
+    apart = abs(float(np.median(inside)) - float(np.median(right)))
+    calm = max(3.0 * spread(right), 1e-3)
+    level = spread(inside) < max(3.0 * spread(right), 0.02)
+    enters = begin == 0 or abs(abs(late[begin] - late[begin - 1]) - abs(turns[begin])) < 0.45
+    return apart < min(_WHOLE, max(calm, 0.01)) and level and enters
+
+
+def _side_of(
+    series: Series, places: np.ndarray, pace: Cadence, begin: int, end: int
+) -> Side:  # fmt: skip
+    """Whose interval is odd where a slip begins (or, of one that begins the log, ends)."""
+    assert series.receive is not None
+    k = begin if begin > 0 else end
+    if not 0 < k < places.size:
+        return "unknown"
+    a, b = places[k - 1], places[k]
+    stamp = (series.stamp[b] - series.stamp[a]) / NS
+    receive = (series.receive[b] - series.receive[a]) / NS
+    odd_stamp, odd_receive = abs(stamp - pace.period_s), abs(receive - pace.period_s)
+    if odd_receive > 0.6 and odd_stamp < 0.4:
+        return "receipt"
+    return "stamp"
+
+
+def _slip(times: Array, turns: Array, run: tuple[int, int], stamp: np.ndarray) -> StampFault:
+    begin, end = run
+    size = -float(turns[begin])
+    ends = end < times.size
+    change = np.diff(stamp[max(0, begin - 1) : end + 1])
+    falls = int(np.sum(change < 0))
+    back = Consequence("backward_jump", {"count": float(falls)},
+                       "stamps go back where the slip begins or ends")  # fmt: skip
+    return StampFault(
+        "whole_second_slip", {"seconds": size, "count": float(end - begin)}, float(times[begin]),
+        float(times[end] if ends else times[-1]),
+        f"{end - begin} messages are stamped {abs(size):.0f} s "
+        f"{'ahead' if size > 0 else 'behind'}" + ("" if ends else ", to the end of the log"),
+        (back,) if falls else (),
+    )  # fmt: skip
+
+
+def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
+    """Steps, drift, episodes and settling, named where they are the stamps' own."""
+    nothing = Shifts(series, (), (), None, None)
+    if series.receive is None or series.good.sum() < 2:
+        return nothing
+    places = series.places()
+    time_s = series.seconds[places]
+    late = seconds((series.receive - series.stamp)[places])
+    late = late - np.median(late)
+    blocks = blocks_of(time_s, late)
+    if blocks is None or not bool(np.all(np.diff(time_s) >= 0)):
+        return replace(nothing, blocks=blocks)
+    pace = cadence(series)
+    placed = [_placed(s, time_s, late, blocks) for s in shapes_of(blocks, least_s=least_s)]
+    judged = [_judged(pace, shape, time_s, blocks) for shape in placed]
+    rest = late - course(tuple(shape for shape, _ in judged), time_s)
+    if judged and _waits_for_ticks(
+        series, rest
+    ):  # what is slow may be a beat between sensor and ticks
+        judged = [(shape, side) for shape, side in judged if side == "stamp"]
+    found, sides = tuple(shape for shape, _ in judged), [side for _, side in judged]
+    found = polished(found, [side == "stamp" for side in sides], blocks)
+    own = tuple(s for s, side in zip(found, sides, strict=True) if side != "receipt")
+    whole = series.stamp.copy()
+    whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
+    faults = tuple(_named(shape, time_s, blocks) for shape in own)
+    shifts = tuple(
+        Shift(s.begin_s, None if s.kind == "step" else s.end_s, s.size_s, side, blocks.length_s)
+        for s, side in zip(found, sides, strict=True) if s.kind in ("step", "episode")
+    )  # fmt: skip
+    ppm = next((f.parameters["ppm"] for f in faults if f.fault == "drift"), None)
+    assert not isinstance(ppm, str)
+    return Shifts(replace(series, stamp=whole), faults, shifts, ppm, blocks)
+
+
+def _placed(shape: Shape, time_s: Array, late: Array, blocks: Blocks) -> Shape:
+    """Begin (and end) to the message: where the jump parts the messages best."""
+    if shape.kind in ("drift", "holdover"):
+        return shape
+    begin = _change(shape.begin_s, shape.size_s, time_s, late, blocks)
+    if shape.kind == "episode":
+        end = _change(shape.end_s, -shape.size_s, time_s, late, blocks)
+        return replace(shape, begin_s=begin, end_s=end)
+    return replace(shape, begin_s=begin, end_s=begin if shape.kind == "relock" else shape.end_s)
+
+
+def _change(at_s: float, size_s: float, time_s: Array, late: Array, blocks: Blocks) -> float:
+    """The moment within two blocks of a jump that parts lower from higher messages best."""
+    width = 3.0 * blocks.length_s
+    a, b = np.searchsorted(time_s, [at_s - width, at_s + width])
+    near = late[a:b]
+    if near.size < 4:
+        return at_s
+    sign = 1.0 if size_s > 0 else -1.0
+    limit = 3.0 * max(blocks.spread_s, abs(size_s))
+    middle = np.median(near)
+    value = np.clip(sign * (near - middle), -limit, limit)
+    value = value - value.mean()
+    split = int(np.argmin(np.cumsum(value)[:-1])) + 1
+    return float(time_s[a + split])
+
+
+def _waits_for_ticks(series: Series, late: Array) -> bool:
+    """Whether receipts keep to the ticks of a timer, and delays are not those of transport.
+
+    A sensor whose interval is nearly a multiple of the host's tick waits a little less each time:
+    a beat, which looks like drift.  Transport's delays have a tail, waits for a tick have none.
+    """
+    assert series.receive is not None
+    receive = np.sort(series.receive[series.good])
+    when = seconds(receive - receive[0])
+    return best_timer(when) is not None and not _has_tail(late)
+
+
+def _has_tail(late: Array) -> bool:
+    """Whether delays reach further above their median than below it, block by block."""
+    skews = []
+    for piece in np.array_split(late, max(4, late.size // 64)):
+        k = np.arange(piece.size) - 0.5 * (piece.size - 1)
+        low, middle, high = np.percentile(piece - k * float(k @ piece) / float(k @ k), [5, 50, 95])
+        if high > low:
+            skews.append(((high - middle) - (middle - low)) / (high - low))
+    return bool(skews) and float(np.median(skews)) > _TAIL
+
+
+def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple[Shape, Side]:
+    """A shape put where the stamps' own rhythm breaks, and whether it breaks there at all."""
+    if shape.kind in ("drift", "holdover") or not pace.regular:
+        return shape, "unknown"
+    side, at = _broken(pace, shape.begin_s, -shape.size_s, time_s, blocks)
+    if at is not None:
+        end = at if shape.kind == "relock" else shape.end_s
+        shape = replace(shape, begin_s=at, end_s=end)
+    if shape.kind == "episode":
+        other, at = _broken(pace, shape.end_s, shape.size_s, time_s, blocks)
+        shape = shape if at is None else replace(shape, end_s=at)
+        side = other if side == "unknown" else side
+    return shape, side
+
+
+def _broken(
+    pace: Cadence, at_s: float, jump_s: float, time_s: Array, blocks: Blocks
+) -> tuple[Side, float | None]:
+    """Whether stamps leave their rhythm by a jump near a moment, and where.
+
+    The interval that does is the jump longer; where the rhythm scatters too much for one interval,
+    the sum of all near by.
+    """
+    width = _LOOK * blocks.length_s
+    inside = np.flatnonzero((time_s[1:] > at_s - width) & (time_s[:-1] < at_s + width))
+    if not inside.size:
+        return "unknown", None
+    period, noise = pace.period_s, 6.0 * pace.jitter_s + 1e-9
+    large = abs(jump_s) > 0.4 * period
+    steps = 1.0 if large else pace.steps[inside]
+    off = pace.interval[inside] - steps * period
+    apart = np.abs(off - jump_s)
+    nearest = int(np.argmin(apart))
+    if abs(jump_s) > noise and apart[nearest] < 0.35 * abs(jump_s):
+        return "stamp", float(time_s[inside[nearest] + 1])
+    if large:
+        hole = bool(np.any(pace.interval[inside] > 4.0 * period))
+        return ("unknown" if hole else "receipt"), None
+    moved = float(off.sum())
+    bound = max(0.35 * abs(jump_s), noise)
+    if noise < abs(jump_s) and abs(moved - jump_s) < bound:
+        return "stamp", None
+    return ("receipt" if noise < abs(jump_s) and abs(moved) < bound else "unknown"), None
+
+
+def _named(shape: Shape, time_s: Array, blocks: Blocks) -> StampFault:
+    end = float(time_s[-1])
+    size = -shape.size_s
+    sure = f"{abs(shape.size_s) / max(shape.sigma_s, 1e-12):.3g} times its uncertainty"
+    if shape.kind == "drift":
+        ppm = 1e6 * size / (shape.end_s - shape.begin_s)
+        return StampFault(
+            "drift", {"ppm": ppm}, None, None,
+            f"stamps run {abs(ppm):.4g} ppm {'fast' if ppm > 0 else 'slow'} against receipts: "
+            f"{abs(size) * 1e3:.4g} ms over the log, {sure}",
+        )  # fmt: skip
+    if shape.kind in ("step", "episode"):
+        stop = end if shape.kind == "step" else shape.end_s
+        lasts = "and stay so" if shape.kind == "step" else f"until {stop:.4g} s"
+        return StampFault(
+            "step", {"seconds": size}, shape.begin_s, stop,
+            f"stamps move by {size * 1e3:+.4g} ms against receipts {lasts}, {sure}",
+        )  # fmt: skip
+    away = "drift away and settle" if shape.kind == "holdover" else "jump and settle"
+    stop = min(end, shape.end_s + 5.0 * shape.settle_s)
+    return StampFault(
+        "relock", {"seconds": size, "settling_s": shape.settle_s}, shape.begin_s, stop,
+        f"stamps {away} again: {size * 1e3:+.4g} ms, time constant {shape.settle_s:.3g} s",
+    )  # fmt: skip
+
+
+def common(shifts: Sequence[Shift]) -> float:
+    """The size of a shift that several streams show [s]."""
+    return float(np.median([s.size_s for s in shifts]))

@@ -1,0 +1,282 @@
+"""One stream: every fault is named and taken out before the next is looked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from syncline_design.auditing import arrival, grains, order
+from syncline_design.auditing.cadence import Cadence, cadence, level_scatter, missing
+from syncline_design.auditing.envelope import above_floor
+from syncline_design.auditing.epochs import epoch_fault, in_one_unit
+from syncline_design.auditing.levels import smallest
+from syncline_design.auditing.result import (
+    Consequence,
+    EnvelopePoint,
+    ResidualTime,
+    SmallestSeen,
+    StampFault,
+)
+from syncline_design.auditing.series import NS, Array, Series, seconds, series_of
+from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
+from syncline_design.logs.readers.stream import Stream
+from syncline_design.machine.deadline import in_force
+
+TRACE_POINTS: Final = 240
+_LARGE_STEP_NS: Final = 1e6
+# epochs of a counter without a calendar
+_COUNTERS: Final = ("boot", "unknown", "week_seconds", "day_seconds", "hour_seconds")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Examined:
+    """A stream and all that its own stamps say; shifts: to be held against other streams."""
+
+    stream: Stream
+    raw: Series
+    series: Series  # every named fault taken out
+    faults: tuple[StampFault, ...]
+    shifts: tuple[Shift, ...]
+    pace: Cadence
+    offset_s: float | None
+    residual: ResidualTime
+    smallest: SmallestSeen
+    trace: tuple[EnvelopePoint, ...]
+    constant_s: float | None  # latency, or a clock that is wrong: stamps cannot tell
+
+
+def examined(stream: Stream, start: int | None = None) -> Examined:
+    """All faults of one stream; start: receipt of the run's first message [ns]."""
+    in_force().check()
+    stamps = stream.stamps
+    assert stamps is not None
+    raw = series_of(stamps.primary_ns, stamps.secondary_ns, start)
+    found: list[StampFault] = []
+    series, unit, step_ns = _ordered(raw, found)
+    grain = _grain(series, step_ns, found)
+    arrived = None if grain else arrival.stamped_on_arrival(series, cadence(series))
+    if arrived is not None:
+        series = _arrivals(series, arrived, found)
+    elif step_ns >= _LARGE_STEP_NS:  # duplicates are the unit's
+        series = order.without_duplicates(series).series
+    elif grain is None or not grain.explains_duplicates:
+        series = _take(order.without_duplicates(series), found)
+    else:
+        series = order.without_duplicates(series).series
+    series = _take(order.without_spikes(series), found)
+    epoch = None if unit else epoch_fault(series)
+    found[:] = _with_epoch(found, epoch)
+    known = _known(epoch, series, unit is not None)
+    slips = without_slips(series, known)
+    least = max(_coarse(raw), grain.size_s if grain is not None else 0.0)
+    moved = without_shifts(slips.series, least_s=least)
+    found += [*slips.faults, *moved.faults]
+    series = moved.series
+    pace = cadence(series)
+    _last(series, pace, stream, known, grain, found)
+    return _summed(stream, raw, series, pace, found, (slips, moved), known, grain)
+
+
+def _ordered(raw: Series, found: list[StampFault]) -> tuple[Series, StampFault | None, float]:
+    """Unset stamps left out, one unit, counters continuous."""
+    series = _take(order.without_unset(raw), found)
+    unit = in_one_unit(series)
+    if unit.fault is not None:
+        found.append(unit.fault)
+    series = _take(order.unwrapped(unit.series), found)
+    return series, unit.fault, unit.step_ns
+
+
+def _take(repaired: order.Repaired, found: list[StampFault]) -> Series:
+    found += repaired.faults
+    return repaired.series
+
+
+def _grain(series: Series, step_ns: float, found: list[StampFault]) -> grains.Grain | None:
+    pace = cadence(series)
+    grain = grains.truncated(series, pace, step_ns) or grains.packetised(series, pace)
+    if grain is not None:
+        found.append(grain.fault)
+    return grain
+
+
+def _with_epoch(found: list[StampFault], epoch: StampFault | None) -> list[StampFault]:
+    """The epoch beside the others; a counter that wraps has none, so that is its consequence."""
+    if epoch is None:
+        return found
+    wraps = [f for f in found if f.fault == "counter_wrap"]
+    if not wraps or epoch.parameters["kind"] not in _COUNTERS:
+        return [*found, epoch]
+    follows = Consequence("epoch_offset", epoch.parameters, epoch.evidence)
+    whole = replace(wraps[0], consequences=(*wraps[0].consequences, follows))
+    return [whole if f is wraps[0] else f for f in found]
+
+
+def _arrivals(series: Series, arrived: StampFault, found: list[StampFault]) -> Series:
+    """Stamps of messages that came at once follow from being stamped on arrival."""
+    alike = order.without_duplicates(series)
+    follows = tuple(Consequence("duplicates", f.parameters, f.evidence) for f in alike.faults)
+    found.append(replace(arrived, consequences=follows))
+    return alike.series
+
+
+def _known(epoch: StampFault | None, series: Series, unit: bool) -> float | None:
+    """Stamp minus receipt that has a name [s]; None where the constant is of no known epoch."""
+    if epoch is None:
+        return None if unit or _far_off(series) else 0.0
+    exact = ("tai", "gps", "tai_gps", "time_zone", "gps_epoch", "adjusted_gps", "ntp_epoch",
+             "week_rollover")  # fmt: skip
+    value = epoch.parameters.get("seconds")
+    if epoch.parameters["kind"] in exact and isinstance(value, float):
+        return value
+    return None
+
+
+def _far_off(series: Series) -> bool:
+    if series.receive is None or not series.good.any():
+        return True
+    return abs(float(np.median(seconds((series.receive - series.stamp)[series.good])))) > 60.0
+
+
+def _coarse(raw: Series) -> float:
+    """Resolution of the receipts [s]: smaller shifts may be theirs."""
+    if raw.receive is None or raw.receive.size < 20:
+        return 0.0
+    for grain in grains.GRAINS:
+        rest = raw.receive % grain
+        if float(np.mean(np.minimum(rest, grain - rest) <= grains.ROUNDING_NS)) > 0.995:
+            return grain / NS
+    return 0.0
+
+
+def _last(
+    series: Series, pace: Cadence, stream: Stream, known: float | None,
+    grain: grains.Grain | None, found: list[StampFault],
+) -> None:  # fmt: skip
+    """What is looked for once everything else is taken out."""
+    names = {fault.fault for fault in found}
+    if "packetised" not in names:
+        found += missing(series, pace, level_scatter(series))
+    if not names & {"packetised", "truncated_stamps", "stamped_on_arrival"}:
+        arrived = arrival.stamped_on_arrival(series, pace)
+        found += [arrived] if arrived is not None else []
+    if known is not None:
+        ahead = arrival.ahead(series, known, grain.size_s if grain else _coarse(series))
+        moves = names & {"drift", "step", "relock"}  # where these begin is not known to the last us
+        if ahead is not None and (not moves or ahead.from_s is None):
+            found.append(_as_slip(ahead, series, known))
+    explained = names & {"whole_second_slip", "counter_wrap", "step", "relock"}
+    fall = None if explained else order.remaining_falls(series)
+    found += [fall] if fall is not None and "backward_jump" not in names else []
+    scan = arrival.scan(series, stream.points)
+    found += [scan] if scan is not None else []
+
+
+def _as_slip(ahead: StampFault, series: Series, known: float) -> StampFault:
+    """A whole log that is stamped one or two whole seconds late is a slip of its own."""
+    if series.receive is None or ahead.from_s is not None:
+        return ahead
+    late = seconds((series.receive - series.stamp)[series.good]) + known
+    least = float(np.percentile(late, 1.0))
+    slip = round(least - 0.02)
+    if slip not in (-1, -2) or not -1e-4 < least - slip < 0.1:
+        return ahead
+    return StampFault(
+        "whole_second_slip", {"seconds": float(-slip), "count": float(late.size)}, None, None,
+        f"every stamp lies {-slip} s after its receipt, but for {(least - slip) * 1e3:.3g} ms",
+    )  # fmt: skip
+
+
+def _summed(
+    stream: Stream, raw: Series, series: Series, pace: Cadence, found: list[StampFault],
+    moved: tuple[Shifts, Shifts], known: float | None, grain: grains.Grain | None,
+) -> Examined:  # fmt: skip
+    places = series.places()
+    drifts = any(f.fault == "drift" for f in found)
+    offset = _offset(raw)
+    residual = ResidualTime(None, None, None)
+    least = SmallestSeen(None, None)
+    trace: tuple[EnvelopePoint, ...] = ()
+    constant = None
+    if series.receive is not None and places.size > 1:
+        restored = _restored(series, pace, found)
+        left = above_floor(series.seconds[places], restored, sloping=drifts)
+        recorded = _recorded(raw, series)
+        residual = ResidualTime(
+            float(left.max()), float(np.percentile(left, 95.0)), float(np.ptp(recorded))
+        )
+        trace = _trace(raw, series)
+        blocks = moved[1].blocks
+        if blocks is not None:
+            step, over = smallest(blocks)
+            length = float(blocks.time_s[-1] - blocks.time_s[0])
+            if np.isfinite(step) and length > 0.0:
+                least = SmallestSeen(step, 1e6 * over / length)
+        late = seconds((series.receive - series.stamp)[places])
+        constant = float(np.min(late)) + (known or 0.0) if known is not None else None
+    shifts = (*moved[0].shifts, *moved[1].shifts)
+    return Examined(stream, raw, series, tuple(found), shifts, pace, offset, residual, least, trace,
+                    constant)  # fmt: skip
+
+
+def _offset(raw: Series) -> float | None:
+    """Stamp minus receipt of the fastest message as the file has it [s]."""
+    if raw.receive is None or not raw.good.any():
+        return None
+    return float(seconds(np.max((raw.stamp - raw.receive)[raw.good])))
+
+
+def _restored(series: Series, pace: Cadence, found: list[StampFault]) -> Array:
+    """Receipt minus stamp [s], stamps of a coarse clock put back to their sensor's rhythm."""
+    assert series.receive is not None
+    whole = (series.receive - series.stamp)[pace.places]
+    late = seconds(whole - whole.min())
+    names = {f.fault for f in found}
+    if not names & {"packetised", "truncated_stamps", "stamped_on_arrival"}:
+        return late
+    when = seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
+    rhythm = _rhythm(when, pace)
+    return late if rhythm is None else np.asarray(late + when - rhythm)
+
+
+def _rhythm(when: Array, pace: Cadence) -> Array | None:
+    """When a regular sensor measured, from its own mean rhythm; None of an irregular one."""
+    if when.size < 40 or when[-1] <= 0.0:
+        return None
+    counts = np.arange(when.size, dtype=np.float64)
+    if pace.regular:
+        counts[1:] = np.cumsum(pace.steps)
+    first, mean = np.polynomial.polynomial.polyfit(counts, when, 1)
+    even = first + mean * counts
+    grain = float(np.percentile(np.diff(when), 99.0))
+    return np.asarray(even) if float(np.ptp(when - even)) < 2.0 * grain + 2.0 * mean else None
+
+
+def _recorded(raw: Series, series: Series) -> Array:
+    """Receipt minus stamp as the file has them, of the messages in use [s]."""
+    assert raw.receive is not None
+    whole = (raw.receive - raw.stamp)[series.good]
+    return seconds(whole - whole.min())
+
+
+def _trace(raw: Series, series: Series) -> tuple[EnvelopePoint, ...]:
+    """Receipt minus stamp over time: least and largest of each stretch, without the median."""
+    assert raw.receive is not None
+    places = raw.places()
+    if places.size < 2:
+        return ()
+    late = seconds((raw.receive - raw.stamp)[places])
+    late = late - float(np.median(late))
+    times = raw.seconds[places]
+    parts = np.array_split(np.arange(places.size), min(TRACE_POINTS, places.size))
+    return tuple(
+        EnvelopePoint(float(times[p].mean()), float(late[p].min()), float(late[p].max()))
+        for p in parts
+    )  # fmt: skip
+
+
+def with_faults(one: Examined, faults: tuple[StampFault, ...]) -> Examined:
+    """The same stream with other faults."""
+    return replace(one, faults=faults)

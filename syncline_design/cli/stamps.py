@@ -1,0 +1,82 @@
+"""The command about stamps: audit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from syncline_design.cli.shared import (
+    AuditOutput,
+    QuietOption,
+    SeedOption,
+    TimeLimitOption,
+    deadline_of,
+    emit,
+    guarded,
+    output_targets,
+    refuse,
+    watched,
+)
+from syncline_design.machine.streams import say
+
+if TYPE_CHECKING:
+    from syncline_design.auditing.result import Audit
+    from syncline_design.spec.case import Case
+
+
+@guarded
+def audit(
+    file: Annotated[
+        list[Path],
+        typer.Argument(help="Logs: bags (or their folders), flight logs, CSV with two times, ..."),
+    ],
+    spec: Annotated[
+        Path | None, typer.Option(metavar="SPEC", help="Hold the streams against its tau_crit.")
+    ] = None,
+    write_spec: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="Write the spec with the residuals as timestamp errors."),
+    ] = None,
+    output: AuditOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    time_limit: TimeLimitOption = None,
+) -> int:
+    """Name every fault of the stamps in logs, from stamps and receipts alone."""
+    deadline = deadline_of(time_limit)
+    from syncline_design.auditing.run import audit as audit_files
+    from syncline_design.comparison.stamp_meaning import held_against
+    from syncline_design.report.formats import AUDIT_FORMATS
+    from syncline_design.report.on_audit import on_audit, render_audit
+    from syncline_design.report.render_console import console
+    from syncline_design.spec.load import load
+
+    if write_spec is not None and spec is None:
+        refuse("syncline-design: --write-spec needs --spec SPEC, the spec to write into")
+    reads = [*file, *([spec] if spec is not None else [])]
+    targets = output_targets(output, AUDIT_FORMATS, reads, [write_spec])
+    with watched(deadline, targets, quiet=quiet):
+        case = None if spec is None else load(spec)
+        found = audit_files(file)
+        if case is not None:
+            found = held_against(found, case, seed)
+    for one in found.unreadable:
+        say(one.reason)
+    if write_spec is not None and case is not None:
+        _write(found, case, write_spec)
+    emit(console(on_audit(found)), targets, lambda name: render_audit(name, found), quiet=quiet)
+    return found.exit_code
+
+
+def _write(found: Audit, case: Case, path: Path) -> None:
+    from syncline_design.comparison.stamp_meaning import spec_with_residuals
+    from syncline_design.spec.edit import write_spec
+
+    text = spec_with_residuals(found, case)
+    if text is None:
+        say("no stream with a residual plays a role of the spec: no spec written")
+        return
+    write_spec(text, path)
+    say(f"spec with the residuals written to {path}")

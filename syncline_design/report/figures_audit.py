@@ -1,0 +1,95 @@
+"""Figures of audited stamps: receipt minus stamp over time, one row a stream, faults marked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final
+
+from syncline_design.auditing.result import StampFault, StreamAudit
+from syncline_design.report import axes as scales
+from syncline_design.report import numbers
+from syncline_design.report.palette import BAD, MUTED, SERIES, SHADE, WARN
+from syncline_design.report.svg import InlineFigure, add_axes, draw
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH: Final = 440.0
+ROW: Final = 76.0
+MOST_MARKS: Final = 30
+MOST_LETTERS: Final = 34
+
+
+def traces(rows: Sequence[StreamAudit]) -> InlineFigure:
+    """One row a stream, all over the same time."""
+    end = max((row.trace[-1].time_s for row in rows), default=1.0)
+    begin = min((row.trace[0].time_s for row in rows), default=0.0)
+
+    def build(figure: Figure) -> None:
+        for k, row in enumerate(rows, 1):
+            axes = add_axes(figure, len(rows), 1, k)
+            _trace(axes, row)
+            axes.set_xlim(begin, end if end > begin else begin + 1.0)
+            _faults(axes, row)
+            _labels(axes, row, last=k == len(rows))
+
+    spoken = "; ".join(
+        f"{row.name}: " + (", ".join(f.fault for f in row.faults) or "no fault") for row in rows
+    )
+    size = (WIDTH, 46.0 + ROW * len(rows))
+    return draw("fig-traces", "Receipt minus stamp over time", spoken, size, build)
+
+
+def _trace(axes: Axes, row: StreamAudit) -> None:
+    times = [p.time_s for p in row.trace]
+    low, high = [p.low_s for p in row.trace], [p.high_s for p in row.trace]
+    axes.vlines(times, low, high, color=SERIES[0], linewidth=1.0)
+    axes.plot(times, low, color=SERIES[0], linewidth=0.7)
+    bottom, top = min(low), max(high)
+    room = 0.08 * (top - bottom) or 1e-9
+    axes.set_ylim(bottom - room, top + room)
+
+
+def _faults(axes: Axes, row: StreamAudit) -> None:
+    """Episodes as a shade, moments as a line; what concerns the whole stream is in its name."""
+    for fault in [f for f in row.faults if f.from_s is not None][:MOST_MARKS]:
+        begin = fault.from_s or 0.0
+        colour = BAD if fault.counts else MUTED
+        axes.axvline(begin, color=colour, linewidth=1.1, linestyle=(0, (4, 2)))
+        if fault.to_s is not None and fault.to_s > begin and _is_episode(fault):
+            axes.axvspan(begin, fault.to_s, color=SHADE, linewidth=0, zorder=0)
+            axes.axvline(fault.to_s, color=colour, linewidth=0.7, linestyle=(0, (1, 2)))
+    marked = [f for f in row.faults if f.from_s is not None][:6]
+    for k, name in enumerate(dict.fromkeys(f.fault for f in marked)):
+        first = next(f for f in marked if f.fault == name)
+        axes.annotate(
+            name, (first.from_s or 0.0, 0.97 - 0.17 * (k % 5)),
+            xycoords=("data", "axes fraction"), xytext=(3, 0), textcoords="offset points",
+            color=BAD if first.counts else MUTED, va="top", fontsize=8, zorder=6,
+        )  # fmt: skip
+
+
+def _is_episode(fault: StampFault) -> bool:
+    return fault.fault in ("whole_second_slip", "relock", "gap") or (
+        fault.fault == "step" and fault.to_s is not None
+    )
+
+
+def _labels(axes: Axes, row: StreamAudit, *, last: bool) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    whole = [f.fault for f in row.faults if f.from_s is None]
+    name = row.name if len(row.name) <= MOST_LETTERS else "\u2026" + row.name[-MOST_LETTERS:]
+    mark = "\u2713" if row.sound else "\u2717"
+    title = f"{mark} {name}" + (f": {', '.join(dict.fromkeys(whole))}" if whole else "")
+    axes.set_title(title, loc="left", fontsize=9, color=WARN if not row.sound else MUTED)
+    low, high = axes.get_ylim()
+    ticks = [float(t) for t in MaxNLocator(3).tick_values(low, high) if low <= t <= high]
+    scales.set_ticks(axes, "y", ticks, lambda v: "0" if v == 0 else numbers.time(v, 3))
+    scales.grid(axes, "y")
+    axes.tick_params(labelsize=8)
+    if last:
+        axes.set_xlabel("seconds of receipt since the first message")
+    else:
+        axes.set_xticklabels([])
