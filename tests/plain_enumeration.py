@@ -20,12 +20,14 @@ from typing import Any
 
 import yaml
 
+from plain_existence import codes_of_part, codes_of_sensor
+
 CATALOGS = Path(__file__).parent.parent / "catalogs"
 ROLES = ("position", "attitude", "ranging")
 FACTOR = {
     **{"m": 1.0, "cm": 1e-2, "mm": 1e-3, "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "h": 3600.0},
     **{"m/s": 1.0, "deg": math.pi / 180, "deg/s": math.pi / 180, "ppm": 1e-6},
-    **{"EUR": 1.0, "kg": 1.0, "g": 1e-3, "W": 1.0},
+    **{"degC": 1.0, "Hz": 1.0, "EUR": 1.0, "kg": 1.0, "g": 1e-3, "W": 1.0},
 }
 Slot = tuple[int, str]  # stage, role
 
@@ -145,10 +147,15 @@ class Stage:
 class Enumeration:
     """Every design of one spec; gnss_everywhere: those that cannot work for want of GNSS too."""
 
-    def __init__(self, spec: dict[str, Any], gnss_everywhere: bool = False) -> None:
+    def __init__(
+        self,
+        spec: dict[str, Any],
+        gnss_everywhere: bool = False,
+        catalog: dict[str, Any] | None = None,
+    ) -> None:
         self.spec = spec
         self.gnss_everywhere = gnss_everywhere
-        self.catalog = read_catalog(families=True)
+        self.catalog = catalog or read_catalog(families=True)
         self.k = spec.get("coverage_factor", 3)
         self.stages = [self._stage(raw) for raw in spec["stages"]]
         self.vehicles = list(dict.fromkeys(stage.vehicle for stage in self.stages))
@@ -160,12 +167,15 @@ class Enumeration:
         ]
 
     def _stage(self, raw: dict[str, Any]) -> Stage:
+        figures = self._platform(raw)
+        v, w, d = (number(figures[key]) for key in ("v_max", "omega_max", "distance"))
+        return Stage(raw.get("vehicle", raw["name"]), v, w, d if "ranging" in raw else 0.0)
+
+    def _platform(self, raw: dict[str, Any]) -> dict[str, Any]:
         platform = raw["platform"]
         if isinstance(platform, str):
             platform = {"use": platform}
-        figures = {**self.catalog["platforms"].get(platform.get("use"), {}), **platform}
-        v, w, d = (number(figures[key]) for key in ("v_max", "omega_max", "distance"))
-        return Stage(raw.get("vehicle", raw["name"]), v, w, d if "ranging" in raw else 0.0)
+        return {**self.catalog["platforms"].get(platform.get("use"), {}), **platform}
 
     def _sensors(self, wanted: dict[str, Any], role: str) -> list[str]:
         if "sensor" in wanted:
@@ -192,8 +202,9 @@ class Enumeration:
         found: list[Option] = []
         for name, method in itertools.product(self._sensors(wanted, role), methods):
             sensor, stamping = self.catalog["sensors"][name], self.catalog["timestamping"][method]
-            listens = sensor.get("type") == "gnss" or self._needs_gnss(sensor)
-            if not self.has_gnss(slot[0]) and (listens or self._needs_gnss(stamping)):
+            if self.codes(slot[0], sensor) or self._codes_of_parts(stamping, slot[0]):
+                continue
+            if not self.has_time(slot[0]) and self._needs_gnss(stamping):
                 continue
             error, tau = sensor_error(sensor, stage.d_m), bound_of(stamping["error"], self.k)
             common = {*sensor["primitives"], "arrival"} & set(stamping["primitives"])
@@ -203,6 +214,21 @@ class Enumeration:
                 if wanted.get("primitive", primitive) == primitive
             ]
         return found
+
+    def codes(self, stage: int, sensor: dict[str, Any]) -> list[str]:
+        """Why a sensor cannot work on a stage."""
+        raw, spec = self.spec["stages"][stage], self.spec
+        spacing = [
+            number(r["limit"]) for r in spec["requirements"] if r["kind"] == "sample_spacing"
+        ]
+        return codes_of_sensor(
+            sensor, raw, self._platform(raw), spec, self.has_gnss(stage), min(spacing, default=None)
+        )
+
+    def _codes_of_parts(self, entry: dict[str, Any], stage: int) -> list[str]:
+        hardware = [self.catalog["infrastructure"][name] for name in entry.get("requires", ())]
+        raw = self.spec["stages"][stage]
+        return [code for one in (entry, *hardware) for code in codes_of_part(one, raw, self.spec)]
 
     def clocks(self, vehicle: str) -> list[str | None]:
         """Clocks that a vehicle's host can have; None alone where the spec names none."""
@@ -228,7 +254,12 @@ class Enumeration:
             return True
         raw = self.spec["stages"][stage]
         deep = number(raw.get("depth", "0 m")) > 0
-        return bool({"yes": True, "no": False}.get(raw.get("gnss"), stage == 0 and not deep))
+        said = raw.get("gnss")
+        return said in ("yes", True) if said is not None else stage == 0 and not deep
+
+    def has_time(self, stage: int) -> bool:
+        """GNSS time, which needs a cable or GNSS."""
+        return self.has_gnss(stage)
 
     def _needs_gnss(self, entry: dict[str, Any]) -> bool:
         """Whether an entry, or the shared hardware that it requires, says so."""
@@ -238,7 +269,9 @@ class Enumeration:
     def _works(self, clock: str, vehicle: str) -> bool:
         aboard = [i for i, stage in enumerate(self.stages) if stage.vehicle == vehicle]
         entry = self.catalog["clocks"][clock]
-        return not self._needs_gnss(entry) or any(map(self.has_gnss, aboard))
+        if any(self._codes_of_parts(entry, stage) for stage in aboard):
+            return False
+        return not self._needs_gnss(entry) or any(map(self.has_time, aboard))
 
     def _raw_of(self, vehicle: str) -> list[dict[str, Any]]:
         pairs = zip(self.spec["stages"], self.stages, strict=True)

@@ -10,24 +10,24 @@ from pathlib import Path
 
 import pytest
 
+import command as commands
+
 ROOT = Path(__file__).parent.parent
 SPECS = ROOT / "specs"
 HEAVY = {"cvxpy", "highspy", "scipy", "matplotlib", "polars", "pymap3d", "jinja2", "rich"}
 
 
 def run(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
-    """A run of the real command in a process of its own."""
-    environment = {**os.environ, "NO_COLOR": "1", "PYTHONPATH": str(ROOT)}
-    environment.pop("SYNCLINE_DEBUG", None)
+    """A run of the command in a process of its own."""
+    return commands.run(*arguments, cwd=cwd, environment={"NO_COLOR": "1"})
+
+
+def really(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """An interpreter started from nothing."""
     return subprocess.run(
-        [sys.executable, "-m", "syncline_design.cli", *arguments],
-        cwd=cwd,
-        env=environment,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=120,
-    )
+        [sys.executable, *arguments], cwd=ROOT, capture_output=True, text=True, check=False,
+        env={**os.environ, "NO_COLOR": "1", "PYTHONPATH": str(ROOT)}, timeout=120,
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -129,9 +129,15 @@ def test_reproduce_accounts_for_every_cell() -> None:
 
 
 def test_version_and_quiet() -> None:
-    assert run("--version").stdout.startswith("syncline-design ")
-    quiet = run("check", str(SPECS / "usv_mapping.yaml"), "--quiet")
-    assert (quiet.returncode, quiet.stdout) == (0, "")
+    """In processes started from nothing, as the shell starts them."""
+    for module in ("syncline_design", "syncline_design.cli"):
+        done = really("-m", module, "--version")
+        assert (done.returncode, done.stdout.split()[0]) == (0, "syncline-design"), done.stderr
+    quiet = really("-m", "syncline_design", "check", str(SPECS / "usv_mapping.yaml"), "--quiet")
+    assert (quiet.returncode, quiet.stdout, quiet.stderr) == (0, "", "")
+    missed = really("-m", "syncline_design", "check", str(SPECS / "usv_wire_missing.yaml"))
+    assert (missed.returncode, missed.stderr) == (1, "")
+    assert missed.stdout == run("check", str(SPECS / "usv_wire_missing.yaml")).stdout
 
 
 def test_a_pinned_check_imports_nothing_heavy() -> None:

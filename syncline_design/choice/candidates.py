@@ -18,7 +18,9 @@ import numpy as np
 
 from syncline_design.choice.exclusions import Excluded, Exclusions
 from syncline_design.choice.options import (
+    EVERYWHERE,
     RESOURCES,
+    Bools,
     Floats,
     Indices,
     Option,
@@ -34,6 +36,7 @@ from syncline_design.choice.table import RoleTable
 from syncline_design.machine.deadline import unhurried
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName
+from syncline_design.spec.barred import barred_method, barred_sensor, surroundings
 from syncline_design.spec.case import Case, RoleCase, StageCase, usable_primitives
 from syncline_design.spec.catalog import (
     ClockEntry,
@@ -42,7 +45,7 @@ from syncline_design.spec.catalog import (
     TimestampingEntry,
 )
 from syncline_design.spec.exact import fraction_of, norm, tau_bound
-from syncline_design.spec.gnss import Barred, barred_method, barred_sensor
+from syncline_design.spec.existence import RuledOut, interval_of, out_of_reach
 
 INLINE = "inline"
 
@@ -119,7 +122,7 @@ class _Way:
     timeline: Literal["host", "utc"] = "host"
     entry: TimestampingEntry | None = None
     requires: Requires = ()
-    barred: Barred | None = None
+    barred: RuledOut | None = None
     served: str = ""
     offered: str = ""
 
@@ -133,9 +136,10 @@ class _Way:
 class Candidates:
     """Every candidate of one role, in the order of the spec: a sensor and a way of stamping it.
 
-    ways_of: numbers of the ways of stamping each sensor; sensor, way: of each row (way -1: the
-    sensor itself cannot work here); fixed, turned: terms of each sensor's error, [m] and [m] per
-    metre of distance.
+    barred: why a sensor cannot work here at any distance; near, far: between which distances [m]
+    each measures.  ways_of: numbers of the ways of stamping each sensor; sensor, way: of each row
+    (way -1: stands for the sensor, where it cannot work here); fixed, turned: terms of each
+    sensor's error, [m] and [m] per metre of distance.
     """
 
     case: Case
@@ -143,34 +147,46 @@ class Candidates:
     role: RoleCase
     motion: Motion
     effects: tuple[SensorEffects, ...]
-    barred: tuple[Barred | None, ...]
+    barred: tuple[RuledOut | None, ...]
     ways: tuple[_Way, ...]
     ways_of: tuple[Indices, ...]
     sensor: Indices
     way: Indices
     fixed: Floats
     turned: Floats
+    near: Floats
+    far: Floats
     made: dict[int, Option] = field(default_factory=dict)
 
     def table(self, vehicle: int, sync_limit: float) -> RoleTable:
         """The options that keep their own tau_crit, and what is excluded."""
-        fits = np.array([*(one.fits for one in self.ways), False])[self.way]
-        fitting, rest = np.flatnonzero(fits), np.flatnonzero(~fits)
-        pool = self._columns(fitting)
+        works = self._reaches(self.motion)[self.sensor]
+        stands_for, fits = self.way < 0, np.array([*(one.fits for one in self.ways), False])
+        fitting = ~stands_for & fits[self.way]
+        barred = np.array([one is not None for one in self.barred], dtype=bool)[self.sensor]
+        gone = np.where(stands_for, barred | ~works, ~fitting & works)
+        here, rest = np.flatnonzero(fitting & works), np.flatnonzero(gone)
+        pool, beyond = self._columns(np.flatnonzero(fitting)).parted(works[fitting])
         keeps = pool.keep_own_tau_crit(sync_limit)
         options, poor = pool.parted(keeps)
-        order = np.argsort(np.concatenate([rest, fitting[~keeps]]), kind="stable")
+        order = np.argsort(np.concatenate([rest, here[~keeps]]), kind="stable")
         name, stage = self.stage.choice.name, self.stage.index
-        excluded = Exclusions(_Records(self, rest), poor, order)
+        excluded = Exclusions(_Records(self, rest), poor, order, beyond)
         ordered = options.take(options.by_name())
         return RoleTable(stage, name, self.role.role, vehicle, ordered, excluded)
 
     def moved(self, table: RoleTable, motion: Motion, sync_limit: float) -> RoleTable:
         """A table of these candidates where the stage moves in another way."""
-        there, pool = replace(self, motion=motion, made={}), table.pool()
+        there, pool = replace(self, motion=motion, made={}), table.anywhere()
         error, added, crit = (figure[pool.sensor] for figure in there._figures())
         pool = replace(pool, make=there.__call__, error=error, added=added, crit=crit)
-        return table.with_pool(pool, sync_limit)
+        here, beyond = pool.parted(self._reaches(motion)[pool.sensor])
+        return table.with_pool(here, sync_limit, beyond)
+
+    def _reaches(self, motion: Motion) -> Bools:
+        """Which sensors measure at a stage's distance."""
+        distance = float(motion.distance)
+        return np.asarray((self.near <= distance) & (distance <= self.far))
 
     @property
     def _rate(self) -> Fraction | None:
@@ -203,8 +219,8 @@ class Candidates:
         host = np.array([way.timeline == "host" for way in self.ways], dtype=bool)
         return Options(
             self.__call__, rows, self._ranks(rows), sensors, method[ways], error, added,
-            tau[ways] + extra[sensors], crit, host[ways], tuple(self._spent(sensors, ways)), needs,
-            need[ways],
+            tau[ways] + extra[sensors], crit, self.near[sensors], self.far[sensors], host[ways],
+            tuple(self._spent(sensors, ways)), needs, need[ways],
         )  # fmt: skip
 
     def _ranks(self, rows: Indices) -> Indices:
@@ -250,16 +266,17 @@ class Candidates:
             exact_systematic_m=systematic if systematic else None,
             noise_systematic_m=effects.noise_m,
             own_rate_mps=rate,
+            reach_m=(float(self.near[place]), float(self.far[place])),
         )
 
     def excluded(self, row: int) -> Excluded:
         """Why one row is no option."""
         place, number = int(self.sensor[row]), int(self.way[row])
-        name, barred = self.role.sensors[place].id, self.barred[place]
-        if barred is not None:
+        name = self.role.sensors[place].id
+        if number < 0:
             ways = [self.ways[k] for k in self.ways_of[place].tolist()]
             fitting = [self._option(place, way) for way in ways if not way.offered]
-            return _impossible(name, "", "", barred, fitting)
+            return _impossible(name, "", "", self._why(place), fitting)
         way = self.ways[number]
         if way.barred is not None:
             options = [self._option(place, way)]
@@ -268,6 +285,13 @@ class Candidates:
         if self.role.inline is not None:
             reason = f"{way.offered} is asked for; {name} has {way.served}"
         return Excluded(name, "", way.method, reason, figure=way.served, limit=way.offered)
+
+    def _why(self, place: int) -> RuledOut:
+        """Why a sensor cannot work here: how far it reaches comes first."""
+        sensor, barred = self.role.sensors[place], self.barred[place]
+        short = next(out_of_reach(sensor.id, sensor.entry, surroundings(self.stage)), barred)
+        assert short is not None
+        return short
 
 
 @dataclass(frozen=True, slots=True)
@@ -299,7 +323,8 @@ def candidates(
     """
     ways: list[_Way] = []
     by_signals: dict[tuple[str, ...], Indices] = {}
-    barred, of_sensor, terms = [], [], []
+    barred, of_sensor, terms, reach = [], [], [], []
+    around = surroundings(stage)
     for sensor in unhurried(role.sensors):
         signals = tuple(sensor.entry.serves)
         if signals not in by_signals:
@@ -307,16 +332,21 @@ def candidates(
             by_signals[signals] = np.arange(len(ways), len(ways) + len(found))
             ways += found
         of_sensor.append(by_signals[signals])
-        barred.append(barred_sensor(case, stage.choice, sensor))
+        barred.append(barred_sensor(case, stage, around, sensor))
+        reach.append(interval_of(sensor.entry, around.reflectivity))
         terms.append(_error_terms(sensor.entry, role.role))
-    shown = [own if bar is None else NO_WAY for own, bar in zip(of_sensor, barred, strict=True)]
+    shown = [
+        NO_WAY if bar is not None else own if limits == EVERYWHERE else np.append(NO_WAY, own)
+        for own, bar, limits in zip(of_sensor, barred, reach, strict=True)
+    ]
+    near, far = np.array(reach, dtype=float).reshape(-1, 2).T
     fixed, turned = np.array(terms, dtype=float).reshape(-1, 2).T
     name = stage.choice.name
     effects = tuple(by_sensor.get((name, role.role, one.id), usual) for one in role.sensors)
     sensors = np.repeat(np.arange(len(shown)), [len(own) for own in shown])
     return Candidates(
         case, stage, role, motion_of(stage), effects, tuple(barred), tuple(ways), tuple(of_sensor),
-        sensors, np.concatenate([NO_WAY[:0], *shown]), fixed, turned,
+        sensors, np.concatenate([NO_WAY[:0], *shown]), fixed, turned, near, far,
     )  # fmt: skip
 
 
@@ -337,7 +367,7 @@ def _ways(case: Case, stage: StageCase, role: RoleCase, sensor: SensorEntry) -> 
         entry = method.entry
         timeline = "utc" if entry.timeline == "utc" else "host"
         primitives = usable_primitives(sensor, entry, pinned)
-        barred = barred_method(case, stage.choice, method)
+        barred = barred_method(case, stage, method)
         tau, requires = tau_bound(entry.error, factor), tuple(sorted(entry.requires.items()))
         for primitive in primitives:
             yield _Way(primitive, method.id, tau, timeline, entry, requires, barred)
@@ -363,7 +393,7 @@ def _norm(figures: float | Sequence[float] | None, axes: int) -> float:
 
 
 def _impossible(
-    sensor: str, primitive: str, method: str, barred: Barred, options: list[Option]
+    sensor: str, primitive: str, method: str, barred: RuledOut, options: list[Option]
 ) -> Excluded:
     """The record of what cannot work on its stage, with the options that it takes along."""
     return Excluded(

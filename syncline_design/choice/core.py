@@ -36,7 +36,7 @@ class Beside:
         name = resource_of(problem)
         self.problem = problem
         self.own = {id(table.options) for table in problem.roles}
-        spent = [table.pool().spent(name) for table in problem.roles]
+        spent = [table.anywhere().spent(name) for table in problem.roles]
         clocks = [[c.resources.of(name) for c in v.clocks] for v in problem.vehicles]
         known = [a for amounts in clocks for a in amounts if a is not None]
         self.unit = math.lcm(*(s.denominator for s in spent), *(a.denominator for a in known))

@@ -12,6 +12,8 @@ import numpy as np
 
 from syncline_design.choice.options import Indices, Option, Options, sync_ratio
 
+NO_OPTIONS = Options.of(())
+
 
 @dataclass(frozen=True, slots=True)
 class Excluded:
@@ -50,12 +52,14 @@ class Exclusions(Sequence[Excluded]):
     """What a role cannot be, each record made where it is asked for.
 
     poor: options that break their own tau_crit; rest: everything else.  order: places in the
-    two, one after the other.
+    two, one after the other.  beyond: options that would be there at another distance; the record
+    of their sensor is among the rest.
     """
 
     rest: Sequence[Excluded]
     poor: Options
     order: Indices
+    beyond: Options = NO_OPTIONS
 
     @classmethod
     def of(cls, records: Sequence[Excluded]) -> Exclusions:
@@ -67,9 +71,11 @@ class Exclusions(Sequence[Excluded]):
         return cls(rest, Options.of(poor), np.array(order, dtype=np.intp))
 
     @classmethod
-    def in_turn(cls, rest: Sequence[Excluded], poor: Options) -> Exclusions:
+    def in_turn(
+        cls, rest: Sequence[Excluded], poor: Options, beyond: Options = NO_OPTIONS
+    ) -> Exclusions:
         """The rest first."""
-        return cls(rest, poor, np.arange(len(rest) + len(poor)))
+        return cls(rest, poor, np.arange(len(rest) + len(poor)), beyond)
 
     def __len__(self) -> int:
         return len(self.order)

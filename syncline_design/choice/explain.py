@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TypeVar
 
+from syncline_design.choice.fact_fixes import fact_fixes
 from syncline_design.choice.fixes import method_fixes, requirement_fixes, with_requirements
 from syncline_design.choice.joint import joint_fixes
 from syncline_design.choice.outcome import (
@@ -83,6 +84,7 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
     if not moves:
         joint = joint_fixes(case, problem, build)
     fixes += _proven(lambda: method_fixes(case, build, problem))
+    fixes += _proven(lambda: fact_fixes(case, problem, build))
     fixes += _proven(lambda: platform_fixes(case, build))
     each_suffices = _each_suffices(case, problem, build, conflict)
     found = Explanation(

@@ -27,6 +27,8 @@ MARGIN = 1e-12  # sums of floats are trusted to this; what lies closer to a limi
 INT64_ROOM = 2**61
 Requires = tuple[tuple[str, int], ...]  # (infrastructure id, channels)
 Names = tuple[str, str, str]  # sensor, primitive, method
+Interval = tuple[float, float]  # from, to
+EVERYWHERE: Interval = (0.0, math.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +65,7 @@ class Option:
     exact_systematic_m: Fraction | None = None
     noise_systematic_m: Fraction = Fraction(0)  # the share of it that is in proportion to the noise
     own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
+    reach_m: Interval = EVERYWHERE  # distances between which the sensor measures
 
     @property
     def names(self) -> Names:
@@ -188,6 +191,7 @@ class Options(Sequence[Option]):
 
     make: the option at a place of the source; at: that place.  rank: place in the order of names.
     error, added: sensor error alone, and with its systematic part [m]; crit: its own tau_crit [s].
+    near, far: distances between which the sensor measures [m].
     sensor, method: numbers that tell them apart.  needs: kinds of `requires`; need: which.
     """
 
@@ -200,6 +204,8 @@ class Options(Sequence[Option]):
     added: Floats
     tau: Floats
     crit: Floats
+    near: Floats
+    far: Floats
     host: Bools
     spends: tuple[Spent, ...]
     needs: tuple[Requires, ...]
@@ -222,6 +228,8 @@ class Options(Sequence[Option]):
             _floats(o.added_m() for o in options),
             _floats(o.tau_s for o in options),
             _floats(o.tau_crit_s for o in options),
+            _floats(o.reach_m[0] for o in options),
+            _floats(o.reach_m[1] for o in options),
             np.array([o.timeline == "host" for o in options], dtype=bool),
             spends,
             needs,
@@ -339,6 +347,10 @@ class Options(Sequence[Option]):
         for row in np.flatnonzero(~keeps & (ratios <= limit * (1.0 + MARGIN))).tolist():
             keeps[row] = sync_ratio(self[row]) < limit
         return keeps
+
+    def reach(self, near: float, far: float) -> Bools:
+        """Which options measure at some distance between two [m]."""
+        return np.asarray((self.near <= far) & (near <= self.far))
 
     def _own_ratios(self) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):

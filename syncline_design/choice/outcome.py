@@ -22,6 +22,7 @@ FixKind = Literal[
     "monte_carlo",
     "platform",
     "timestamping",
+    "facts",
     "worst_case",
     "thu",
     "tvu",

@@ -16,7 +16,7 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choice.acceptable import without_simulation
-from syncline_design.choice.options import Option
+from syncline_design.choice.options import Option, Options
 from syncline_design.choice.outcome import Fix
 from syncline_design.choice.parts import CLOSE, is_feasible
 from syncline_design.choice.table import NOTHING, Pair, Problem, RoleTable, with_limits
@@ -98,7 +98,7 @@ class _Asked:
         """Whether the far end keeps every sum and still fails in simulation: then no value helps,
         since a slower or nearer vehicle errs no more."""
         last = self._problem(end)
-        if last.judge is None or end > self.before:
+        if last.judge is None or end > self.before or self._ends_of_reach(self.before, end):
             return False
         return is_feasible(without_simulation(last)) and not is_feasible(last)
 
@@ -120,16 +120,33 @@ class _Asked:
             if not ranges:
                 return None
             one, other = ranges.pop()
-            best = better_of(self._problem(one), self._problem(other))
+            best = better_of(self._problem(one), self._problem(other), self._moved(one, other))
             if not is_feasible(best):
                 continue
             if abs(other - one) <= CLOSE * max(one, other):
-                if self._keeps_sums(other):
-                    return one, other
+                for value in (*self._ends_of_reach(one, other), other):
+                    if self._keeps_sums(value):
+                        return one, value
                 continue
             middle = math.sqrt(one * other)
             ranges += [(middle, other), (one, middle)]
         return None
+
+    def _moved(self, one: float, other: float) -> Moved | None:
+        """How the stage moves where the figure is its distance."""
+        if self.figure != "distance":
+            return None
+        return self.stage, min(one, other), max(one, other)
+
+    def _ends_of_reach(self, one: float, other: float) -> list[float]:
+        """Distances from one to another at which an option comes or goes, in that order."""
+        ends: set[float] = set()
+        for table in self._problem(one).roles if self.figure == "distance" else ():
+            if table.stage == self.stage:
+                pool = table.anywhere()
+                ends.update(np.concatenate([pool.near, pool.far]).tolist())
+        low, high = min(one, other), max(one, other)
+        return sorted((d for d in ends if low <= d <= high), reverse=other < one)
 
     def _nearer(self, start: float, end: float) -> tuple[float, float]:
         """(last value that fails, first that holds); both fail where none is found.
@@ -188,7 +205,12 @@ class _Asked:
         }
 
     def _edge(self, fails: float, works: float) -> float:
-        """The value nearest to one that fails that holds, to 1e-4."""
+        """The value nearest to one that fails that holds, to 1e-4, or where an option comes in."""
+        for end in self._ends_of_reach(fails, works):
+            if end != fails and self._holds(end):
+                works = end
+                break
+            fails = end
         close = CLOSE if self._problem(works).judge is None else SIMULATED_CLOSE
         while abs(works - fails) > close * abs(works):
             middle = 0.5 * (works + fails)
@@ -214,15 +236,21 @@ def _shares(start: float, end: float) -> Iterator[float]:
             yield value
 
 
-def better_of(one: Problem, other: Problem) -> Problem:
+Moved = tuple[int, float, float]  # a stage, and between which distances [m] its objects are
+
+
+def better_of(one: Problem, other: Problem, moved: Moved | None = None) -> Problem:
     """A problem that has a design wherever one of two, or any between them, has.
 
     For figures that move steadily from one to the other: each option takes the smaller error for
-    the total, the larger noise against its timestamps, the smaller tau and rate.
+    the total, the larger noise against its timestamps, the smaller tau and rate.  moved: where the
+    figure is the distance of a stage; its options are those that measure at any in between.
     """
     first, second = (_open(problem) for problem in (one, other))
     limit = one.limits.sync
-    roles = tuple(_better_role(a, b, limit) for a, b in zip(first.roles, second.roles, strict=True))
+    roles = tuple(
+        _better_role(a, b, limit, moved) for a, b in zip(first.roles, second.roles, strict=True)
+    )
     rate = min(one.sync_rate(), other.sync_rate())
     fixed = min(one.fixed_error(), other.fixed_error())
     pairs = tuple(_slower(a, b) for a, b in zip(one.pairs, other.pairs, strict=True))
@@ -247,9 +275,15 @@ def _slower(one: Pair, other: Pair) -> Pair:
     return replace(one, rate_mps=float(rate), exact_rate_mps=rate)
 
 
-def _better_role(one: RoleTable, other: RoleTable, limit: float) -> RoleTable:
-    first, second = one.options, other.options
+def _better_role(one: RoleTable, other: RoleTable, limit: float, moved: Moved | None) -> RoleTable:
+    """The better of each option; at every distance the same ones are in reach or beyond."""
+    near, far = (0.0, math.inf)
+    first, second = _by_name(one.pool()), _by_name(other.pool())
+    if moved is not None and moved[0] == one.stage:
+        _, near, far = moved
+        first, second = _by_name(one.anywhere()), _by_name(other.anywhere())
     keeps = first.keep_own_tau_crit(limit) | second.keep_own_tau_crit(limit)
+    keeps &= first.reach(near, far)
     beside = dict(zip(first.at.tolist(), second.at.tolist(), strict=True))
     better = replace(
         first,
@@ -260,6 +294,10 @@ def _better_role(one: RoleTable, other: RoleTable, limit: float) -> RoleTable:
         crit=np.full(len(first), math.inf),
     )
     return replace(one, options=better.take(keeps), excluded=NOTHING)
+
+
+def _by_name(options: Options) -> Options:
+    return options.take(options.by_name())
 
 
 def _better_option(one: Option, other: Option) -> Option:

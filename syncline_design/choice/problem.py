@@ -36,10 +36,10 @@ from syncline_design.choice.table import (
     with_limits,
 )
 from syncline_design.model.known import NOTHING_KNOWN, Known
+from syncline_design.spec.barred import barred_clock
 from syncline_design.spec.case import Candidate, Case, RoleCase, StageCase
 from syncline_design.spec.catalog import ClockEntry
 from syncline_design.spec.exact import fraction_of, tau_bound
-from syncline_design.spec.gnss import barred_clock
 from syncline_design.spec.selection import ClockSelection, RoleSelection, Selection
 
 
@@ -189,7 +189,8 @@ def _clock(case: Case, clock: Candidate[ClockEntry]) -> ClockOption:
 
 def _required(tables: Sequence[RoleTable], vehicles: Sequence[VehicleTable]) -> set[str]:
     """Shared hardware that any option or clock requires, excluded options included."""
-    needs = [kind for table in tables for kind in table.pool().required]
+    needs = [kind for table in tables for kind in table.anywhere().required]
+    needs += [o.requires for t in tables for one in t.excluded.rest for o in one.impossible]
     needs += [clock.requires for vehicle in vehicles for clock in vehicle.clocks]
     return {name for requires in needs for name, _ in requires}
 

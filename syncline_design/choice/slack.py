@@ -198,7 +198,10 @@ def _platform_slack(
     def kinds_broken(at: float) -> tuple[str, ...]:
         other = what_if(alone, figure, at)
         same = same_design(alone, only, other)
-        return ("sync",) if same is None else broken(other, evaluate(other, same))
+        if same is not None:
+            return broken(other, evaluate(other, same))
+        reached = all(len(table.pool()) for table in other.roles)
+        return ("sync",) if reached else ("feasible",)
 
     fails = _first(lambda at: not kinds_broken(at), _tried(value, GROWTHS))
     unit = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}[figure]

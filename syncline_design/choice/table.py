@@ -43,13 +43,22 @@ class RoleTable:
         """The options with those that break their own tau_crit."""
         return self.options.joined(self.excluded.poor)
 
-    def with_pool(self, pool: Options, limit: float) -> RoleTable:
-        """The table with these options, as far as they keep their own tau_crit times a limit."""
+    def anywhere(self) -> Options:
+        """The options at this and at any other distance, poor ones included."""
+        return self.pool().joined(self.excluded.beyond)
+
+    def with_pool(self, pool: Options, limit: float, beyond: Options | None = None) -> RoleTable:
+        """The table with these options, as far as they keep their own tau_crit times a limit.
+
+        beyond: those that are out of reach, where they are others than before.
+        """
         if np.any(np.diff(pool.rank) < 0):
             pool = pool.take(pool.by_name())
         keeps = pool.keep_own_tau_crit(limit)
         kept, poor = pool.parted(keeps)
-        return replace(self, options=kept, excluded=Exclusions.in_turn(self.excluded.rest, poor))
+        out = self.excluded.beyond if beyond is None else beyond
+        gone = Exclusions.in_turn(self.excluded.rest, poor, out)
+        return replace(self, options=kept, excluded=gone)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +251,7 @@ def with_impossible(problem: Problem) -> Problem:
             continue
         options = Options.of(sorted((*table.options, *back), key=lambda option: option.names))
         rest = [one for one in table.excluded.rest if not one.impossible]
-        excluded = Exclusions.in_turn(rest, table.excluded.poor)
+        excluded = Exclusions.in_turn(rest, table.excluded.poor, table.excluded.beyond)
         roles.append(replace(table, options=options, excluded=excluded))
     vehicles = tuple(
         replace(v, clocks=(*v.clocks, *(one.clock for one in v.excluded)), excluded=())

@@ -13,10 +13,23 @@ def bearing(azimuth_rad: Array, elevation_rad: Array) -> Array:
     Source: the paper's bearing vector (before eq. bear_posvec).
     """
     cos_el = np.cos(elevation_rad)
-    return np.stack(
-        [np.cos(azimuth_rad) * cos_el, np.sin(azimuth_rad) * cos_el, -np.sin(elevation_rad)],
-        axis=-1,
-    )
+    found = np.empty((*cos_el.shape, 3))
+    found[..., 0] = np.cos(azimuth_rad) * cos_el
+    found[..., 1] = np.sin(azimuth_rad) * cos_el
+    found[..., 2] = -np.sin(elevation_rad)
+    return found
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b row by row, (n, 3) or (3,) each; for few rows in a third of numpy's time."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    x = ay * bz - az * by
+    found = np.empty((*x.shape, 3))
+    found[..., 0] = x
+    found[..., 1] = az * bx - ax * bz
+    found[..., 2] = ax * by - ay * bx
+    return found
 
 
 def rotate(rotation: Array, vector: Array) -> Array:
@@ -28,12 +41,13 @@ def rotate(rotation: Array, vector: Array) -> Array:
 def euler_to_rotation(euler_rad: Array) -> Array:
     """R_nb of (roll, pitch, yaw), (n, 3) -> (n, 3, 3); the paper's eq. R_nb."""
     (sr, sp, sy), (cr, cp, cy) = np.sin(euler_rad).T, np.cos(euler_rad).T
-    rows = [
-        [cp * cy, -cr * sy + sr * sp * cy, sr * sy + cr * sp * cy],
-        [cp * sy, cr * cy + sr * sp * sy, -sr * cy + cr * sp * sy],
-        [-sp, sr * cp, cr * cp],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)
+    found = np.empty((*sr.shape, 3, 3))
+    srsp, crsp = sr * sp, cr * sp
+    found[..., 0, 0], found[..., 1, 0], found[..., 2, 0] = cp * cy, cp * sy, -sp
+    found[..., 0, 1], found[..., 0, 2] = srsp * cy - cr * sy, crsp * cy + sr * sy
+    found[..., 1, 1], found[..., 1, 2] = srsp * sy + cr * cy, crsp * sy - sr * cy
+    found[..., 2, 1], found[..., 2, 2] = sr * cp, cr * cp
+    return found
 
 
 def rotation_to_euler(rotation: Array) -> Array:
@@ -63,12 +77,12 @@ def antenna_to_object(rows: StageRows) -> Array:
 def antenna_velocity(rows: StageRows) -> Array:
     """V = R (v + w x l_G) [m/s], NED, (n, 3); the paper's eq. meas_gnss."""
     lever = np.broadcast_to(rows.antenna_m, rows.velocity_mps.shape)
-    return rotate(rows.rotation, rows.velocity_mps + np.cross(rows.rate_radps, lever))
+    return rotate(rows.rotation, rows.velocity_mps + cross(rows.rate_radps, lever))
 
 
 def sweep_velocity(rows: StageRows) -> Array:
     """W = R (w x q) [m/s], NED, (n, 3); the paper's eq. meas_ins times the lever q."""
-    return rotate(rows.rotation, np.cross(rows.rate_radps, antenna_to_object(rows)))
+    return rotate(rows.rotation, cross(rows.rate_radps, antenna_to_object(rows)))
 
 
 def down_axis_sweep(rows: StageRows) -> Array:

@@ -6,12 +6,19 @@ position and attitude are taken at their own shifted times, lever arms rotate.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
+from syncline_design.effects.kinematics import (
+    bearing,
+    cross,
+    euler_to_rotation,
+    rotate,
+    rotation_to_euler,
+)
 from syncline_design.effects.record import NOTHING, Array, Departures, StageRows
 from syncline_design.model.syncline import Sigma
 
@@ -36,23 +43,74 @@ def cross_matrix(vector: Array) -> Array:
     return matrix
 
 
-def _sinc_terms(angle: Array) -> tuple[Array, Array, Array]:
-    """sin a / a, (1 - cos a) / a^2, (a - sin a) / a^3, by series where a is small."""
-    small = angle < 1e-2
-    a = np.where(small, 1.0, angle)
-    a2 = angle * angle
-    first = np.where(small, 1 - a2 / 6 + a2**2 / 120, np.sin(a) / a)
+_SMALL_RAD = 1e-2
+
+
+def _sinc(angle: Array) -> Array:
+    """sin a / a, by series where a is small."""
+
+    def series(a: Array) -> Array:
+        a2 = a * a
+        return 1 - a2 / 6 + a2**2 / 120
+
+    return _by_size(angle, series, lambda a: np.sin(a) / a)
+
+
+def _versed(angle: Array) -> Array:
+    """(1 - cos a) / a^2, by series where a is small."""
+
+    def series(a: Array) -> Array:
+        a2 = a * a
+        return 0.5 - a2 / 24 + a2**2 / 720
+
     # 1 - cos a = 2 sin^2(a/2): no cancellation where a is small but above the series' limit
-    second = np.where(small, 0.5 - a2 / 24 + a2**2 / 720, 2 * np.sin(0.5 * a) ** 2 / a**2)
-    third = np.where(small, 1 / 6 - a2 / 120 + a2**2 / 5040, (a - np.sin(a)) / a**3)
-    return first, second, third
+    return _by_size(angle, series, lambda a: 2 * np.sin(0.5 * a) ** 2 / a**2)
+
+
+def _lag(angle: Array) -> Array:
+    """(a - sin a) / a^3, by series where a is small."""
+
+    def series(a: Array) -> Array:
+        a2 = a * a
+        return 1 / 6 - a2 / 120 + a2**2 / 5040
+
+    return _by_size(angle, series, lambda a: (a - np.sin(a)) / a**3)
+
+
+def _by_size(
+    angle: Array, series: Callable[[Array], Array], exact: Callable[[Array], Array]
+) -> Array:
+    """A function of angles by its series where they are small; neither is computed for nothing."""
+    small = angle < _SMALL_RAD
+    if np.all(small):
+        return series(angle)
+    if not np.any(small):
+        return exact(angle)
+    found: Array = np.where(small, series(angle), exact(np.where(small, 1.0, angle)))
+    return found
 
 
 def rotation_exp(vector: Array) -> Array:
-    """exp(S(v)), (n, 3) -> (n, 3, 3): Rodrigues' formula."""
-    first, second, _ = _sinc_terms(np.linalg.norm(vector, axis=-1))
-    s = cross_matrix(vector)
-    return np.eye(3) + first[..., None, None] * s + second[..., None, None] * (s @ s)
+    """exp(S(v)), (n, 3) -> (n, 3, 3): Rodrigues' formula.
+
+    With S^2 = v v' - a^2 I, a = |v|: (1 - a^2 (1 - cos a)/a^2) I + (sin a / a) S
+    + ((1 - cos a)/a^2) v v'.
+    """
+    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
+    square = x * x + y * y + z * z
+    angle = np.sqrt(square)
+    once, twice = _sinc(angle), _versed(angle)
+    matrix = np.empty((*vector.shape[:-1], 3, 3))
+    diagonal, ax, ay, az = 1.0 - twice * square, once * x, once * y, once * z
+    bx, by = twice * x, twice * y
+    matrix[..., 0, 0] = diagonal + bx * x
+    matrix[..., 1, 1] = diagonal + by * y
+    matrix[..., 2, 2] = diagonal + twice * z * z
+    xy, xz, yz = bx * y, bx * z, by * z
+    matrix[..., 0, 1], matrix[..., 1, 0] = xy - az, xy + az
+    matrix[..., 0, 2], matrix[..., 2, 0] = xz + ay, xz - ay
+    matrix[..., 1, 2], matrix[..., 2, 1] = yz - ax, yz + ax
+    return matrix
 
 
 def screw_displacement(velocity_mps: Array, rate_radps: Array, shift_s: Array) -> Array:
@@ -61,10 +119,12 @@ def screw_displacement(velocity_mps: Array, rate_radps: Array, shift_s: Array) -
     With a = |w s|: s (I + (1 - cos a)/a^2 S + (a - sin a)/a^3 S^2) v, S = S(w s).
     """
     turn = rate_radps * shift_s[:, None]
-    _, second, third = _sinc_terms(np.linalg.norm(turn, axis=-1))
-    once = np.cross(turn, velocity_mps)
-    twice = np.cross(turn, once)
-    return shift_s[:, None] * (velocity_mps + second[:, None] * once + third[:, None] * twice)
+    angle = np.sqrt(np.einsum("ni,ni->n", turn, turn))
+    once = cross(turn, velocity_mps)
+    twice = cross(turn, once)
+    once *= _versed(angle)[:, None]
+    twice *= _lag(angle)[:, None]
+    return shift_s[:, None] * (velocity_mps + once + twice)
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,8 +202,10 @@ def stage_error(
     if carried_m is not None:
         antenna_error = antenna_error + carried_m
     r_hat = _measured_rotation(motion.rotation(shift_a), noise, departures)
-    believed = rows.ranging_m - rows.antenna_m + _measured_vector(rows, noise, departures)
-    true_vector = rows.range_m[:, None] * bearing(rows.azimuth_rad, rows.elevation_rad)
+    direction = bearing(rows.azimuth_rad, rows.elevation_rad)
+    true_vector = rows.range_m[:, None] * direction
+    believed = rows.ranging_m - rows.antenna_m
+    believed = believed + _measured_vector(rows, noise, departures, direction)
     true = rotate(rows.rotation, rows.ranging_m + departures.ranging_m + true_vector)
     error: Array = antenna_error + rotate(r_hat, believed) - true - departures.target_m
     return error
@@ -181,7 +243,9 @@ def noise_slopes(
     slopes = np.zeros((len(rows), 3, 9))
     slopes[:, :, :3] = np.diag(sigma.position_m)
     slopes[:, :, :3] *= _column(1 + departures.position_noise)
-    lever = rows.ranging_m - rows.antenna_m + _measured_vector(rows, noise, departures)
+    direction = bearing(rows.azimuth_rad, rows.elevation_rad)
+    lever = rows.ranging_m - rows.antenna_m
+    lever = lever + _measured_vector(rows, noise, departures, direction)
     slopes[:, :, 3:6] = _euler_slopes(r_hat, lever) * np.asarray(sigma.attitude_rad)
     slopes[:, :, 3:6] *= _column(1 + departures.attitude_noise)
     slopes[:, :, 6:] = r_hat @ _polar_slopes(rows, noise, departures) * np.asarray(sigma.ranging)
@@ -196,12 +260,15 @@ def _column(values: Array) -> Array:
 def _euler_slopes(rotation: Array, lever: Array) -> Array:
     """d(R q) by roll, pitch, yaw of R, (n, 3, 3): axes in NED times R q."""
     turned = rotate(rotation, lever)
+    x, y, z = turned[:, 0], turned[:, 1], turned[:, 2]
     yaw = rotation_to_euler(rotation)[:, 2]
-    zero, one = np.zeros_like(yaw), np.ones_like(yaw)
-    pitch_axis = np.stack([-np.sin(yaw), np.cos(yaw), zero], axis=-1)
-    yaw_axis = np.stack([zero, zero, one], axis=-1)
-    axes = (rotation[:, :, 0], pitch_axis, yaw_axis)
-    return np.stack([np.cross(axis, turned) for axis in axes], axis=-1)
+    sine, cosine = np.sin(yaw), np.cos(yaw)
+    slopes = np.zeros((*turned.shape, 3))
+    slopes[:, :, 0] = cross(rotation[:, :, 0], turned)
+    # by pitch about (-sin psi, cos psi, 0), by yaw about (0, 0, 1)
+    slopes[:, 0, 1], slopes[:, 1, 1], slopes[:, 2, 1] = cosine * z, sine * z, -sine * y - cosine * x
+    slopes[:, 0, 2], slopes[:, 1, 2] = -y, x
+    return slopes
 
 
 def _polar_slopes(rows: StageRows, noise: ChainNoise, departures: Departures) -> Array:
@@ -218,10 +285,15 @@ def _polar_slopes(rows: StageRows, noise: ChainNoise, departures: Departures) ->
     return np.stack([bearing(azimuth, elevation), far * east, far * up], axis=-1)
 
 
-def _measured_vector(rows: StageRows, noise: ChainNoise, departures: Departures) -> Array:
-    """r_hat n_hat [m] in the axes the spec believes, (n, 3)."""
+def _measured_vector(
+    rows: StageRows, noise: ChainNoise, departures: Departures, direction: Array
+) -> Array:
+    """r_hat n_hat [m] in the axes the spec believes, (n, 3); direction: n as it is."""
     distance, azimuth, elevation = _measured_polar(rows, noise, departures)
-    return distance[:, None] * bearing(azimuth, elevation)
+    same = np.array_equal(azimuth, rows.azimuth_rad)
+    if not (same and np.array_equal(elevation, rows.elevation_rad)):
+        direction = bearing(azimuth, elevation)
+    return distance[:, None] * direction
 
 
 def _measured_polar(

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
+from syncline_design.effects.kinematics import bearing, cross, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.model.horizon import Horizon
 from syncline_design.simulation.chain import ChainNoise, ConstantTwist
@@ -97,7 +97,7 @@ def placed_rows(
         rotation=rotation,
         euler_rad=euler,
         velocity_mps=velocity,
-        acceleration_mps2=np.cross(rate, velocity),
+        acceleration_mps2=cross(rate, velocity),
         rate_radps=rate,
         range_m=draw.range_m,
         azimuth_rad=azimuth,

@@ -187,7 +187,7 @@ def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candida
     choice: PlatformChoice = stage.platform
     own = {
         key: value
-        for key in ("name", "v_max", "omega_max", "distance", "baseline", "source")
+        for key in ("name", "v_max", "omega_max", "distance", "baseline", "medium", "source")
         if (value := getattr(choice, key)) is not None
     }
     if choice.use is None:

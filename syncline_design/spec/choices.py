@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, PlainValidator, model_validator
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.catalog import ErrorEntry, Primitive, SensorEntry
 from syncline_design.spec.effects_listed import EffectChoice as EffectChoice
+from syncline_design.spec.facts import FieldOfView, Medium, Reflectivity, TemperatureInterval
 from syncline_design.spec.fields import (
     AngularRate,
     FileRecord,
@@ -37,6 +38,7 @@ class PlatformChoice(FileRecord):
     omega_max: AngularRate | None = None
     distance: PositiveLength | None = None
     baseline: NonNegativeLength | None = None
+    medium: Medium | None = None
     source: str | None = None
     note: str = ""
 
@@ -191,6 +193,10 @@ class StageChoice(FileRecord):
     clock: Annotated[ClockChoice | None, one_or_candidates("clock", ClockChoice)] = None
     gnss: YesNo | None = None  # None: yes for a first stage that is not at a depth
     depth: NonNegativeLength | None = None
+    medium: Literal["air", "water"] | None = None  # of the path to the object
+    look: FieldOfView | None = None  # where the ranging sensor has to look
+    temperature: TemperatureInterval | None = None
+    reflectivity: Reflectivity | None = None  # of the object
     timing_from: Text | None = None  # stage that GNSS time comes from, by a cable
     note: str = ""
 

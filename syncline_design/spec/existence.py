@@ -1,7 +1,7 @@
-"""Whether a sensor can work where it would stand: its facts against those of the stage.
+"""Whether a product can work where it would stand: its facts against those of the stage.
 
 Each rule compares two figures and says both.  What an entry does not tell rules nothing out; it is
-named, so that somebody looks it up.
+named, so that somebody looks it up.  The rules know neither specs nor catalogs, only entries.
 """
 
 from __future__ import annotations
@@ -9,13 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
-from syncline_design.spec.catalog import SensorEntry
+from syncline_design.spec.catalog import Product, SensorEntry
 from syncline_design.spec.facts import FULL_TURN, FieldOfView, Medium
 
-Code = Literal["reach", "medium", "look", "depth", "temperature", "discontinued"]
+Code = Literal[
+    "reach", "medium", "gnss", "field_of_view", "rate", "depth", "temperature", "discontinued",
+    "unknown-fact",
+]  # fmt: skip
+ORDER: tuple[Code, ...] = get_args(Code)  # the strongest reason first
 _SLACK = 1e-12  # of sums and differences of angles
 
 
@@ -23,7 +27,8 @@ _SLACK = 1e-12  # of sums and differences of angles
 class Surroundings:
     """What a stage asks of its sensors; None: it asks nothing of that kind.
 
-    nearest, farthest: distance to the object [m]; reflectivity: of the object, 0.8 for 80 %.
+    nearest, farthest: distance to the object [m]; medium: of the path to it; reflectivity: of the
+    object, 0.8 for 80 %.
     """
 
     stage: str
@@ -38,7 +43,7 @@ class Surroundings:
 
 @dataclass(frozen=True, slots=True)
 class RuledOut:
-    """Why a sensor cannot work on a stage: what its entry says and what the stage asks."""
+    """Why an entry cannot work where it would stand: what it says and what is asked of it."""
 
     code: Code
     reason: str
@@ -59,14 +64,28 @@ def ruled_out(
     identity: str, sensor: SensorEntry, around: Surroundings, allow_discontinued: bool = False
 ) -> Iterator[RuledOut]:
     """Every reason why a sensor cannot work on a stage, the strongest first."""
+    yield from out_of_reach(identity, sensor, around)
+    yield from out_of_place(identity, sensor, around)
+    if not allow_discontinued:
+        yield from not_sold(identity, sensor)
+
+
+def out_of_place(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+    """Reasons of the place that hold at any distance."""
     if sensor.modality == "ranging":
         yield from _medium(identity, sensor, around)
-        yield from _reach(identity, sensor, around)
         yield from _look(identity, sensor, around)
     yield from _depth(identity, sensor, around)
-    yield from _temperature(identity, sensor, around)
-    if not allow_discontinued:
-        yield from _lifecycle(identity, sensor)
+    yield from too_hot_or_cold(identity, sensor, around.stage, around.temperature)
+
+
+def interval_of(sensor: SensorEntry, reflectivity: float | None) -> tuple[float, float]:
+    """Distances [m] between which nothing that is known speaks against a sensor."""
+    reach = sensor.reach
+    if sensor.modality != "ranging" or reach is None:
+        return 0.0, math.inf
+    far = reach.surely_ends(reflectivity)
+    return reach.min or 0.0, math.inf if far is None else far
 
 
 def not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[NotTold]:
@@ -105,23 +124,20 @@ def _medium(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterato
         yield RuledOut("medium", reason, f"medium: {sensor.medium}", f"medium: {around.medium}")
 
 
-def _reach(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+def out_of_reach(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
     """min <= distance <= max, at both ends of the distance."""
-    reach = sensor.reach
-    if reach is None:
-        return
-    far = reach.farthest(around.reflectivity)
-    if far is not None and around.farthest > far:
+    near, far = interval_of(sensor, around.reflectivity)
+    if around.farthest > far:
         asked = f"{around.stage}.distance is {_length(around.farthest)}"
         yield RuledOut(
             "reach", f"{identity}: reaches {_length(far)}, {asked}",
             f"reach: {_length(far)}", f"distance: {_length(around.farthest)}",
         )  # fmt: skip
-    if reach.min is not None and around.nearest < reach.min:
+    if around.nearest < near:
         asked = f"{around.stage}.distance is {_length(around.nearest)}"
         yield RuledOut(
-            "reach", f"{identity}: measures from {_length(reach.min)} on, {asked}",
-            f"reach: from {_length(reach.min)}", f"distance: {_length(around.nearest)}",
+            "reach", f"{identity}: measures from {_length(near)} on, {asked}",
+            f"reach: from {_length(near)}", f"distance: {_length(around.nearest)}",
         )  # fmt: skip
 
 
@@ -134,7 +150,7 @@ def _look(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[
         if wanted is None or seen is None or lies_within(wanted, seen, axis == "azimuth"):
             continue
         reason = f"{identity}: sees {seen.text} in {axis}, {around.stage} looks {wanted.text}"
-        yield RuledOut("look", reason, f"{axis}: {seen.text}", f"{axis}: {wanted.text}")
+        yield RuledOut("field_of_view", reason, f"{axis}: {seen.text}", f"{axis}: {wanted.text}")
 
 
 def lies_within(inner: Quantity, outer: Quantity, goes_round: bool) -> bool:
@@ -158,24 +174,29 @@ def _depth(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator
         yield RuledOut("depth", reason, figure, limit)
 
 
-def _temperature(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
-    """All temperatures of the stage lie within those that the sensor works at."""
-    asked, works = around.temperature, sensor.temperature
+def too_hot_or_cold(
+    identity: str, entry: Product, where: str, asked: Quantity | None
+) -> Iterator[RuledOut]:
+    """All temperatures of a place lie within those that the product works at."""
+    works = entry.temperature
     if asked is None or works is None:
         return
     if asked.low < works.low or asked.high > works.high:
-        reason = f"{identity}: works at {works.text}, {around.stage} has {asked.text}"
+        reason = f"{identity}: works at {works.text}, {where} has {asked.text}"
         figure, limit = f"temperature: {works.text}", f"temperature: {asked.text}"
         yield RuledOut("temperature", reason, figure, limit)
 
 
-def _lifecycle(identity: str, sensor: SensorEntry) -> Iterator[RuledOut]:
+def not_sold(identity: str, entry: Product) -> Iterator[RuledOut]:
     """Only what can be had today, unless the spec allows more."""
-    lifecycle = sensor.lifecycle
+    lifecycle = entry.lifecycle
     if lifecycle is None or lifecycle.status == "active":
         return
     follower = f", {lifecycle.successor} follows it" if lifecycle.successor else ""
-    reason = f"{identity}: {lifecycle.status}, read {lifecycle.read}{follower}"
+    reason = (
+        f"{identity}: {lifecycle.status}, read {lifecycle.read}{follower}; "
+        "allow_discontinued: yes lets it in"
+    )
     figure = f"lifecycle: {lifecycle.status}"
     yield RuledOut("discontinued", reason, figure, "allow_discontinued: no")
 

@@ -61,6 +61,16 @@ MoneyInterval = Annotated[Quantity, _interval(Dimension.MONEY)]
 Rate = Annotated[float, figure_of(Dimension.FREQUENCY, 0.0, above=True)]
 
 
+def _read_reflectivity(value: Any) -> Quantity:
+    share = read_quantity(value, Dimension.RATIO, 0.0, above=True)
+    if share > 1.0:
+        raise refusal("out of range", "at most 100 %", share.text)
+    return share
+
+
+Reflectivity = Annotated[float, Reader(_read_reflectivity, quantity_schema(Dimension.RATIO))]
+
+
 def _read_far_end(value: Any) -> Quantity | dict[str, Quantity]:
     """One length, or one for each reflectivity (`10 %`) or target strength (`-30 dB`)."""
     if not isinstance(value, Mapping):
@@ -110,19 +120,51 @@ class Reach(FileRecord):
 
         A row holds for every target that reflects at least what it says; None: no row does.
         """
-        if not isinstance(self.max, Mapping):
-            return self.max
+        if self.max is None:
+            return None
         if reflectivity is None:
-            return min(self.max.values())
+            return min(self._rows().values())
         held = [
             length
-            for target, length in self.max.items()
-            if (ratio := _ratio(target)) is not None and ratio <= reflectivity * (1.0 + 1e-12)
+            for target, length in self._rows().items()
+            if (ratio := _ratio(target)) is None or ratio <= reflectivity * (1.0 + 1e-12)
         ]
         return max(held, default=None)
 
+    def surely_ends(self, reflectivity: float | None = None) -> float | None:
+        """The distance beyond which it does not measure, for all that is told; None: not told.
+
+        Where no row holds for so dark a target, those of brighter ones bound it from above.
+        """
+        far = self.farthest(reflectivity)
+        if far is not None or self.max is None or reflectivity is None:
+            return far
+        brighter = [end for row, end in self._rows().items() if _ratio(row) != math.inf]
+        return min(brighter, default=max(self._rows().values()))
+
+    def _rows(self) -> Mapping[str, float]:
+        """The far end by target; one alone holds for the reflectivity that `at` names, if any."""
+        if isinstance(self.max, Mapping):
+            return self.max
+        named = _PERCENT.search(self.at)
+        assert self.max is not None
+        return {f"{named[1]} %" if named else "": self.max}
+
+    def is_favourable(self, distance_m: float, reflectivity: float | None = None) -> bool:
+        """Whether a distance is within reach only of a target brighter than the darkest told."""
+        far = self.farthest(reflectivity)
+        if far is None or len(self._rows()) < 2:
+            return False
+        return min(self._rows().values()) < distance_m <= far
+
+
+_PERCENT = re.compile(r"([0-9]+(?:\.[0-9]+)?) ?%")
+
 
 def _ratio(target: str) -> float | None:
+    """A row's reflectivity; None where it says none, and then holds for every target."""
+    if target.endswith("dB"):  # a target strength: no reflectivity picks it
+        return math.inf
     return float(target[:-2]) / 100.0 if target.endswith("%") else None
 
 

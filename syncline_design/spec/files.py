@@ -130,10 +130,32 @@ def add_builtin(collection: Collection) -> None:
     A family (a file in a folder of the package) is read once a spec asks for one of its entries:
     most specs name a few, and reading all would take longer than checking such a spec.
     """
-    for path in sorted(_package().glob("*.yaml")):
-        shown = f"builtin:{path.name}"
-        _add_document(collection, read(path, shown), path.parent, path.parent, shown)
+    shipped = _shipped(tuple((path, _content(path)) for path in sorted(_package().glob("*.yaml"))))
+    collection.problems.extend(shipped.problems)
+    collection.digests.extend(shipped.digests)
+    collection.origins.update(shipped.origins)
+    collection.documents.update(shipped.documents)
+    for section, found in shipped.entries.items():
+        collection.entries[section].update(found)
     collection.families = True
+
+
+def _content(path: Path) -> bytes:
+    """What a file holds, read each time so that every command notes it among what it reads."""
+    try:
+        return read_bytes(path)
+    except (OSError, StopReadingError):
+        return b""  # reading it as a catalog says why
+
+
+@functools.lru_cache(maxsize=2)
+def _shipped(contents: tuple[tuple[Path, bytes], ...]) -> Collection:
+    """The files beside the families, looked over once a process as long as they hold the same."""
+    alone = Collection()
+    for path, _ in contents:
+        shown = f"builtin:{path.name}"
+        _add_document(alone, read(path, shown), path.parent, path.parent, shown)
+    return alone
 
 
 def _package() -> Path:

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
 
 from syncline_design.spec.case import Candidate, Case
 from syncline_design.spec.catalog import ClockEntry, SensorEntry, TimestampingEntry
 from syncline_design.spec.choices import StageChoice
+from syncline_design.spec.existence import RuledOut
 from syncline_design.spec.spec import Spec
 
 GENERIC = ("gnss", "gps", "satnav")  # inside a word too: dgps, GnssCompass
@@ -24,24 +23,13 @@ SYSTEMS = {"navstar", "glonass", "galileo", "beidou", "bds", "qzss", "navic", "i
 AUGMENTATIONS = {"sbas", "egnos", "waas", "msas", "gagan", "sdcm", "kass"}
 CORRECTIONS = {"ppp", "vrs", "ntrip", "omnistar", "terrastar"}
 NAMES = SYSTEMS | AUGMENTATIONS | CORRECTIONS | {"satellite", "global positioning"}
-Code = Literal["gnss"]
-
-
-@dataclass(frozen=True, slots=True)
-class Barred:
-    """Why an entry cannot work where it would stand: what the entry says, what the spec offers."""
-
-    code: Code
-    reason: str
-    figure: str
-    limit: str
 
 
 def has_gnss(spec: Spec, stage: StageChoice) -> bool:
     """Whether a stage has GNSS of its own."""
     if stage.gnss is not None:
         return stage.gnss
-    return stage.name == spec.stages[0].name and not _is_submerged(stage)
+    return stage.name == spec.stages[0].name and not is_submerged(stage)
 
 
 def has_gnss_time(spec: Spec, stage: StageChoice) -> bool:
@@ -59,7 +47,8 @@ def _along_cables(spec: Spec, stage: StageChoice) -> Iterator[StageChoice]:
         stage = by_name[stage.timing_from]
 
 
-def _is_submerged(stage: StageChoice) -> bool:
+def is_submerged(stage: StageChoice) -> bool:
+    """Whether a stage is under water."""
     return stage.depth is not None and stage.depth > 0
 
 
@@ -76,27 +65,27 @@ def is_receiver(kind: str) -> bool:
     )
 
 
-def barred_sensor(case: Case, stage: StageChoice, sensor: Candidate[SensorEntry]) -> Barred | None:
-    """Why a sensor cannot work on a stage; None where it can."""
+def deaf_sensor(case: Case, stage: StageChoice, sensor: Candidate[SensorEntry]) -> RuledOut | None:
+    """Why a sensor would not hear on a stage; None where it needs no GNSS, or there is some."""
     needs = "gnss" in sensor.entry.needs or is_receiver(sensor.entry.type)
     if not needs or has_gnss(case.spec, stage):
         return None
     hint = "write gnss: yes in the stage where its antenna is above the water"
     reason = f"{sensor.id} needs GNSS; {stage.name} has none{_why(case.spec, stage)}; {hint}"
-    return Barred("gnss", reason, "needs: gnss", "gnss: no")
+    return RuledOut("gnss", reason, "needs: gnss", "gnss: no")
 
 
-def barred_method(
+def untimed_method(
     case: Case, stage: StageChoice, method: Candidate[TimestampingEntry]
-) -> Barred | None:
-    """Why a timestamping method cannot work on a stage; None where it can."""
+) -> RuledOut | None:
+    """Why a timestamping method lacks GNSS time on a stage; None where it does not."""
     if not _needs_gnss(case, method.entry) or has_gnss_time(case.spec, stage):
         return None
     return _without_time(stage.name, method.id, _why(case.spec, stage))
 
 
-def barred_clock(case: Case, vehicle: str, clock: Candidate[ClockEntry]) -> Barred | None:
-    """Why a clock cannot be disciplined so on a vehicle; None where it can."""
+def untimed_clock(case: Case, vehicle: str, clock: Candidate[ClockEntry]) -> RuledOut | None:
+    """Why a clock lacks GNSS time on a vehicle; None where it does not."""
     spec = case.spec
     stages = [stage for stage in spec.stages if stage.vehicle_name == vehicle]
     if not _needs_gnss(case, clock.entry) or any(has_gnss_time(spec, stage) for stage in stages):
@@ -104,19 +93,19 @@ def barred_clock(case: Case, vehicle: str, clock: Candidate[ClockEntry]) -> Barr
     return _without_time(vehicle, clock.id, _why(spec, stages[0]))
 
 
-def _without_time(where: str, name: str, why: str) -> Barred:
+def _without_time(where: str, name: str, why: str) -> RuledOut:
     hint = (
         "write gnss: yes in the stage if it has GNSS, timing_from: STAGE if a cable brings its time"
     )
     reason = f"{name} needs GNSS time; {where} has none{why}; {hint}"
-    return Barred("gnss", reason, "needs: gnss", "gnss: no")
+    return RuledOut("gnss", reason, "needs: gnss", "gnss: no")
 
 
 def _why(spec: Spec, stage: StageChoice) -> str:
     """How the spec comes to say that a stage has no GNSS."""
     if stage.gnss is not None:
         return " (gnss: no)"
-    if _is_submerged(stage):
+    if is_submerged(stage):
         return f" (depth: {getattr(stage.depth, 'text', stage.depth)})"
     return " (a later stage has none unless it says so)" if stage != spec.stages[0] else ""
 

@@ -23,6 +23,7 @@ from syncline_design.spec.fields import (
     PositiveMoney,
     PositiveNumber,
     Text,
+    YesNo,
     did_you_mean,
     refusal,
     refusals,
@@ -113,6 +114,8 @@ class Spec(FileRecord):
         MethodChoice | None, one_or_candidates("timestamping", MethodChoice)
     ] = None
     coverage_factor: PositiveNumber = 3.0
+    strict_facts: YesNo = False  # a fact that is asked for and not told rules out
+    allow_discontinued: YesNo = False
     horizon: HorizonChoice = Field(default_factory=HorizonChoice)
     objective: Literal["cost", "mass", "power", "error"] = "cost"
     monte_carlo: MonteCarloChoice = Field(default_factory=MonteCarloChoice)

@@ -4,12 +4,18 @@ The rules, written down once more for the recheck: a sensor that receives GNSS s
 that has it; a method needs GNSS time where its sensor is, a clock where one of its vehicle's stages
 is.  A stage has GNSS if it says so; silent, the first one has it at the surface (no depth, or
 zero), and no other one.  Time also comes along `timing_from`, as many cables on as there are.
+A ranging sensor measures through the medium of its path (the stage's word, water below the surface,
+the platform's word), from its least to its largest distance, in every direction that is looked at.
+Housings stand the depth, everything stands the temperature, and can be had.  What is not told
+speaks against nothing, unless the spec is strict about facts.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any
 
 from syncline_design.spec.case import Case
@@ -37,20 +43,23 @@ def _sensors_and_methods(case: Case, selection: Selection) -> Iterator[str]:
         listens = _asks(sensor) or RECEIVER.search(sensor.type.casefold()) is not None
         if listens and one.stage not in received:
             yield f"{one.sensor} ({one.role} of {one.stage}) needs GNSS, {one.stage} has none"
+        yield from _standing(case, stages[one.stage], one.sensor, sensor)
         if role.inline is not None:
             continue  # an error given in place names no method
         if _asks_with_hardware(case, method) and one.stage not in timed:
             yield f"{one.method} ({one.role} of {one.stage}) needs GNSS time, there is none"
+        yield from _parts(case, one.method, method, [stages[one.stage].choice])
 
 
 def _clocks(case: Case, selection: Selection) -> Iterator[str]:
     timed = _timed(case)
     for one in selection.clocks:
         clock = case.clock(one.vehicle, one.id)
-        if clock is None or not _asks_with_hardware(case, clock):
+        if clock is None:
             continue
-        aboard = {s.name for s in case.spec.stages if (s.vehicle or s.name) == one.vehicle}
-        if not aboard & timed:
+        aboard = [s for s in case.spec.stages if (s.vehicle or s.name) == one.vehicle]
+        yield from _parts(case, str(one.id), clock, aboard)
+        if _asks_with_hardware(case, clock) and not {s.name for s in aboard} & timed:
             yield f"clock {one.id} of {one.vehicle} needs GNSS time, there is none"
 
 
@@ -81,3 +90,130 @@ def _asks(entry: Any) -> bool:
 def _asks_with_hardware(case: Case, entry: Any) -> bool:
     hardware = (case.hardware[name].entry for name in entry.requires)
     return _asks(entry) or any(_asks(one) for one in hardware)
+
+
+def _parts(case: Case, name: str, entry: Any, stages: list[Any]) -> Iterator[str]:
+    """A method or clock, and the hardware behind it: sold, and warm enough on every stage."""
+    for part, one in ((name, entry), *((i, case.hardware[i].entry) for i in entry.requires)):
+        yield from _sold(case, part, one)
+        for stage in stages:
+            yield from _warm(part, one, stage)
+
+
+def _standing(case: Case, stage: Any, name: str, sensor: Any) -> Iterator[str]:
+    """A sensor against what its stage asks."""
+    choice = stage.choice
+    yield from _sold(case, name, sensor)
+    yield from _warm(name, sensor, choice)
+    if choice.depth and sensor.depth_rating is not None and choice.depth > sensor.depth_rating:
+        yield f"{name} stands {sensor.depth_rating:g} m, {choice.name} is {choice.depth:g} m deep"
+    if sensor.modality == "ranging":
+        yield from _path(stage, name, sensor)
+        yield from _directions(choice, name, sensor)
+    if case.spec.strict_facts:
+        yield from (f"{name} does not tell its {key}" for key in _silent(stage, sensor))
+
+
+def _sold(case: Case, name: str, entry: Any) -> Iterator[str]:
+    state = "active" if entry.lifecycle is None else entry.lifecycle.status
+    if state in ("discontinued", "announced") and not case.spec.allow_discontinued:
+        yield f"{name} is {state}"
+
+
+def _warm(name: str, entry: Any, choice: Any) -> Iterator[str]:
+    asked, stands = choice.temperature, entry.temperature
+    if asked is not None and stands is not None:
+        inside = stands.low <= asked.low <= asked.high <= stands.high
+        if not inside:
+            yield f"{name} works at {stands.text}, {choice.name} has {asked.text}"
+
+
+def _medium(stage: Any) -> str | None:
+    """Of the path from a stage to its object; None: nobody says."""
+    choice, platform = stage.choice, stage.platform.entry
+    found: str | None = choice.medium or ("water" if choice.depth else platform.medium)
+    return found
+
+
+def _path(stage: Any, name: str, sensor: Any) -> Iterator[str]:
+    where, distance, through = stage.choice.name, stage.platform.entry.distance, _medium(stage)
+    if (sensor.medium, through) in (("air", "water"), ("water", "air")):
+        yield f"{name} measures through {sensor.medium}, {where} looks into {through}"
+    reach = sensor.reach
+    if reach is None:
+        return
+    if reach.min is not None and distance < reach.min:
+        yield f"{name} begins at {reach.min:g} m, {where} is {distance:g} m away"
+    known = _told_reach(stage.choice.reflectivity, reach)[1]
+    if known is not None and distance > known:
+        yield f"{name} ends at {known:g} m, {where} is {distance:g} m away"
+
+
+def _told_reach(reflectivity: float | None, reach: Any) -> tuple[float | None, float | None]:
+    """How far is told for a target, and beyond what it surely does not measure.
+
+    Rows of a table hold for targets at least as bright as they say; a single length for those that
+    `at` names, if it names any.
+    """
+    if reach.max is None:
+        return None, None
+    rows = reach.max
+    if not isinstance(rows, dict):
+        named = re.search(r"[0-9.]+ ?%", reach.at)
+        rows = {named[0] if named else "": rows}
+    if reflectivity is None:
+        return min(rows.values()), min(rows.values())
+    plain, darker, brighter = [], [], []
+    for target, length in rows.items():
+        if target.endswith("dB"):
+            continue
+        if not target:
+            plain.append(length)
+        elif float(target.rstrip("% ")) / 100.0 <= reflectivity * (1.0 + 1e-12):
+            darker.append(length)
+        else:
+            brighter.append(length)
+    if plain or darker:
+        return max(plain + darker), max(plain + darker)
+    return None, min(brighter) if brighter else max(rows.values())
+
+
+def _directions(choice: Any, name: str, sensor: Any) -> Iterator[str]:
+    """Each asked direction lies in the field of view; azimuth is the same after a turn.
+
+    On the circle it is enough to look at both ends, and midway between every two angles at which
+    seeing begins or ends.
+    """
+    for axis in ("azimuth", "elevation"):
+        asked = getattr(choice.look, axis, None)
+        seen = getattr(sensor.field_of_view, axis, None)
+        if asked is None or seen is None:
+            continue
+        turns = [k * 2.0 * math.pi for k in range(-4, 5)] if axis == "azimuth" else [0.0]
+        edges = [end + turn for end in (seen.low, seen.high) for turn in turns]
+        inner = sorted({asked.low, asked.high, *(e for e in edges if asked.low < e < asked.high)})
+        points = [*inner[:: len(inner) - 1 or 1], *((a + b) / 2 for a, b in pairwise(inner))]
+        if not all(
+            any(seen.low - 1e-12 <= at + turn <= seen.high + 1e-12 for turn in turns)
+            for at in points
+        ):
+            yield f"{name} sees {axis} {seen.text}, {choice.name} looks {asked.text}"
+
+
+def _silent(stage: Any, sensor: Any) -> Iterator[str]:
+    """Facts that the stage asks for and the entry does not give."""
+    choice = stage.choice
+    if choice.depth and sensor.depth_rating is None:
+        yield "depth rating"
+    if choice.temperature is not None and sensor.temperature is None:
+        yield "temperature"
+    if sensor.modality != "ranging":
+        return
+    if _medium(stage) is not None and sensor.medium is None:
+        yield "medium"
+    if sensor.reach is None or _told_reach(choice.reflectivity, sensor.reach)[0] is None:
+        yield "reach"
+    for axis in ("azimuth", "elevation"):
+        asked, seen = (getattr(one, axis, None) for one in (choice.look, sensor.field_of_view))
+        if asked is not None and seen is None:
+            yield f"field of view in {axis}"

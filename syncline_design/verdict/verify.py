@@ -30,6 +30,7 @@ from syncline_design.verdict.acceptance import (
     simulation_settings,
 )
 from syncline_design.verdict.cautions import cautions
+from syncline_design.verdict.cautions_of_facts import lifecycle_cautions
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
 from syncline_design.verdict.design_data import (
     assumptions,
@@ -337,6 +338,7 @@ def _verdict(
         warnings=(
             *cautions(case, verified, figures, assumed, transcripts(entries)),
             *claim_cautions(case, entries),
+            *lifecycle_cautions(entries),
         ),
         figures=figures,
         assumptions=assumed,

@@ -21,7 +21,9 @@ from syncline_design.logs.readers.stream import (
     Frame,
     Incomplete,
     Nanoseconds,
+    Nature,
     Piece,
+    PointTimes,
     StampColumn,
     Stamps,
     Stream,
@@ -59,6 +61,8 @@ class Facts:
     body: Body = "unknown"
     kind: str = ""
     columns: tuple[str, ...] = ()
+    nature: Nature = "unknown"
+    points: PointTimes | None = None
 
 
 @dataclass(slots=True)
@@ -145,6 +149,8 @@ class BatchRecording(ABC):
             body=facts.body,
             kind=facts.kind,
             columns=facts.columns or tally.columns,
+            nature=facts.nature,
+            points=facts.points,
         )
 
     def samples(self, name: str) -> Iterator[Piece]:

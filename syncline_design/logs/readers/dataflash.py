@@ -210,6 +210,7 @@ class DataFlashRecording(BatchRecording):
             notes=tuple(notes),
             body="frd" if meaning.body else "unknown",
             kind=kind.name,
+            nature=meaning.nature,
         )
 
 

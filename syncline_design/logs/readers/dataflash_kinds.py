@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.readers.epochs import GPS_EPOCH_S, NANO, WEEK_S
-from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds
+from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Nature
 
 Values = Mapping[str, NDArray[Any]]
 Made = dict[str, NDArray[Any]]
@@ -45,6 +45,7 @@ class Meaning:
     renamed: Mapping[str, str] = field(default_factory=dict)
     made: Callable[[Values], Made] | None = None
     taken: frozenset[str] = frozenset()
+    nature: Nature = "unknown"
 
     def columns(self, values: Values) -> Made:
         own = {new: values[old].astype(float) for old, new in self.renamed.items()}
@@ -80,6 +81,10 @@ KINDS: dict[str, tuple[str, ...]] = {
     "ATT": (),
     "IMU": (),
     "RFND": (),
+}
+NATURES: dict[str, Nature] = {
+    **dict.fromkeys(("POS", "AHR", "NKF", "XKF", "ATT"), "fused"),
+    "SIM": "truth",
 }
 NOT_THESE = frozenset({"NKF2", "NKF3", "NKF4", "NKF5", "NKF7", "NKF8", "NKF9"})
 
@@ -119,6 +124,7 @@ def meaning_of(name: str, fields: tuple[str, ...]) -> Meaning:
         renamed,
         made,
         frozenset(renamed) | here_taken,
+        NATURES.get(name.rstrip("0123456789"), "measured"),
     )
 
 

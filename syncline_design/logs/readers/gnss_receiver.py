@@ -269,6 +269,7 @@ class ReceiverRecording(BatchRecording):
             of_times=of_times,
             body="frd" if "attitude" in quantity else "unknown",
             kind=kind or "GGA, RMC, GLL, GNS, GST",
+            nature="measured" if quantity else "unknown",
             columns=columns,
         )
 
@@ -303,6 +304,7 @@ class ReceiverRecording(BatchRecording):
             body="frd" if "attitude" in quantity or "rate" in quantity else "unknown",
             kind=name,
             columns=columns,
+            nature="fused" if "attitude" in quantity else "measured" if quantity else "unknown",
         )
 
     def _has_high(self) -> bool:

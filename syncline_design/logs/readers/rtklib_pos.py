@@ -202,6 +202,7 @@ class PosRecording(BatchRecording):
             primary=header.system or "time",
             notes=tuple(notes),
             kind="RTKLIB " + header.place,
+            nature="measured",
         )
 
 

@@ -122,6 +122,7 @@ class SbetRecording(BatchRecording):
             ),
             body="frd",
             kind="SBET",
+            nature="fused",
         )
 
 

@@ -20,6 +20,9 @@ points         point_{x,y,z}_m of a cloud, in the stream's frame
 clock          one more time of the message, as NAME_ns
 
 Other columns (quality, week, ...) have names of their own, unit last.
+
+From where the stamps of a timeline count is said in `epochs.py`: those of `utc`, `gps` and `tai` as
+their calendars read since 1970.
 """
 
 from __future__ import annotations

@@ -1,0 +1,237 @@
+"""LAS and LAZ clouds as a stream of points with their GPS times.
+
+The header says whether times are seconds of the GPS week or adjusted standard time (GPS seconds
+minus 1e9); where the values cannot be what it says, the values count, and that is said.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
+from syncline_design.logs.readers.epochs import (
+    ADJUSTED_S,
+    GPS_EPOCH_S,
+    NANO,
+    WEEK_S,
+    WEEK_SECONDS,
+    nanoseconds_of,
+)
+from syncline_design.logs.readers.las_header import MAGIC, TIMED, LasClaims, claims_of
+from syncline_design.logs.readers.laz_cut import mended
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Recording
+from syncline_design.logs.refusals import refuse
+from syncline_design.spec.load import BadInput
+
+FORMAT = "LAS or LAZ cloud"
+PIECE_BYTES = 1 << 25
+PANIC = "PanicException"  # what a library in Rust raises beside all exceptions of Python
+MOST_ROWS = 50_000  # the size of a chunk as most writers pack them
+NARROWER = 30  # times fewer points at once, where a piece cannot be read as a whole
+LAST_WEEK_SECOND = 2.0 * WEEK_S  # seconds may run on past the end of the week
+SHIFT_NS = (ADJUSTED_S + GPS_EPOCH_S) * NANO  # adjusted standard time to `gps`
+
+
+class LasRecording(BatchRecording):
+    """One cloud, some hundred thousand points at a time."""
+
+    format = FORMAT
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(path)
+        with path.open("rb") as file:
+            self._claims: LasClaims = claims_of(path, file.read(4096), path.stat().st_size)
+        self._laspy = library("laspy", path, FORMAT)
+        if self._claims.packed:
+            library("lazrs", path, FORMAT)
+        self._adjusted: bool | None = None  # what the values say
+        self._not_finite = 0
+        self._back = 0
+        self._frame: Frame = "unknown"
+
+    def _batches(self, wanted: str | None) -> Iterator[Batch]:
+        timed = self._claims.point_format in TIMED
+        count = unknown = back = 0
+        last = -np.inf
+        for points in self._clouds():
+            stamps = None
+            if timed:
+                times = np.asarray(points.gps_time, dtype=float)
+                if self._adjusted is None:
+                    self._adjusted = _look_adjusted(times)
+                stamps = self._stamps(times)
+                known = times[np.isfinite(times)]
+                unknown += times.shape[0] - known.shape[0]
+                back += int(np.count_nonzero(np.diff(np.concatenate([[last], known])) < 0))
+                last = float(known[-1]) if known.shape[0] else last
+            count += len(points)
+            columns = _columns(points) if wanted is not None else dict.fromkeys(_NAMES, _NONE)
+            yield Batch(self.path.stem, len(points), stamps, None, columns)
+        if not count:
+            raise refuse(self.path, "no point in the cloud")
+        self._not_finite, self._back = unknown, back
+
+    def _clouds(self) -> Iterator[Any]:
+        """Points, up to the last that can be read."""
+        claims = self._claims
+        size = self.path.stat().st_size
+        there = claims.points
+        if not claims.packed:
+            there = min(there, (size - claims.offset) // claims.record)
+        rows, count, said = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record)), 0, ""
+        while rows and count < there:
+            try:
+                for points in self._from(count, there, rows):
+                    count += len(points)
+                    yield points
+            except BadInput:
+                raise
+            except BaseException as error:  # lazrs and laspy raise many kinds, lazrs panics too
+                if not isinstance(error, Exception) and type(error).__name__ != PANIC:
+                    raise
+                said = said or (str(error).splitlines() or [type(error).__name__])[0][:120]
+                if not claims.packed:
+                    break
+                rows = rows // NARROWER if rows > NARROWER else rows // 2
+            else:
+                break
+        if not count and said:
+            raise refuse(self.path, "no readable LAS or LAZ cloud", found=said)
+        if count < claims.points:
+            reason = f"{count} of {claims.points} points are there"
+            self._cut(f"{reason}: {said}" if said else reason, count)
+
+    def _from(self, first: int, end: int, rows: int) -> Iterator[Any]:
+        """Points from one on, some at a time; those before are unpacked once more."""
+        with self.path.open("rb") as file, quiet("laspy"):
+            reader = self._reader(file)
+            self._frame = _frame(reader.header)
+            at = 0
+            while at < first:
+                at += len(reader.read_points(min(first - at, MOST_ROWS)))
+            while at < end:
+                points = reader.read_points(min(rows, end - at))
+                if not len(points):
+                    return
+                at += len(points)
+                yield points
+
+    def _reader(self, file: BinaryIO) -> Any:
+        """laspy's, unpacking from front to back: a cut file has lost its table of chunks."""
+        if not self._claims.packed:
+            return self._laspy.open(file, closefd=False)
+        header = self._laspy.LasHeader.read_from(file)
+        record = header.vlrs.get("LasZipVlr")[0].record_data_bytes()
+        source = mended(self.path, file, self._claims, bytes(record))
+        source.seek(0)
+        return self._laspy.open(source, closefd=False, laz_backend=self._laspy.LazBackend.Lazrs)
+
+    def _stamps(self, times: NDArray[np.float64]) -> Nanoseconds:
+        stamps = nanoseconds_of(times)
+        if not self._adjusted:
+            return stamps
+        shifted: Nanoseconds = np.where(stamps == UNSET, UNSET, stamps + SHIFT_NS)
+        return shifted
+
+    def _facts(self, name: str) -> Facts:
+        claims = self._claims
+        of_times = self._time_notes()
+        notes = []
+        if self._frame == "unknown":
+            notes.append("the file does not say in which frame its points are")
+        return Facts(
+            quantity=("points",),
+            frame=self._frame,
+            timeline="gps" if self._adjusted else "unknown",
+            primary="GPS time" if self._adjusted else WEEK_SECONDS,
+            notes=tuple(notes),
+            of_times=of_times,
+            kind=f"LAS {claims.version}, point format {claims.point_format}",
+            columns=_NAMES,
+            nature="measured",
+        )
+
+    def _time_notes(self) -> tuple[str, ...]:
+        claims = self._claims
+        said = []
+        if self._adjusted:
+            said.append("adjusted standard GPS time: GPS seconds minus 1e9")
+        else:
+            said.append("seconds of the GPS week: the week is not in the file")
+        if self._adjusted and not claims.standard_time:
+            said.append(
+                "the header says seconds of the GPS week, but the values are larger than any: they "
+                "are adjusted standard time"
+            )
+        elif claims.standard_time and not self._adjusted:
+            said.append(
+                "the header says adjusted standard time, but the values are seconds of a week "
+                "(else they would be of September 2011)"
+            )
+        if self._not_finite:
+            said.append(f"{self._not_finite} points have no finite time")
+        if self._back:
+            said.append(f"points are not in the order of their times: {self._back} steps back")
+        return tuple(said)
+
+
+@contextmanager
+def quiet(name: str) -> Iterator[None]:
+    """Without what a library logs of an error that it also raises."""
+    logger = logging.getLogger(name)
+    before = logger.level
+    logger.setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        logger.setLevel(before)
+
+
+_NAMES = ("point_x_m", "point_y_m", "point_z_m", "intensity", "point_source_id")
+_NONE: NDArray[Any] = np.zeros(0)
+
+
+def _columns(points: Any) -> dict[str, NDArray[Any]]:
+    columns = {f"point_{a}_m": np.asarray(getattr(points, a), dtype=float) for a in "xyz"}
+    for name in ("intensity", "point_source_id"):
+        columns[name] = np.asarray(points[name])
+    return columns
+
+
+def _look_adjusted(times: NDArray[np.float64]) -> bool:
+    """Whether times are adjusted standard ones: no second of a week is as large, or below zero."""
+    known = times[np.isfinite(times)]
+    if not known.shape[0]:
+        return False
+    middle = float(np.median(known))
+    return not 0 <= middle < LAST_WEEK_SECOND
+
+
+def _frame(header: Any) -> Frame:
+    """By the words of the coordinate system, where the header holds one."""
+    words = ""
+    for record in header.vlrs:
+        for name in ("string", "strings"):
+            words += str(getattr(record, name, ""))
+    if "UTM" in words:
+        return "utm"
+    return "unknown"
+
+
+def _recognises(head: Head) -> int:
+    return BY_MAGIC if head.start.startswith(MAGIC) and len(head.start) > 104 else NO
+
+
+def _open(path: Path) -> Recording:
+    return LasRecording(path)
+
+
+READER = Reader(FORMAT, _recognises, _open)

@@ -1,0 +1,83 @@
+"""What a verdict stands on that an entry does not tell, or tells of a better case than is asked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.system import System
+from syncline_design.spec.barred import path_medium, surroundings
+from syncline_design.spec.case import Case, StageCase
+from syncline_design.spec.catalog import Product, SensorEntry
+from syncline_design.spec.existence import not_told
+from syncline_design.verdict.design_data import UsedEntry
+from syncline_design.verdict.tree import Caution
+
+# The order in which a wrong guess costs: first what nothing works without.
+FIRST = ("reach", "medium", "field_of_view", "rate", "depth_rating", "temperature")
+Chosen = tuple[StageCase, str, SensorEntry]
+
+
+def fact_cautions(case: Case, system: System) -> tuple[Caution, ...]:
+    """Facts that a rule of this spec needs of the chosen payload and nobody gives, the weightiest
+    first; then what holds for bright objects alone."""
+    chosen = list(_chosen(case, system))
+    silent = [caution for one in chosen for caution in _silent(one)]
+    silent += [caution for one in chosen for caution in _pathless(one)]
+    silent.sort(key=lambda one: FIRST.index((one.key or "").partition(".")[0]))
+    return (*silent, *_favoured(chosen))
+
+
+def _chosen(case: Case, system: System) -> Iterator[Chosen]:
+    for stage, found in zip(system.stages, case.stages, strict=True):
+        for one in stage.sensors():
+            role = found.role(one.role)
+            entry = None if role is None else role.sensor(one.id)
+            if entry is not None:
+                yield found, one.id, entry
+
+
+def _silent(one: Chosen) -> Iterator[Caution]:
+    stage, name, entry = one
+    for fact in not_told(name, entry, surroundings(stage)):
+        yield Caution("unknown-fact", fact.reason, entry=fact.entry, key=fact.key)
+
+
+def _pathless(one: Chosen) -> Iterator[Caution]:
+    """A ranging sensor of one medium where nobody says what its path goes through."""
+    stage, name, entry = one
+    if entry.modality != "ranging" or entry.medium in (None, "both"):
+        return
+    if path_medium(stage) is None:
+        yield Caution(
+            "unknown-fact",
+            f"{stage.choice.name} gives no medium, {name} measures through {entry.medium}: "
+            "say in the stage what its path goes through",
+            entry=stage.platform.id,
+            key="medium",
+        )
+
+
+def _favoured(chosen: list[Chosen]) -> Iterator[Caution]:
+    """A distance that is within reach only because the object is said to be bright."""
+    for stage, name, entry in chosen:
+        distance, share = stage.platform.entry.distance, stage.choice.reflectivity
+        if entry.reach is not None and entry.reach.is_favourable(distance, share):
+            shown = getattr(distance, "text", format_quantity(distance, Dimension.LENGTH))
+            yield Caution(
+                "favourable-reach",
+                f"{name} reaches {shown} only with the reflectivity that {stage.choice.name} "
+                "says its object has: darker ones are out of reach",
+                entry=name,
+                key="reach",
+            )
+
+
+def lifecycle_cautions(entries: Iterable[UsedEntry]) -> Iterator[Caution]:
+    """What is chosen though it is no longer sold, or not yet."""
+    for one in entries:
+        sold = one.entry.lifecycle if isinstance(one.entry, Product) else None
+        if sold is not None and sold.status != "active":
+            after = f"; {sold.successor} follows it" if sold.successor else ""
+            message = f"{one.id} is {sold.status}, read {sold.read}{after}"
+            yield Caution("discontinued", message, entry=one.id, key="lifecycle")

@@ -1,0 +1,32 @@
+"""What every test process shares: how it is set up, none of it visible to the tests themselves."""
+
+from __future__ import annotations
+
+import atexit
+import gc
+import os
+import shutil
+import tempfile
+
+import pytest
+
+# Matrices are small and many: two threads of the linear algebra library cost more than they do, and
+# the command sets the same.  Before numpy is imported; that threads change no digit is a test of
+# its own (test_diagnose_checks), which starts its processes with a number of threads of its own.
+for _library in ("OMP", "OPENBLAS", "MKL"):
+    os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+
+# Every command that a test starts in a process of its own would compile the package anew where
+# Python is told to write no bytecode: it goes to a folder that the run removes again.
+if os.environ.pop("PYTHONDONTWRITEBYTECODE", None):
+    _bytecode = tempfile.mkdtemp(prefix="bytecode-")
+    os.environ["PYTHONPYCACHEPREFIX"] = _bytecode
+    atexit.register(shutil.rmtree, _bytecode, ignore_errors=True)
+
+
+def pytest_collection_finish(session: pytest.Session) -> None:
+    """Thousands of collected tests are no garbage: do not look through them again and again."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(50_000, 20, 20)
