@@ -32,8 +32,10 @@ class Flight:
         return len(self.stamp_ns)
 
 
-def flight(seconds: float = 60.0, hertz: float = 10.0, late_s: float = 0.0) -> Flight:
-    """late_s: how much older the state is than its stamp."""
+def flight(
+    seconds: float = 60.0, hertz: float = 10.0, late_s: float = 0.0, noise_m: float = 0.0
+) -> Flight:
+    """late_s: how much older the state is than its stamp; noise_m: white, of the places."""
     count = round(seconds * hertz)
     since = np.arange(count) / hertz
     t = since - late_s
@@ -52,7 +54,8 @@ def flight(seconds: float = 60.0, hertz: float = 10.0, late_s: float = 0.0) -> F
     h = 1e-4
     velocity = (place_at(t + h) - place_at(t - h)) / (2 * h)
     rate = (turn_at(t - h).inv() * turn_at(t + h)).as_rotvec() / (2 * h)
-    return Flight(stamp, place_at(t), velocity, turn_at(t), rate)
+    scatter = noise_m * np.random.default_rng(5).standard_normal((count, 3))
+    return Flight(stamp, place_at(t) + scatter, velocity, turn_at(t), rate)
 
 
 def geodetic(ned: np.ndarray) -> np.ndarray:
@@ -88,14 +91,17 @@ def ros_quaternion(turn: Rotation) -> np.ndarray:
     return (TO_ENU * turn * TO_FLU.inv()).as_quat()
 
 
-def ros_messages(store, made: Flight, seq: bool, receive_s: float = 0.004) -> list:  # type: ignore[no-untyped-def]
-    """(topic, type, log time, message) of a NavSatFix, an Imu and an Odometry a stamp."""
+def ros_messages(store, made: Flight, seq: bool, fixes: Flight | None = None) -> list:  # type: ignore[no-untyped-def]
+    """(topic, type, log time, message) of a NavSatFix, an Imu and an Odometry a stamp.
+
+    fixes: what the receiver says, where that is another state than the truth.
+    """
     types = store.types
     header = types["std_msgs/msg/Header"]
     time = types["builtin_interfaces/msg/Time"]
     vector, point = types["geometry_msgs/msg/Vector3"], types["geometry_msgs/msg/Point"]
     quaternion = types["geometry_msgs/msg/Quaternion"]
-    globe = geodetic(made.place)
+    globe = geodetic((fixes or made).place)
     turned = ros_quaternion(made.turn)
     flu = made.rate * np.array([1.0, -1.0, -1.0])
     enu = TO_ENU.apply(made.place)
@@ -108,7 +114,7 @@ def ros_messages(store, made: Flight, seq: bool, receive_s: float = 0.004) -> li
             stamp = time(sec=ns // 10**9, nanosec=ns % 10**9)
             return header(**({"seq": k} if seq else {}), stamp=stamp, frame_id=frame)
 
-        late = ns + int(receive_s * 1e9)
+        late = ns + 4_000_000
         q = quaternion(*(float(v) for v in turned[k]))
         nine = np.zeros(9)
         status = types["sensor_msgs/msg/NavSatStatus"](status=0, service=1)
@@ -142,7 +148,7 @@ def ros_messages(store, made: Flight, seq: bool, receive_s: float = 0.004) -> li
     return found
 
 
-def write_ros1(path: Path, made: Flight, packing: str = "") -> Path:
+def write_ros1(path: Path, made: Flight, packing: str = "", fixes: Flight | None = None) -> Path:
     """packing: bz2, lz4 or nothing."""
     from rosbags.rosbag1 import Writer
     from rosbags.typesys import Stores, get_typestore
@@ -154,14 +160,16 @@ def write_ros1(path: Path, made: Flight, packing: str = "") -> Path:
         writer.set_compression(Writer.CompressionFormat[packing.upper()])
     with writer:
         topics = {}
-        for topic, kind, at, message in ros_messages(store, made, seq=True):
+        for topic, kind, at, message in ros_messages(store, made, True, fixes):
             if topic not in topics:
                 topics[topic] = writer.add_connection(topic, kind, typestore=store)
             writer.write(topics[topic], at, store.serialize_ros1(message, kind))
     return path
 
 
-def write_ros2(path: Path, made: Flight, mcap: bool = False, packing: str = "") -> Path:
+def write_ros2(
+    path: Path, made: Flight, mcap: bool = False, packing: str = "", fixes: Flight | None = None
+) -> Path:
     """A folder; packing: message, file or nothing."""
     from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
     from rosbags.typesys import Stores, get_typestore
@@ -173,14 +181,16 @@ def write_ros2(path: Path, made: Flight, mcap: bool = False, packing: str = "") 
         writer.set_compression(CompressionMode[packing.upper()], CompressionFormat.ZSTD)
     with writer:
         topics = {}
-        for topic, kind, at, message in ros_messages(store, made, seq=False):
+        for topic, kind, at, message in ros_messages(store, made, False, fixes):
             if topic not in topics:
                 topics[topic] = writer.add_connection(topic, kind, typestore=store)
             writer.write(topics[topic], at, store.serialize_cdr(message, kind))
     return path
 
 
-def write_mcap(path: Path, made: Flight, packing: str = "zstd") -> Path:
+def write_mcap(
+    path: Path, made: Flight, packing: str = "zstd", fixes: Flight | None = None
+) -> Path:
     """By the mcap library's own writer, with ROS 2 messages as its support package writes them."""
     from mcap.writer import CompressionType, Writer
     from rosbags.typesys import Stores, get_typestore
@@ -191,7 +201,7 @@ def write_mcap(path: Path, made: Flight, packing: str = "zstd") -> Path:
         writer = Writer(file, compression=kinds[packing], chunk_size=20_000)
         writer.start(profile="ros2", library="test")
         channels = {}
-        for topic, kind, at, message in ros_messages(store, made, seq=False):
+        for topic, kind, at, message in ros_messages(store, made, False, fixes):
             if topic not in channels:
                 text, _ = store.generate_msgdef(kind, ros_version=2)
                 schema = writer.register_schema(kind, "ros2msg", text.encode())
@@ -222,7 +232,7 @@ BOOT_NS = 12_345_678_000
 GEOID_M = 48.0
 
 
-def ulog_bytes(made: Flight) -> bytes:
+def ulog_bytes(made: Flight, fixes: Flight | None = None) -> bytes:
     """A flight log by the public description of the format, bytes made here."""
     out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", BOOT_NS // 1000)]
     out.append(ulog_record("B", bytes(40)))
@@ -230,7 +240,7 @@ def ulog_bytes(made: Flight) -> bytes:
     names = [text.partition(":")[0] for text in ULOG_FORMATS]
     for number, name in enumerate(names):
         out.append(ulog_record("A", struct.pack("<BH", 0, number) + name.encode()))
-    globe = geodetic(made.place)
+    globe = geodetic((fixes or made).place)
     turn = made.turn.as_quat()[:, [3, 0, 1, 2]]
     for k in range(len(made)):
         boot = (int(made.stamp_ns[k] - made.stamp_ns[0]) + BOOT_NS) // 1000
@@ -252,6 +262,6 @@ def ulog_bytes(made: Flight) -> bytes:
     return b"".join(out)
 
 
-def write_ulog(path: Path, made: Flight) -> Path:
-    path.write_bytes(ulog_bytes(made))
+def write_ulog(path: Path, made: Flight, fixes: Flight | None = None) -> Path:
+    path.write_bytes(ulog_bytes(made, fixes))
     return path

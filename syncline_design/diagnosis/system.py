@@ -12,12 +12,15 @@ from syncline_design.diagnosis.gross import Reread, mended
 from syncline_design.effects.acting import Acting, acting_of
 from syncline_design.logs.columns import ISO_TIMES, known_names, shown
 from syncline_design.logs.log import Log
+from syncline_design.logs.log_files import row_sources
+from syncline_design.logs.pose_pairs import lever_m
 from syncline_design.logs.reading import read_log
 from syncline_design.model.quantity import si_name
 from syncline_design.model.system import System
 from syncline_design.spec.case import Case
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.load import BadInput
+from syncline_design.spec.log_block import LogChoice
 from syncline_design.spec.yaml_text import Flaw, KeyPath
 
 
@@ -36,18 +39,22 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
     """Resolve the spec, read the log, and refuse what does not fit."""
     system = pinned_system(case)
     names = [stage.name for stage in system.stages]
-    mapping = case.spec.log.columns if case.spec.log else {}
-    _demand_known_columns(case, mapping, names)
-    origin = case.spec.log.origin if case.spec.log else None
+    choice = case.spec.log or LogChoice()
+    _demand_known_columns(case, choice.columns, names)
     ranges = system.stages[-1].ranging is not None
     files = list(paths) or own_files(case)
+    first = system.stages[0]
+    lever = lever_m(first.position, first.attitude) if len(names) == 1 else None
+    sources = row_sources(files, choice, names, poses=lever is not None)
 
     def read(slip_s: float) -> Log:
-        return read_log(files, names, mapping, ranges, slip_s, origin)
+        return read_log(sources, names, choice.columns, ranges, slip_s, choice.origin, lever)
 
     log = read(0.0)
-    reread = read if len(files) > 1 else None
+    reread = read if len(sources) > 1 else None
     system = replace(system, stages=system.stages[: len(log.stages)])
+    if log.kind == "pose":  # no ranging sensor took part in it
+        system = replace(system, stages=(replace(system.stages[0], ranging=None),))
     _demand_fit(case, system, log)
     known = acting_of(system)
     for one in known:
@@ -101,7 +108,7 @@ def pinned_system(case: Case) -> System:
 def _demand_fit(case: Case, system: System, log: Log) -> None:
     if system.stages[0].position is None:
         raise _refuse(case, ("stages", 0), "the first stage has no position sensor")
-    if log.kind == "position":
+    if log.kind != "georeference":
         return
     for k, stage in enumerate(system.stages):
         for role in ("attitude", "ranging"):

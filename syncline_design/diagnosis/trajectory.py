@@ -18,14 +18,12 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.recent import Recent
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
+from syncline_design.logs.smoothing import LEAST_SMOOTHED, MOST_TRIED, penalty
 from syncline_design.logs.stamps import per_stamp
 from syncline_design.simulation.chain import rotation_exp
 
 Index = NDArray[np.int64]
 NEAR_S = 5.0  # of a series around the stamps, that their slopes rest on
-LEAST_SMOOTHED = 20  # rows of a stretch
-MOST_TRIED = 1000  # rows on which the penalty is chosen
-PENALTIES = np.geomspace(1e-3, 1e4, 15)  # over the cube of the time between rows
 SHIFTS = 24  # of the stamps, whose turns and displacements are kept
 FAR_S = 1.5  # beyond such shifts poses are looked up, not carried along
 
@@ -147,33 +145,13 @@ def _smooth_slope(time_bytes: bytes, series_bytes: bytes, at_bytes: bytes, width
     longest = max(pairwise(bounds), key=lambda ends: ends[1] - ends[0])
     chosen = slice(longest[0], min(longest[1], longest[0] + MOST_TRIED))
     for k in range(width):
-        penalty = _penalty(time_s[chosen], series[chosen, k])
-        for a, b in pairwise(bounds) if penalty else ():
+        found = penalty(time_s[chosen], series[chosen, k])
+        for a, b in pairwise(bounds) if found else ():
             own = (at_s >= time_s[a]) & (at_s <= time_s[b - 1])
             if b - a >= LEAST_SMOOTHED and np.any(own):
-                smooth = make_smoothing_spline(time_s[a:b], series[a:b, k], lam=penalty)
+                smooth = make_smoothing_spline(time_s[a:b], series[a:b, k], lam=found)
                 slope[own, k] = smooth(at_s[own], 1)
     return slope
-
-
-def _penalty(time_s: Array, series: Array) -> float:
-    """Lambda [s3] of least error in rows left out; 0 of a series that is short, still or smooth.
-
-    Half of the rows weigh half, so all of them go with twice the lambda.
-    """
-    from scipy.interpolate import make_smoothing_spline
-
-    if time_s.shape[0] < 2 * LEAST_SMOOTHED or np.ptp(series) == 0.0:
-        return 0.0
-    unit = float(np.median(np.diff(time_s))) ** 3
-    known, asked = slice(0, None, 2), slice(1, -1, 2)
-    errors = [
-        np.sum((make_smoothing_spline(time_s[known], series[known], lam=unit * p)(time_s[asked])
-                - series[asked]) ** 2)
-        for p in PENALTIES
-    ]  # fmt: skip
-    best = int(np.argmin(errors))
-    return 2.0 * unit * float(PENALTIES[best]) if best else 0.0  # a spline through all rows then
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,12 +17,14 @@ VELOCITY = tuple(f"velocity_{axis}_mps" for axis in NED)
 RATE = tuple(f"rate_{axis}_radps" for axis in "xyz")
 TARGET = tuple(f"target_{axis}_m" for axis in NED)
 REFERENCE = tuple(f"reference_{axis}_m" for axis in NED)
+REFERENCE_ATTITUDE = tuple(f"reference_{name}" for name in ATTITUDE)
 GEODETIC = ("latitude_rad", "longitude_rad", "height_m")
 PER_STAGE = (*POSITION, *ATTITUDE, *VELOCITY, *RATE, *RANGING, *GEODETIC)
 COMMON = (
     TIME,
     *TARGET,
     *REFERENCE,
+    *REFERENCE_ATTITUDE,
     *(f"{p}_{g}" for p in ("target", "reference") for g in GEODETIC),
 )
 TARGET_ID = "target_id"

@@ -13,7 +13,7 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import usual_step_s
 
 GAP_FACTOR = 5.0  # rows further apart than this times the median interval are a gap
-Kind = Literal["georeference", "position"]
+Kind = Literal["georeference", "position", "pose"]
 Rows = NDArray[np.signedinteger[Any]] | NDArray[np.bool_] | slice
 
 
@@ -67,9 +67,11 @@ class StageLog:
 class Log:
     """A log, rows in rising time; rows of several targets may share a stamp.
 
-    truth_m (n, 3) NED: surveyed target (georeference) or the better system's reference point
-    (position); NaN components are not known and count for nothing.  rejected: rows dropped, by
-    reason.  notes: what was derived or cut, for people.  rows_read: before any was dropped.
+    truth_m (n, 3) NED: surveyed target (georeference), the better system's reference point
+    (position), or a point at a lever on its body (pose), which the tested pose has to meet: range
+    and bearing are that lever's, exact; NaN components are not known and count for nothing.
+    rejected: rows dropped, by reason.  notes: what was derived or cut, for people.
+    rows_read: before any was dropped.
     thinned: rows of a very long log that are not in the windows kept of it.
     """
 

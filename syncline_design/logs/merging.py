@@ -130,7 +130,7 @@ def interpolated(
     inside = (stamps >= own[0]) & (stamps <= own[-1])
     covered = inside & (step <= REACH * np.median(np.diff(own)))
     result: dict[str, Array] = {}
-    for prefix in dict.fromkeys(("", *prefixes)):
+    for prefix in dict.fromkeys(("", "reference_", *prefixes)):
         names = tuple(prefix + n for n in ATTITUDE)
         if all(n in taken for n in names):
             euler = _slerp(own, np.stack([taken[n] for n in names], axis=1), stamps, right)

@@ -17,6 +17,7 @@ from syncline_design.logs.columns import (
     RANGING,
     RATE,
     REFERENCE,
+    REFERENCE_ATTITUDE,
     TARGET,
     TARGET_ID,
     TIME,
@@ -27,7 +28,9 @@ from syncline_design.logs.derivatives import derived_rate, derived_velocity
 from syncline_design.logs.log import Kind, Log, LogTrack, StageLog
 from syncline_design.logs.magnitudes import demand_possible
 from syncline_design.logs.merging import merged
+from syncline_design.logs.pose_pairs import with_points
 from syncline_design.logs.refusals import refuse
+from syncline_design.logs.sources import RowSource
 from syncline_design.logs.tables import LogTable, read_tables
 from syncline_design.logs.twins import without_twins
 
@@ -56,29 +59,31 @@ class _Draft:
 
 
 def read_log(
-    paths: Sequence[Path],
+    paths: Sequence[Path | RowSource],
     stages: Sequence[str],
     mapping: Mapping[str, str] | None = None,
     needs_ranging: bool = True,
     slip_s: float = 0.0,
     origin: places.Origin | None = None,
+    pose_lever_m: float | None = None,
 ) -> Log:
     """Read one log, from one file or several, for a system of these stages.
 
     needs_ranging: whether the spec has ranging sensors; it decides what is said to be missing.
     slip_s: by how much the stamps of a file of positions are ahead; they are set back.  origin: of
-    the local frame, where the spec states it.
+    the local frame, where the spec states it.  pose_lever_m: at what lever two poses are compared;
+    None where attitudes are not.
     """
     prefixes = [f"{name}_" for name in stages] if len(stages) > 1 else [""]
     names = (prefixes[0] + POSITION[0], prefixes[0] + GEODETIC[0])
     slip = (names, slip_s if len(paths) > 1 else 0.0)
-    tables = read_tables([Path(p) for p in paths], mapping or {}, tuple(stages), slip)
+    tables = read_tables(paths, mapping or {}, tuple(stages), slip)
     draft = _draft(tables, prefixes)
     draft.tracks, said = places.made_local(
         draft.path, draft.columns, draft.tracks, prefixes, origin
     )
     draft.notes += said
-    kind = _kind(draft, prefixes, needs_ranging)
+    kind = _kind(draft, prefixes, needs_ranging, pose_lever_m)
     draft.notes += planar.filled(draft.columns, prefixes, kind)
     _demand_columns(draft, prefixes, kind)
     rejected = dict(draft.table.rejected)
@@ -93,6 +98,9 @@ def read_log(
             expected=f"at least {LEAST_ROWS}, at several stamps",
             found=f"{left.shape[0]} of {draft.table.rows}",
         )
+    if kind == "pose":
+        assert pose_lever_m is not None
+        draft.notes.append(with_points(draft.columns, prefixes[0], pose_lever_m))
     demand_possible(draft.path, draft.columns, prefixes)
     return _log(draft, stages, prefixes, kind, rejected)
 
@@ -111,14 +119,18 @@ def _draft(tables: Sequence[LogTable], prefixes: Sequence[str]) -> _Draft:
     )
 
 
-def _kind(draft: _Draft, prefixes: Sequence[str], needs_ranging: bool) -> Kind:
+def _kind(
+    draft: _Draft, prefixes: Sequence[str], needs_ranging: bool, pose_lever_m: float | None
+) -> Kind:
     last = prefixes[-1]
     ranging = last + RANGING[0] in draft.columns
     reference = any(n in draft.columns for n in REFERENCE)
     if ranging and any(n in draft.columns for n in TARGET):
         return "georeference"
     if reference and not ranging:
-        return "position"
+        whole = (*POSITION, *REFERENCE, *REFERENCE_ATTITUDE)
+        turned = len(prefixes) == 1 and draft.has(whole)
+        return "pose" if turned and pose_lever_m is not None else "position"
     wanted = (*(last + n for n in RANGING), *TARGET) if needs_ranging or ranging else REFERENCE
     raise _missing(draft, [n for n in wanted if n not in draft.columns])
 
@@ -171,6 +183,7 @@ def _complete_rows(
         needed += [prefix + n for n in (*VELOCITY, *RATE) if prefix + n in draft.columns]
     truth = TARGET if kind == "georeference" else REFERENCE
     needed += [n for n in truth if np.any(np.isfinite(draft.columns[n]))]
+    needed += REFERENCE_ATTITUDE if kind == "pose" else ()
     keep = np.ones(draft.columns[TIME].shape, dtype=bool)
     for name in needed:
         keep &= np.isfinite(draft.columns[name])
@@ -193,7 +206,7 @@ def _log(
         kind=kind,
         time_s=draft.columns[TIME],
         stages=tuple(built),
-        truth_m=draft.vectors(TARGET if kind == "georeference" else REFERENCE),
+        truth_m=draft.vectors(REFERENCE if kind == "position" else TARGET),
         target_id=target_id,
         rows_read=draft.table.rows,
         rejected=rejected,
@@ -213,7 +226,7 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
         rate = derived_rate(time_s, euler)
         draft.notes.append(f"rates of {name} were derived from its attitude")
     distance, azimuth, elevation = (
-        draft.columns[prefix + n] if kind == "georeference" else None for n in RANGING
+        None if kind == "position" else draft.columns[prefix + n] for n in RANGING
     )
     return StageLog(
         name,
@@ -237,7 +250,7 @@ def _velocity(
     time_s = draft.columns[TIME]
     if draft.has([prefix + n for n in VELOCITY]):
         return draft.vectors([prefix + n for n in VELOCITY]), draft.follows_position
-    reference = draft.vectors(REFERENCE) if kind == "position" else None
+    reference = draft.vectors(REFERENCE) if kind != "georeference" else None
     if reference is not None and np.all(np.isfinite(reference)):
         draft.notes.append(f"velocity of {name} was derived from the reference positions")
         return derived_velocity(time_s, reference), False

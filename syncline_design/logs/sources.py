@@ -65,12 +65,14 @@ class Clock:
 class RowSource(Protocol):
     """A file whose columns can be read one pass at a time.
 
-    cut: the line in which the file is cut off, 0 if it is whole.
+    cut: the line in which the file is cut off, 0 if it is whole.  notes: what was done to its
+    columns before they came here.
     """
 
     path: Path
     header: tuple[str, ...]
     cut: int
+    notes: tuple[str, ...]
 
     def clock(self, name: str) -> Clock:
         """The time column of every row."""
@@ -115,8 +117,10 @@ def demand_plain_file(path: Path) -> None:
 class TextSource:
     """Delimited text, block by block."""
 
+    notes: tuple[str, ...]
+
     def __init__(self, path: Path) -> None:
-        self.path = path
+        self.path, self.notes = path, ()
         self.how = delimited.dialect(path)
         self.header = self.how.names
         self.end, self.cut = path.stat().st_size, 0
@@ -296,10 +300,12 @@ def any_zone() -> Iterator[None]:
 class ParquetSource:
     """A Parquet file, column by column."""
 
+    notes: tuple[str, ...]
+
     def __init__(self, path: Path) -> None:
         import polars as pl
 
-        self.path, self.cut = path, 0
+        self.path, self.cut, self.notes = path, 0, ()
         try:
             with any_zone():
                 self._frame = pl.scan_parquet(path, glob=False, hive_partitioning=False)

@@ -65,13 +65,14 @@ class _Open:
 
 
 def read_tables(
-    paths: Sequence[Path],
+    given: Sequence[Path | RowSource],
     mapping: Mapping[str, str],
     stages: tuple[str, ...],
     slip: Slip = ((), 0.0),
 ) -> list[LogTable]:
-    """Read CSV or Parquet files that belong together; raises BadInput."""
-    files = [_opened(path, mapping, stages) for path in paths]
+    """Read files that belong together; raises BadInput."""
+    sources = [opened(one) if isinstance(one, Path) else one for one in given]
+    files = [_opened(source, mapping, stages) for source in sources]
     files = _on_one_scale(_with_absent(files, mapping))
     names, ahead_s = slip
     stamps = [
@@ -82,8 +83,8 @@ def read_tables(
     return [_table(f, chosen) for f, chosen in zip(files, thinned(rows), strict=True)]
 
 
-def _opened(path: Path, mapping: Mapping[str, str], stages: tuple[str, ...]) -> _Open:
-    source = opened(path)
+def _opened(source: RowSource, mapping: Mapping[str, str], stages: tuple[str, ...]) -> _Open:
+    path = source.path
     found = si_columns(source.header, mapping, known_names(stages))
     if TIME not in found:
         raise refuse(
@@ -98,7 +99,7 @@ def _opened(path: Path, mapping: Mapping[str, str], stages: tuple[str, ...]) -> 
         )
     name, factor = found[TIME]
     clock = source.clock(name)
-    notes = (*headings(found), *passed_over(source.header, found, mapping))
+    notes = (*source.notes, *headings(found), *passed_over(source.header, found, mapping))
     seconds, day, said = _seconds(path, name, factor, clock)
     if not seconds.shape[0]:
         raise refuse(path, "no rows below the header", line=2, column=1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 from pydantic_core import PydanticCustomError
@@ -74,15 +74,34 @@ Place = Annotated[
 ]
 
 
-class LogChoice(FileRecord):
-    """How a measured log names its columns: canonical name to `their.name [unit]`.
+class StreamChoice(FileRecord):
+    """Which stream of a log plays which part: a topic, a message or a file, by name."""
 
-    origin: latitude, longitude, height above the ellipsoid of the log's local frame.
+    position: Text | None = None
+    attitude: Text | None = None
+    velocity: Text | None = None
+    rate: Text | None = None
+    ranging: Text | None = None
+    target: Text | None = None
+    reference: Text | None = None
+
+
+class LogChoice(FileRecord):
+    """How a measured log is read.
+
+    columns: canonical name to `their.name [unit]`.  origin: latitude, longitude, height above the
+    ellipsoid of the log's local frame.  streams: of bags and flight logs, what plays which part.
+    frame, body, timeline, gps_week: of streams that do not say so themselves.
     """
 
     columns: dict[Text, Text] = Field(default_factory=dict)
     files: tuple[Text, ...] = ()
     origin: Place | None = None
+    streams: StreamChoice = Field(default_factory=StreamChoice)
+    frame: Literal["enu", "ned"] | None = None
+    body: Literal["flu", "frd"] | None = None
+    timeline: Literal["utc", "gps", "tai", "boot"] | None = None
+    gps_week: Annotated[int, Field(ge=0, le=10_000)] | None = None
 
     @model_validator(mode="after")
     def _units_fit(self) -> LogChoice:

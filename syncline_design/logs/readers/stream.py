@@ -92,6 +92,10 @@ class Stream:
     points: PointTimes | None = None
     nature: Nature = "unknown"
 
+    @property
+    def has_attitude(self) -> bool:
+        return "attitude" in self.quantity
+
 
 @dataclass(frozen=True, slots=True)
 class Incomplete:

@@ -134,7 +134,9 @@ def _global(kind: str, fields: Fields) -> Meaning | None:
 def _local(kind: str, fields: Fields) -> Meaning | None:
     if "local_position" not in kind or not _has(fields, "x", "y", "z"):
         return None
-    columns: dict[str, Column] = {f"position_{a}_m": _as(a) for a in "xyz"}
+    columns: dict[str, Column] = {
+        f"position_{a}_m": _valid(a, "z_valid" if a == "z" else "xy_valid", fields) for a in "xyz"
+    }
     quantity = ["position"]
     if _has(fields, "vx", "vy", "vz"):
         quantity.append("velocity")
@@ -143,13 +145,26 @@ def _local(kind: str, fields: Fields) -> Meaning | None:
     said = ["north, east, down about its own origin"]
     if _has(fields, "ref_lat", "ref_lon", "ref_alt"):
         degree = 1.0 if fields["ref_lat"][1] == "<f8" else 1e-7
-        columns["origin_latitude_deg"] = _as("ref_lat", degree)
-        columns["origin_longitude_deg"] = _as("ref_lon", degree)
-        columns["origin_height_msl_m"] = _as("ref_alt")
+        columns["origin_latitude_deg"] = _valid("ref_lat", "xy_global", fields, degree)
+        columns["origin_longitude_deg"] = _valid("ref_lon", "xy_global", fields, degree)
+        columns["origin_height_msl_m"] = _valid("ref_alt", "z_global", fields)
         said.append("the origin is given, its height above sea level")
     nature = _nature(kind)
     said += [FUSED] if nature == "fused" else []
     return Meaning(tuple(quantity), columns, "ned", notes=tuple(said), nature=nature)
+
+
+def _valid(name: str, flag: str, fields: Fields, factor: float = 1.0) -> Column:
+    """NaN where the topic's own flag says that the value is none."""
+    column = _as(name, factor)
+    if flag not in fields:
+        return column
+
+    def masked(table: NDArray[Any]) -> NDArray[Any]:
+        values: NDArray[Any] = np.where(table[flag] != 0, column(table), np.nan)
+        return values
+
+    return masked
 
 
 def _odometry(kind: str, fields: Fields) -> Meaning | None:

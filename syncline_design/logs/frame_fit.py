@@ -1,0 +1,183 @@
+"""Two trajectories whose frames nothing relates, laid onto each other; what that hides is said.
+
+A turn about down and a shift (where neither says which way is down, any turn) by least squares, in
+which far points count less.  Where a delay or a lever arm between the two clearly shows, it is
+fitted along, so that what the diagnosis is to find does not go into the frames; only turn and shift
+are used.  They take up a constant shift and turn between the two, which can no longer be found.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from syncline_design.effects.record import Array
+
+ROUNDS: Final = 12
+FAR: Final = 2.0  # usual distances from which a point counts less
+ONE_FRAME: Final = 0.05  # of the extent: places as near as this stand in one frame already
+LEAST_POINTS: Final = 10
+LEAST_EXTENT_M: Final = 0.5
+FALLS: Final = 0.05  # by this share the squares have to fall before delay or lever is fitted along
+CLEARLY: Final = 15.0  # and by this many times what noise alone would do for each figure
+WIDTHS: Final = (0, 1, 4)  # figures beside turn and shift: none, the delay, the lever too
+
+
+@dataclass(frozen=True, slots=True)
+class Laid:
+    """How one trajectory came onto the other: x -> turn x + shift."""
+
+    turn: Array
+    shift_m: Array
+    rms_m: float
+    extent_m: float
+
+    @property
+    def heading_rad(self) -> float:
+        return math.atan2(float(self.turn[1, 0]), float(self.turn[0, 0]))
+
+    @property
+    def tilt_rad(self) -> float:
+        return math.acos(float(np.clip(self.turn[2, 2], -1.0, 1.0)))
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """What is laid: places (n, 3), velocities (n, 3), body axes (n, 3, 3) or none."""
+
+    place: Array
+    velocity: Array
+    body: Array | None
+
+
+def laid(moved: Track, onto: Array, any_turn: bool) -> Laid | None:
+    """The turn and shift that bring the first places onto the second (n, 3), pair by pair.
+
+    None where the places are too few or too near each other to tell, or already in one frame.
+    Begun by Kabsch's solution (Umeyama, IEEE PAMI 13 (1991), without scale); then Gauss-Newton of
+    onto = turn (place - delay velocity + body lever) + shift, with Huber's weights.
+    """
+    known = np.isfinite(moved.place).all(axis=1) & np.isfinite(onto).all(axis=1)
+    known &= np.isfinite(moved.velocity).all(axis=1)
+    if moved.body is not None:
+        known &= np.isfinite(moved.body).all(axis=(1, 2))
+    b = onto[known]
+    if b.shape[0] < LEAST_POINTS:
+        return None
+    body = None if moved.body is None else moved.body[known]
+    own = Track(moved.place[known], moved.velocity[known], body)
+    extent = _rms(b - b.mean(axis=0))
+    if extent < LEAST_EXTENT_M or _rms(own.place - b) < ONE_FRAME * extent:
+        return None
+    begun = _kabsch(own.place, b, any_turn)
+    best = _fitted(own, b, begun, any_turn, WIDTHS[0])
+    for width in WIDTHS[1:]:
+        if width > 1 and own.body is None:
+            break
+        wider = _fitted(own, b, begun, any_turn, width)
+        noise = wider.squares / (3 * b.shape[0])
+        fell = best.squares - wider.squares
+        more = width - best.width
+        if fell > FALLS * best.squares and fell > CLEARLY * more * noise:
+            best = wider
+    return Laid(best.turn, best.shift_m, best.rms_m, extent)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fit:
+    turn: Array
+    shift_m: Array
+    squares: float  # of what is left, far points weighted down
+    rms_m: float
+    width: int
+
+
+def _fitted(
+    own: Track, onto: Array, begun: tuple[Array, Array], any_turn: bool, width: int
+) -> _Fit:
+    """Gauss-Newton with so many figures beside turn and shift."""
+    turn, shift = begun
+    extra = np.zeros(4)
+    count = 3 if any_turn else 1
+    rest, weight = onto, np.ones(onto.shape[0])
+    for _ in range(ROUNDS):
+        local, slope = _slope(own, turn, extra, any_turn)
+        rest = onto - local - shift
+        apart = np.linalg.norm(rest, axis=1)
+        usual = max(float(np.median(apart)), 1e-9)
+        weight = np.minimum(1.0, FAR * usual / np.maximum(apart, 1e-12))
+        step = _step(slope[:, :, : count + 3 + width], rest, weight)
+        axis = step[:3] if any_turn else np.array([0.0, 0.0, step[0]])
+        turn, shift = _small(axis) @ turn, shift + step[count : count + 3]
+        extra = extra + np.pad(step[count + 3 :], (0, 4 - width))
+    squares = float(np.sum(weight * np.sum(rest**2, axis=1)))
+    return _Fit(turn, shift, squares, _rms(rest), width)
+
+
+def _rms(apart: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
+
+
+def _kabsch(a: Array, b: Array, any_turn: bool) -> tuple[Array, Array]:
+    middle_a, middle_b = a.mean(axis=0), b.mean(axis=0)
+    cross = (a - middle_a).T @ (b - middle_b)
+    turn = np.eye(3)
+    if any_turn:
+        u, _, v = np.linalg.svd(cross)
+        flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(v.T @ u.T))])
+        turn = v.T @ flip @ u.T
+    else:
+        angle = math.atan2(cross[0, 1] - cross[1, 0], cross[0, 0] + cross[1, 1])
+        c, s = math.cos(angle), math.sin(angle)
+        turn[:2, :2] = [[c, -s], [s, c]]
+    return turn, middle_b - turn @ middle_a
+
+
+def _slope(own: Track, turn: Array, extra: Array, any_turn: bool) -> tuple[Array, Array]:
+    """The turned places with delay and lever, (n, 3), and how they move with every figure.
+
+    Figures: turn (1 or 3), shift (3), delay, lever (3).
+    """
+    a = own.place
+    axes = np.zeros((a.shape[0], 3, 3)) if own.body is None else turn @ own.body
+    swept = own.velocity @ turn.T
+    local = a @ turn.T - extra[0] * swept + axes @ extra[1:]
+    x, y, z = local.T
+    zero = np.zeros_like(x)
+    spin = np.stack(
+        [np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], 2
+    )
+    turned = spin if any_turn else spin[:, :, 2:]
+    shift = np.broadcast_to(np.eye(3), (a.shape[0], 3, 3))
+    return local, np.concatenate([turned, shift, -swept[:, :, None], axes], axis=2)
+
+
+def _step(slope: Array, rest: Array, weight: Array) -> Array:
+    """One step of all figures by weighted least squares; what nothing tells stays."""
+    normal = np.einsum("nki,n,nkj->ij", slope, weight, slope)
+    right = np.einsum("nki,n,nk->i", slope, weight, rest)
+    scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
+    found: Array = np.linalg.lstsq(normal / np.outer(scale, scale), right / scale, rcond=1e-10)[0]
+    return found / scale
+
+
+def _small(axis: Array) -> Array:
+    """The rotation by a vector [rad] (Rodrigues)."""
+    angle = float(np.linalg.norm(axis))
+    if angle < 1e-15:
+        return np.eye(3)
+    x, y, z = axis / angle
+    k = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    found: Array = np.eye(3) + math.sin(angle) * k + (1.0 - math.cos(angle)) * (k @ k)
+    return found
+
+
+def mean_turn(turns: Array) -> Array:
+    """The rotation nearest to all of (n, 3, 3): the polar part of their sum."""
+    u, _, v = np.linalg.svd(np.nansum(turns, axis=0))
+    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ v))])
+    found: Array = u @ flip @ v
+    return found

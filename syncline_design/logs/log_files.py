@@ -1,0 +1,74 @@
+"""The files of a call as sources of rows: tables by their columns, recordings by their streams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from syncline_design.logs.columns import TIME, known_names, si_columns
+from syncline_design.logs.readers import open_recording, reader_of
+from syncline_design.logs.readers.reader import head_of
+from syncline_design.logs.sources import RowSource, demand_plain_file, opened
+from syncline_design.logs.stream_sources import sources_of
+from syncline_design.spec.load import BadInput
+from syncline_design.spec.log_block import LogChoice
+
+TABLES = (".parquet", ".pq")
+TEXT_TABLE = "csv_text"  # the reader of delimited text, whose files `sources` reads by their names
+
+
+def row_sources(
+    paths: Sequence[Path], choice: LogChoice, stages: Sequence[str], poses: bool
+) -> list[RowSource]:
+    """Every file opened; raises BadInput.  Recordings are read as one, whatever their number."""
+    tables: list[RowSource] = []
+    recordings = []
+    for path in paths:
+        table = _table(path, choice.columns, stages)
+        if table is not None:
+            tables.append(table)
+        else:
+            recordings.append(open_recording(path))
+    if not recordings:
+        return tables
+    prefix = f"{stages[0]}_" if len(stages) > 1 else ""
+    return [*tables, *sources_of(recordings, choice, prefix, poses)]
+
+
+def _table(path: Path, mapping: Mapping[str, str], stages: Sequence[str]) -> RowSource | None:
+    """A file that is read by the names of its columns; None where it is a recording."""
+    if path.suffix.lower() in TABLES:
+        return opened(path)
+    if path.is_dir():
+        return None
+    reader = _reader_name(path)
+    if reader not in (None, TEXT_TABLE):
+        return None
+    if reader is None:
+        return opened(path)
+    try:
+        source = opened(path)
+    except BadInput:
+        demand_plain_file(path)
+        raise
+    found = si_columns(source.header, mapping, known_names(stages))
+    if TIME in found and len(found) > 1:
+        return source
+    return None if _is_stream(path) else source
+
+
+def _reader_name(path: Path) -> str | None:
+    from syncline_design.logs.readers import registry
+
+    if not path.is_file():
+        return None
+    try:
+        reader = reader_of(head_of(path))
+    except BadInput:  # said by `opened`, in the words for tables
+        return None
+    return next((name for name, one in registry().items() if one is reader), None)
+
+
+def _is_stream(path: Path) -> bool:
+    """Whether the columns tell anything under the names that readers know."""
+    return any(one.quantity and one.stamps for one in open_recording(path).streams())

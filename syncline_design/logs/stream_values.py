@@ -1,0 +1,241 @@
+"""A stream's samples in the package's conventions: SI, north-east-down, forward-right-down.
+
+Every conversion is noted in words; nothing is turned, shifted or scaled silently.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+import numpy as np
+
+from syncline_design.effects.kinematics import euler_to_rotation, rotate, rotation_to_euler
+from syncline_design.effects.record import Array
+from syncline_design.logs.columns import ATTITUDE, NED, POSITION, RANGING, RATE, TARGET, VELOCITY
+from syncline_design.logs.readers.stream import Body, Frame, Nanoseconds
+from syncline_design.logs.refusals import refuse
+from syncline_design.logs.roles import Offer
+from syncline_design.model.quantity import si_name, suffix_unit
+from syncline_design.spec.log_block import LogChoice
+
+MOST_ROWS: Final = 20_000_000
+ENU_TO_NED: Final = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+FLU_TO_FRD: Final = np.diag([1.0, -1.0, -1.0])
+QUATERNION: Final = tuple(f"quaternion_{a}" for a in "wxyz")
+XYZ: Final = tuple(f"position_{a}_m" for a in "xyz")
+SPEED: Final = tuple(f"velocity_{a}_mps" for a in "xyz")
+BODY_SPEED: Final = tuple(f"velocity_body_{a}_mps" for a in "xyz")
+GLOBE: Final = ("latitude_rad", "longitude_rad")
+ORIGIN: Final = ("origin_latitude_rad", "origin_longitude_rad", "origin_height_msl_m")
+ASSUMED_FRAME: Final[Frame] = "enu"
+ASSUMED_BODY: Final[Body] = "flu"
+_FRAMES: Final = {"enu": "east, north, up", "ned": "north, east, down", "utm": "UTM"}
+_BODIES: Final = {"flu": "forward, left, up", "frd": "forward, right, down"}
+
+
+@dataclass(slots=True)
+class Values:
+    """A stream's samples: stamps as in the file, canonical SI columns, and what was done to them.
+
+    latitude_rad, longitude_rad, height_m stand as they are; everything else is local.  assumed:
+    axes that neither the log nor the spec tells.
+    """
+
+    offer: Offer
+    time_ns: Nanoseconds
+    columns: dict[str, Array]
+    notes: list[str] = field(default_factory=list)
+    origin: Array | None = None  # latitude, longitude [rad], height [m] of the local frame
+    assumed: bool = False
+
+    def has(self, names: Sequence[str]) -> bool:
+        return all(name in self.columns for name in names)
+
+    def vectors(self, names: Sequence[str]) -> Array:
+        return np.stack([self.columns[name] for name in names], axis=1)
+
+    def put(self, names: Sequence[str], vectors: Array) -> None:
+        self.columns |= {name: vectors[:, k] for k, name in enumerate(names)}
+
+    def note(self, words: str) -> None:
+        """Say something of this stream, once."""
+        said = f"{self.offer.name}: {words}"
+        if said not in self.notes:
+            self.notes.append(said)
+
+
+def values_of(offer: Offer, choice: LogChoice) -> Values:
+    """All samples of a stream, made canonical."""
+    time_ns, raw = _collected(offer)
+    columns: dict[str, Any] = {}
+    for name, values in raw.items():
+        if name.startswith("clock_"):  # whole nanoseconds stay whole
+            columns[name] = values
+            continue
+        factor = suffix_unit(name)[0]
+        columns[si_name(name)] = values * factor if factor != 1.0 else values
+    found = Values(offer, time_ns, columns)
+    frame, body = _axes(found, choice)
+    turn = _attitude(found, frame, body)
+    _position(found, frame)
+    _velocity(found, frame, body, turn)
+    _rates(found, body)
+    if any(name.endswith("_deg") or name.endswith("_degps") for name in raw):
+        found.note("degrees were made radians")
+    kept = {*GLOBE, "height_m", "height_msl_m", "separation_m", *POSITION, *ATTITUDE, *VELOCITY}
+    kept |= {*RATE, *RANGING, *TARGET, "target_id", *(f"target_{g}" for g in (*GLOBE, "height_m"))}
+    kept |= {"clock_utc_ns"}
+    found.columns = {name: v for name, v in found.columns.items() if name in kept}
+    return found
+
+
+def _collected(offer: Offer) -> tuple[Nanoseconds, dict[str, Any]]:
+    stamps, pieces, rows = [], [], 0
+    for piece in offer.recording.samples(offer.name):
+        rows += int(piece.primary_ns.shape[0])
+        if rows > MOST_ROWS:
+            raise refuse(offer.path, "too many rows", expected=f"at most {MOST_ROWS}")
+        stamps.append(piece.primary_ns)
+        pieces.append(piece.columns)
+    if not rows:
+        raise refuse(offer.path, f"{offer.name} has no messages")
+    names = list(dict.fromkeys(name for one in pieces for name in one))
+    whole = {
+        name: np.concatenate([one[name] for one in pieces])
+        for name in names
+        if all(name in one for one in pieces)
+    }
+    figures = {n: v if v.dtype.kind == "i" else v.astype(float) for n, v in whole.items()}
+    return np.concatenate(stamps), figures
+
+
+def _axes(values: Values, choice: LogChoice) -> tuple[Frame, Body]:
+    """Frame and body by the stream, else by the spec, else assumed and said."""
+    stream = values.offer.stream
+    frame, body = stream.frame, stream.body
+    local = any(name in values.columns for name in (*XYZ, *SPEED, *QUATERNION))
+    if frame == "unknown" and local:
+        frame = choice.frame or ASSUMED_FRAME
+        if choice.frame is None:
+            values.assumed = True
+            values.note(f"the frame is not told: {_FRAMES[frame]} is assumed (log: {{frame: ...}})")
+    turned = any(n in values.columns for n in (*QUATERNION, *BODY_SPEED, *RATE))
+    if body == "unknown" and turned:
+        body = choice.body or ASSUMED_BODY
+        if choice.body is None:
+            values.assumed = True
+            values.note(
+                f"the body axes are not told: {_BODIES[body]} is assumed (log: {{body: ...}})"
+            )
+    return frame, body
+
+
+def _to_ned(frame: Frame) -> Array:
+    return ENU_TO_NED if frame in ("enu", "utm") else np.eye(3)
+
+
+def _to_frd(body: Body) -> Array:
+    return FLU_TO_FRD if body == "flu" else np.eye(3)
+
+
+def _attitude(values: Values, frame: Frame, body: Body) -> Array | None:
+    """Roll, pitch, yaw from a quaternion; gives the rotations body to NED, where they are told."""
+    if values.has(QUATERNION):
+        from scipy.spatial.transform import Rotation
+
+        raw = values.vectors(QUATERNION)
+        known = np.isfinite(raw).all(axis=1) & (np.linalg.norm(raw, axis=1) > 0.5)
+        whole = np.where(known[:, None], raw, np.array([1.0, 0.0, 0.0, 0.0]))
+        given = Rotation.from_quat(whole[:, [1, 2, 3, 0]]).as_matrix()
+        turn: Array = _to_ned(frame) @ given @ _to_frd(body)
+        turn[~known] = np.nan
+        values.put(ATTITUDE, np.where(known[:, None], rotation_to_euler(turn), np.nan))
+        shown = "wgs84" if frame == "wgs84" else _FRAMES.get(frame, frame)
+        values.note(f"quaternions (body {_BODIES[body]}, frame {shown}) were made roll, pitch, yaw")
+        if not np.all(known):
+            values.note(f"{int(np.sum(~known))} quaternions are none (zero or not finite)")
+        return turn
+    if values.has(ATTITUDE):
+        return euler_to_rotation(values.vectors(ATTITUDE))
+    if "heading_rad" in values.columns:
+        values.columns.setdefault(ATTITUDE[2], values.columns["heading_rad"])
+        values.note("the heading was read as yaw")
+    return None
+
+
+def _position(values: Values, frame: Frame) -> None:
+    if not values.has(XYZ):
+        return
+    values.put(POSITION, values.vectors(XYZ) @ _to_ned(frame).T)
+    if frame != "ned":
+        values.note(f"positions in {_FRAMES.get(frame, frame)} were made north, east, down")
+    if values.has(ORIGIN):
+        place = values.vectors(ORIGIN)
+        known = place[np.isfinite(place).all(axis=1)]
+        if known.shape[0]:
+            values.origin = np.median(known, axis=0)
+            moved = float(np.max(np.ptp(known[:, :2], axis=0))) * 6.4e6
+            if moved > 0.1:
+                values.note(f"its origin moves by up to {moved:.1f} m within the log")
+
+
+def _velocity(values: Values, frame: Frame, body: Body, turn: Array | None) -> None:
+    if values.has(VELOCITY):
+        return
+    if values.has(BODY_SPEED) and turn is not None:
+        own = values.vectors(BODY_SPEED) @ _to_frd(body).T
+        values.put(VELOCITY, rotate(turn, own))
+        values.note("velocities in the body were turned by the stream's own attitude")
+    elif values.has(SPEED):
+        values.put(VELOCITY, values.vectors(SPEED) @ _to_ned(frame).T)
+        values.note(f"velocities in {_FRAMES.get(frame, frame)} were made north, east, down")
+
+
+def _rates(values: Values, body: Body) -> None:
+    if values.has(RATE) and body == "flu":
+        values.put(RATE, values.vectors(RATE) @ FLU_TO_FRD.T)
+        values.note("body rates (forward, left, up) were made forward, right, down")
+
+
+def height_of(values: Values, separation_m: float | None) -> bool | None:
+    """Give `height_m` above the ellipsoid, if the log knows it; whether it does, None without one.
+
+    separation_m: geoid above ellipsoid, where another stream of the log tells it.
+    """
+    columns = values.columns
+    if "height_m" in columns and np.any(np.isfinite(columns["height_m"])):
+        return True
+    if "height_msl_m" not in columns:
+        return None
+    own = columns.get("separation_m")
+    if own is not None and np.any(np.isfinite(own)):
+        columns["height_m"] = columns["height_msl_m"] + own
+        values.note("heights above sea level plus the log's separation are above the ellipsoid")
+        return True
+    if separation_m is not None:
+        columns["height_m"] = columns["height_msl_m"] + separation_m
+        words = f"heights above sea level plus {separation_m:.2f} m, as another stream tells it"
+        values.note(f"{words}, are above the ellipsoid")
+        return True
+    columns["height_m"] = columns["height_msl_m"]
+    values.note("heights are above sea level: the log does not know the ellipsoid's")
+    return False
+
+
+def separation_of(several: Sequence[Values]) -> float | None:
+    """Geoid above ellipsoid [m] where one stream has both heights."""
+    for one in several:
+        columns: Mapping[str, Array] = one.columns
+        if "height_m" in columns and "height_msl_m" in columns:
+            apart = columns["height_m"] - columns["height_msl_m"]
+            known = apart[np.isfinite(apart)]
+            if known.shape[0]:
+                return float(np.median(known))
+    return None
+
+
+def ned_names(prefix: str = "") -> tuple[str, ...]:
+    """Columns of a place: `position_...` or, with the prefix of a reference, `reference_...`."""
+    return tuple(f"{prefix or 'position_'}{axis}_m" for axis in NED)

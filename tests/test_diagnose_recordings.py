@@ -1,0 +1,183 @@
+"""One flight with one hidden delay in every format: the same finding from each.
+
+The receiver's positions are 80 ms older than their stamps, with 2 cm of white noise; the reference
+is exact.  The tables in NED that the package has always read are the oracle of the bags.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from syncline_design.logs.log_files import row_sources
+from syncline_design.logs.reading import read_log
+from syncline_design.spec.load import BadInput
+from syncline_design.spec.log_block import LogChoice
+from tests.flight_logs import Flight, flight, write_mcap, write_ros1, write_ros2, write_ulog
+
+LATE_S, NOISE_M = 0.08, 0.02
+TRUTH = flight(45.0)
+FIXES = flight(45.0, late_s=LATE_S, noise_m=NOISE_M)
+SPEC = """syncline: 1
+name: flight
+requirements: [{{id: ACC-1, kind: accuracy, limit: 30 cm}}]
+stages:
+  - name: uav
+    platform: {{v_max: 20 m/s, omega_max: 90 deg/s, distance: 40 m, baseline: 0.5 m}}
+    position:
+      sensor: {{modality: position, type: gnss, sigma_position: 2 cm, primitives: [pps]}}
+      primitive: pps
+      timestamping: {{error: {{distribution: uniform, low: -1 us, high: 1 us}}}}
+{more}"""
+ATTITUDE = """    attitude:
+      sensor: {modality: attitude, type: ins, sigma_attitude: 0.05 deg, primitives: [pps]}
+      primitive: pps
+      timestamping: {error: {distribution: uniform, low: -1 us, high: 1 us}}
+"""
+WRITERS: dict[str, Callable[[Path], Path]] = {
+    "ros1": lambda p: write_ros1(p / "a.bag", TRUTH, fixes=FIXES),
+    "ros2": lambda p: write_ros2(p / "bag", TRUTH, fixes=FIXES),
+    "mcap": lambda p: write_mcap(p / "a.mcap", TRUTH, fixes=FIXES),
+    "ulog": lambda p: write_ulog(p / "a.ulg", TRUTH, FIXES),
+}
+
+
+def spec(folder: Path, more: str = "", **keys: str) -> Path:
+    path = folder / "spec.yaml"
+    log = "".join(f"log: {value}\n" for value in keys.values())
+    path.write_text(SPEC.format(more=more) + log, "utf-8")
+    return path
+
+
+def found(folder: Path, *files: Path, more: str = "", log: str = "") -> Diagnosis:
+    keys = {"log": log} if log else {}
+    return diagnose(spec(folder, more, **keys), files, DiagnosisSettings(seed=1))
+
+
+def latency(result: Diagnosis, sensor: str = "position") -> tuple[float, float]:
+    (one,) = [f for f in result.findings if (f.effect, f.sensor) == ("latency", sensor)]
+    figure = one.parameters["latency_s"]
+    assert figure.standard_uncertainty is not None
+    return figure.value, figure.standard_uncertainty
+
+
+def table(path: Path, tested: Flight, truth: Flight) -> Path:
+    """The package's own columns, local, on one frame."""
+    euler = truth.turn.as_euler("ZYX")[:, ::-1]
+    since = (truth.stamp_ns - truth.stamp_ns[0]) / 1e9
+    columns = {
+        "time_s": since,
+        **{f"position_{a}_m": tested.place[:, k] for k, a in enumerate(("north", "east", "down"))},
+        **{f"reference_{a}_m": truth.place[:, k] for k, a in enumerate(("north", "east", "down"))},
+        **{f"velocity_{a}_mps": truth.velocity[:, k]
+           for k, a in enumerate(("north", "east", "down"))},
+        **{f"{a}_rad": euler[:, k] for k, a in enumerate(("roll", "pitch", "yaw"))},
+        **{f"rate_{a}_radps": truth.rate[:, k] for k, a in enumerate("xyz")},
+    }  # fmt: skip
+    np.savetxt(path, np.stack(list(columns.values()), 1), "%.17g", ",", header=",".join(columns),
+               comments="")  # fmt: skip
+    return path
+
+
+@pytest.fixture(scope="module")
+def oracle(tmp_path_factory: pytest.TempPathFactory) -> tuple[float, float]:
+    folder = tmp_path_factory.mktemp("oracle")
+    return latency(found(folder, table(folder / "oracle.csv", FIXES, TRUTH)))
+
+
+@pytest.mark.parametrize("name", ["ros1", "ulog"])
+def test_the_same_delay_is_found_as_in_a_table(
+    tmp_path: Path, name: str, oracle: tuple[float, float]
+) -> None:
+    result = found(tmp_path, WRITERS[name](tmp_path))
+    value, sigma = latency(result)
+    assert abs(value - LATE_S) < 4.0 * sigma
+    # the bag's frames are laid onto each other; ULog's places are floats and 1e-7 deg
+    assert abs(value - oracle[0]) < 0.6 * oracle[1]
+    assert [f.effect for f in result.findings if f.kind == "cause"] == ["latency"]
+
+
+@pytest.mark.parametrize("name", ["ros2", "mcap"])
+def test_every_bag_gives_the_very_same_log(tmp_path: Path, name: str) -> None:
+    """Same rows to the last bit, whatever the container: so the findings are the same."""
+    one, other = (
+        read_log(row_sources([WRITERS[n](tmp_path)], LogChoice(), ["uav"], poses=False), ["uav"],
+                 needs_ranging=False)
+        for n in ("ros1", name)
+    )  # fmt: skip
+    assert (one.kind, len(one)) == (other.kind, len(other)) == ("position", len(TRUTH))
+    np.testing.assert_array_equal(one.time_s, other.time_s)
+    np.testing.assert_array_equal(one.truth_m, other.truth_m)
+    for field in ("antenna_m", "euler_rad", "velocity_mps", "rate_radps"):
+        np.testing.assert_array_equal(
+            getattr(one.stages[0], field), getattr(other.stages[0], field)
+        )
+
+
+def test_an_origin_in_the_spec_takes_the_place_of_the_fit(
+    tmp_path: Path, oracle: tuple[float, float]
+) -> None:
+    """With the frame's origin known nothing is laid onto anything: within a tenth of sigma."""
+    place = "{origin: [47.3 deg, 8.55 deg, 460 m]}"
+    result = found(tmp_path, WRITERS["ros1"](tmp_path), log=place)
+    assert abs(latency(result)[0] - oracle[0]) < 0.1 * oracle[1]
+    assert not any("shifted by" in note for note in result.log.notes)
+
+
+def test_streams_that_the_spec_names_go_first(tmp_path: Path) -> None:
+    """The other way round: a reference as noisy as this names no second cause."""
+    path = WRITERS["mcap"](tmp_path)
+    result = found(tmp_path, path, log="{streams: {position: /odom, reference: /fix}}")
+    value, sigma = latency(result)
+    assert abs(value + LATE_S) < 4.0 * sigma
+    assert [f.effect for f in result.findings if f.kind == "cause"] == ["latency"]
+
+
+@pytest.mark.parametrize(
+    ("log", "message"),
+    [
+        ("{streams: {position: /fixx}}", "no stream '/fixx'"),
+        ("{streams: {attitude: /fix}}", "/fix holds no attitude"),
+        ("{streams: {ranging: /imu}}", "/imu holds no ranging"),
+    ],
+)
+def test_a_stream_that_does_not_fit_is_refused(tmp_path: Path, log: str, message: str) -> None:
+    with pytest.raises(BadInput, match=message):
+        found(tmp_path, WRITERS["ros1"](tmp_path), log=log)
+
+
+def tum(path: Path, made: Flight, turn_rad: float = 0.0) -> Path:
+    """TUM: seconds, place and quaternion x, y, z, w in a frame with z up, turned about it."""
+    from scipy.spatial.transform import Rotation
+
+    from tests.flight_logs import TO_ENU, ros_quaternion
+
+    turn = Rotation.from_rotvec([0.0, 0.0, turn_rad])
+    place = turn.apply(TO_ENU.apply(made.place))
+    q = (turn * Rotation.from_quat(ros_quaternion(made.turn))).as_quat()
+    rows = [
+        f"{ns // 10**9}.{ns % 10**9:09d} " + " ".join(f"{v:.12f}" for v in (*p, *t))
+        for ns, p, t in zip(made.stamp_ns.tolist(), place, q, strict=True)
+    ]
+    path.write_text("\n".join(rows) + "\n", "utf-8")
+    return path
+
+
+def test_two_trajectories_are_compared_pose_by_pose(tmp_path: Path) -> None:
+    """Places and attitudes late together: two files, frames that nothing relates."""
+    late = flight(45.0, late_s=LATE_S)
+    draw = np.random.default_rng(3)
+    late = Flight(late.stamp_ns, late.place + NOISE_M * draw.standard_normal((len(late), 3)),
+                  late.velocity, late.turn, late.rate)  # fmt: skip
+    files = tum(tmp_path / "slam.txt", late, 0.7), tum(tmp_path / "truth.txt", TRUTH)
+    axes = "{frame: enu, body: flu}"
+    result = found(tmp_path, *files, more=ATTITUDE, log=axes)
+    assert result.log.kind == "pose"
+    value, sigma = latency(result)
+    assert abs(value - LATE_S) < 5.0 * sigma + 1e-3
+    turned, spread = latency(result, "attitude")
+    assert abs(turned - LATE_S) < 5.0 * spread + 1e-3
