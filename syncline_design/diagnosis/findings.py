@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from syncline_design.diagnosis.consequence import Weights, rms_m
-from syncline_design.diagnosis.fitting import Data, Model, Opened
+from syncline_design.diagnosis.fitting import Data, Model, Opened, bounds_of
 from syncline_design.diagnosis.gross import Gross
 from syncline_design.diagnosis.identify import Alias, Comparison
 from syncline_design.diagnosis.noise import (
@@ -18,7 +18,6 @@ from syncline_design.diagnosis.noise import (
     clipped,
     marginal_variance,
     precision,
-    spec_bounds,
 )
 from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch
 from syncline_design.diagnosis.scene import Scene
@@ -248,12 +247,15 @@ def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:
     shown = {
         p.name: estimate(v, s, p.unit) for p, (v, s) in zip(effect.parameters, figures, strict=True)
     }
-    return _finding(final, effect, label, shown, _noise_size(data, model), weights)
+    return _finding(final, effect, label, shown, _noise_size(data, model, opened), weights)
 
 
-def _noise_size(data: Data, model: Model) -> float:
-    """RMS [m] of what the fitted noise has beyond the spec's."""
-    within = clipped(model.level, spec_bounds(data.structure))
+def _noise_size(data: Data, model: Model, opened: Opened) -> float:
+    """RMS [m] of what one stochastic effect of the fitted noise has beyond the spec's."""
+    others = bounds_of(data, [one for one in model.opened if one is not opened])
+    within = clipped(model.level, others)
+    sizes = (0.0 if k == opened.directed else s for k, s in enumerate(model.level.size))
+    within = replace(within, size=tuple(sizes))
     levels = [marginal_variance(data.structure, level) for level in (model.level, within)]
     visible = np.isfinite(data.view.log.truth_m)
     return float(np.sqrt(max(np.mean(np.sum((levels[0] - levels[1]) * visible, axis=1)), 0.0)))

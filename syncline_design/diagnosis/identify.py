@@ -96,8 +96,10 @@ def _best(data: Data, named: Model, label: Label, fits: Mapping[Label, Model]) -
     """The likeliest member of a class; among those that are as good, the commonest in practice."""
     scores = {label: named.nll + _price(data, effect_of(named, label))}
     for other, model in fits.items():
-        if plausible(model):
+        if plausible(data, model):
             scores[other] = model.nll + _price(data, effect_of(model, other))
+    if len(scores) > 1 and not plausible(data, named):
+        del scores[label]
     least = min(scores.values())
     close = [one for one, score in scores.items() if score <= least + AS_GOOD_NATS]
     return min(close, key=lambda one: (commonness(one), scores[one], one))
@@ -120,7 +122,7 @@ def _sorted_out(
         if model is not None:
             worse = model.nll - named.nll
             loss = worse + _price(data, one.candidate.effect) - own
-            one = replace(one, fit=worse, loss=loss, possible=plausible(model), refitted=True)
+            one = replace(one, fit=worse, loss=loss, possible=plausible(data, model), refitted=True)
         lists[_place(one)].append(one)
     aliases, lookalikes, excluded = lists
     return Comparison(tuple(aliases), tuple(lookalikes), tuple(excluded))

@@ -199,6 +199,12 @@ def clipped(level: NoiseLevel, bounds: Bounds) -> NoiseLevel:
     )
 
 
+def with_size(level: NoiseLevel, index: int, size: float) -> NoiseLevel:
+    """The level with one directed part at another size."""
+    sizes = tuple(size if k == index else s for k, s in enumerate(level.size))
+    return replace(level, size=sizes)
+
+
 def white_covariance(structure: Structure, level: NoiseLevel) -> Array:
     """Covariance of every row's white noise (n, 3, 3) [m2], whatever it shares with others."""
     total = structure.fixed.copy()

@@ -158,9 +158,9 @@ class Search:
         Effects that move the mean go first.
         """
         moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
-        kept = [t for t in moving if t.log_p <= threshold and plausible(t.model)]
+        kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
         if not kept:
-            scattering = [t for t in self.scatter_trials(model) if plausible(t.model)]
+            scattering = [t for t in self.scatter_trials(model) if plausible(self.data, t.model)]
             kept = [t for t in scattering if t.log_p <= threshold]
         return preferred(kept)
 
@@ -247,7 +247,7 @@ class Search:
                 if s.candidate.effect.kind == "stochastic":
                     continue
                 trial = self.trial(without, s, level)
-                if plausible(trial.model) and clearly_better(trial.model, model):
+                if plausible(self.data, trial.model) and clearly_better(trial.model, model):
                     model = trial.model
                     break
         return model

@@ -13,7 +13,7 @@ from syncline_design.diagnosis.identify import Comparison, Label, competed, effe
 from syncline_design.diagnosis.noise import as_specified
 from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted_of, names_of
 from syncline_design.diagnosis.tails import tails_in
-from syncline_design.diagnosis.trials import freedom_of, log_chance
+from syncline_design.diagnosis.trials import freedom_of, log_chance, seen_in_motion
 from syncline_design.effects.record import Effect
 
 APART = 2.0  # standard uncertainties between the values by two noise models
@@ -116,6 +116,7 @@ def _standing(
 
     What stands by the fitted noise has to stand by the spec's as well, larger where it is larger: a
     sensor whose noise is fitted far too small lends its weight to whatever moves that sensor.
+    Scatter of stamps that does not grow with the motion goes after them.
     """
     while model.acting:
         stated = as_specified(data.structure)
@@ -127,6 +128,10 @@ def _standing(
         if not fallen:
             break
         model = refitted_without(data, model, max(fallen)[1])
+    moving = {a.label for a in model.acting}
+    for one in model.opened:
+        if one.candidate.label not in moving and not seen_in_motion(data, model, one):
+            model = refitted_without(data, model, one.candidate.label)
     return model
 
 

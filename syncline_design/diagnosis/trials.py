@@ -14,7 +14,8 @@ import numpy as np
 
 from syncline_design.diagnosis.candidates import EDGE, STEP_TIMES, Candidate, Signature, zero_values
 from syncline_design.diagnosis.fitting import Data, Model, Opened, adjusted, fit
-from syncline_design.diagnosis.noise import NoiseLevel, precision
+from syncline_design.diagnosis.motion_scatter import grows_with_motion
+from syncline_design.diagnosis.noise import NoiseLevel, precision, with_size
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
@@ -50,14 +51,21 @@ def with_effect(data: Data, model: Model, found: Signature, level: NoiseLevel) -
     return located(data, fitted) if found.at else fitted
 
 
-def plausible(model: Model) -> bool:
-    """Whether every fitted parameter is of a size that its effect can have."""
+def plausible(data: Data, model: Model) -> bool:
+    """Whether every fitted parameter is of a size that its effect can have, and jitter is seen."""
     for one in model.acting:
         for p in one.effect.slopes():
             value = one.values[p.name]
             if abs(value) > p.high or (not p.signed and value < 0.0):
                 return False
-    return all(_mean_and_scatter_agree(model, one) for one in model.opened)
+    if not all(_mean_and_scatter_agree(model, one) for one in model.opened):
+        return False
+    return all(seen_in_motion(data, model, one) for one in model.opened)
+
+
+def seen_in_motion(data: Data, model: Model, opened: Opened) -> bool:
+    """Whether a scatter of stamps, if it is one, shows as such: it grows with the motion."""
+    return opened.directed < 0 or grows_with_motion(data, model, opened.directed)
 
 
 def _mean_and_scatter_agree(model: Model, opened: Opened) -> bool:
@@ -168,11 +176,6 @@ def usual_noise_size(data: Data, index: int) -> float:
     own = float(np.median(np.sum(direction**2, axis=(1, 2))))
     white = sum(np.einsum("nii->n", w.covariance) for w in data.noise_structure.white)
     return float(np.sqrt(np.median(white) / max(own, 1e-300)))
-
-
-def with_size(level: NoiseLevel, index: int, size: float) -> NoiseLevel:
-    sizes = tuple(size if k == index else s for k, s in enumerate(level.size))
-    return replace(level, size=sizes)
 
 
 def directed_index(data: Data, candidate: Candidate) -> int:
