@@ -220,7 +220,7 @@ def test_packet_time_against_capture_time(tmp_path: Path, packet: object, nano: 
     assert stream.points.last_s == pytest.approx(15 * 97_656e-9)
     (piece,) = recording.samples(stream.name)
     assert piece.columns["frame_id"].tolist() == [9] * 20
-    assert piece.columns["last_column_ns"][0] == sensor[0] + 15 * 97_656
+    assert piece.columns["clock_last_column_ns"][0] == sensor[0] + 15 * 97_656
 
 
 def test_metadata_beside_a_capture_name_the_clock(tmp_path: Path) -> None:
@@ -241,7 +241,7 @@ def test_an_imu_of_an_ouster(tmp_path: Path) -> None:
     (piece,) = recording.samples(stream.name)
     assert piece.columns["acceleration_z_mps2"].tolist() == [9.80665]
     assert piece.columns["rate_y_degps"].tolist() == [-20]
-    assert piece.columns["gyro_ns"].tolist() == [5 * SECOND + 200]
+    assert piece.columns["clock_gyro_ns"].tolist() == [5 * SECOND + 200]
 
 
 def test_microseconds_of_the_hour_over_the_full_hour(tmp_path: Path) -> None:

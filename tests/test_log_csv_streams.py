@@ -124,7 +124,11 @@ def test_a_survey_has_no_times(tmp_path: Path) -> None:
     assert stream.quantity == ("target",)
     assert stream.stamps is None
     (piece,) = recording.samples("imu")
-    assert piece.columns["target_id"].tolist() == ["A", "B"]
+    other = opened(tmp_path, "target_id,range_m,time_s\nB,5,1\n7,6,2\nA,6,2\n", "log.csv")
+    (ranges,) = other.samples("log")
+    a, b = piece.columns["target_id"].tolist()
+    assert ranges.columns["target_id"].tolist() == [b, 7.0, a]  # one name is one figure everywhere
+    assert a != b
 
 
 def test_empty_cells_are_messages_without_the_stamp(tmp_path: Path) -> None:

@@ -153,10 +153,11 @@ def test_velocity_and_the_receivers_own_time(tmp_path: Path) -> None:
     assert np.allclose(fix["velocity_north_mps"], north)
     assert np.allclose(fix["velocity_east_mps"], east)
     assert np.allclose(fix["velocity_down_mps"], -0.5)
-    assert fix["gps_ns"][0] == UNSET
+    assert (fix["clock_gps_ns"][0], fix["clock_utc_ns"][0]) == (0, 0)
     # 2024-12-22 is the Sunday that GPS week 2346 begins with, 100.2 s after midnight
     sunday = int(np.datetime64("2024-12-22T00:00:00", "ns").astype(np.int64))
-    assert fix["gps_ns"][1] == sunday + 100_200_000_000
+    assert fix["clock_gps_ns"][1] == sunday + 100_200_000_000
+    assert fix["clock_utc_ns"][1] == sunday + 82_200_000_000
 
 
 def test_the_multiplier_of_a_unit_counts(tmp_path: Path) -> None:

@@ -258,7 +258,7 @@ def test_days_of_clouds_with_standard_time() -> None:
 
 def test_the_boot_clock_of_a_flight_against_gps() -> None:
     recording, _ = streams_of("dataflash/sample.bin")
-    gps = np.concatenate([p.columns["gps_ns"] for p in recording.samples("GPS")])
+    gps = np.concatenate([p.columns["clock_gps_ns"] for p in recording.samples("GPS")])
     boot = np.concatenate([p.primary_ns for p in recording.samples("GPS")])
     apart = (gps - utc("1980-01-06") - boot) / SECOND
     assert np.median(apart) == pytest.approx(1237733407.866, abs=0.02)

@@ -28,7 +28,7 @@ from syncline_design.logs.readers.batches import (
 from syncline_design.logs.readers.dataflash_kinds import (
     LABELS,
     Meaning,
-    gps_clock,
+    gps_clocks,
     meaning_of,
 )
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
@@ -314,7 +314,7 @@ def _columns(rows: NDArray[Any], kind: Kind, number: int, layouts: Layouts) -> C
         values[name] = rows[name] if factor == 1 else scaled(rows[name], factor)
     columns: dict[str, NDArray[Any]] = dict(meaning.columns(values))
     if "GWk" in values and "GMS" in values:
-        columns["gps_ns"] = gps_clock(rows["GWk"], rows["GMS"])
+        columns |= gps_clocks(rows["GWk"], rows["GMS"])
     for name, column in values.items():
         if name not in meaning.taken:
             columns[f"{name}_{labels[name]}" if labels[name] else name] = column

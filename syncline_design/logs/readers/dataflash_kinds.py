@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.logs.readers.epochs import GPS_EPOCH_S, NANO, WEEK_S
-from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Nature
+from syncline_design.logs.readers.epochs import GPS_EPOCH_S, NANO, WEEK_S, gps_to_utc
+from syncline_design.logs.readers.stream import Frame, Nature
 
 Values = Mapping[str, NDArray[Any]]
 Made = dict[str, NDArray[Any]]
@@ -31,7 +31,7 @@ FUSED = (
     "for it"
 )
 SEA_LEVEL = "height above mean sea level; the log does not say by how much the ellipsoid differs"
-ARRIVAL = "TimeUS is when the autopilot logged the fix; the receiver's own time is gps_ns"
+ARRIVAL = "TimeUS is when the autopilot logged the fix; the receiver's own time is clock_gps_ns"
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ def meaning_of(name: str, fields: tuple[str, ...]) -> Meaning:
     if not quantity:
         return Meaning()
     frame: Frame = "wgs84" if PLACE.keys() <= here else "ned"
-    shown = tuple(n for n in notes if "gps_ns" not in n or "GMS" in here)
+    shown = tuple(n for n in notes if "clock_gps_ns" not in n or "GMS" in here)
     return Meaning(
         tuple(dict.fromkeys(quantity)),
         frame if quantity != ["ranging"] else "unknown",
@@ -139,9 +139,8 @@ def _ground_velocity(values: Values) -> Made:
     }
 
 
-def gps_clock(week: NDArray[Any], milliseconds: NDArray[Any]) -> Nanoseconds:
-    """The receiver's own time as `gps` counts; UNSET where it has no week yet."""
+def gps_clocks(week: NDArray[Any], milliseconds: NDArray[Any]) -> Made:
+    """The receiver's own time as `gps` and as `utc` count; 0 where it has no week yet."""
     seconds = GPS_EPOCH_S + week.astype(np.int64) * WEEK_S
-    stamps = seconds * NANO + milliseconds.astype(np.int64) * 1_000_000
-    known: Nanoseconds = np.where(week > 0, stamps, UNSET)
-    return known
+    gps = np.where(week > 0, seconds * NANO + milliseconds.astype(np.int64) * 1_000_000, 0)
+    return {"clock_gps_ns": gps, "clock_utc_ns": np.where(gps > 0, gps_to_utc(gps), 0)}

@@ -38,7 +38,7 @@ LOCKED = 2  # Velodyne's PPS status: 0 absent, 1 attempting, 2 locked, 3 error
 IMU_COLUMNS = (
     *(f"acceleration_{a}_mps2" for a in "xyz"),
     *(f"rate_{a}_degps" for a in "xyz"),
-    *("gyro_ns", "system_ns"),
+    *("clock_gyro_ns", "clock_system_ns"),
 )
 WORDS = {
     "ouster": ("lidar", "Ouster lidar packet"),
@@ -350,7 +350,7 @@ def _columns(kind: str, rows: _Rows) -> dict[str, NDArray[Any]]:
     if kind == "ouster":
         frames = np.array([values[0] for values in rows.values], dtype=float)
         last = np.array([values[1] for values in rows.values], dtype=np.int64)
-        return {"frame_id": frames, "last_column_ns": last}
+        return {"frame_id": frames, "clock_last_column_ns": last}
     if kind == "ouster_imu":
         columns: dict[str, NDArray[Any]] = {}
         for k, name in enumerate(IMU_COLUMNS):
