@@ -7,8 +7,10 @@ minus 1e9); where the values cannot be what it says, the values count, and that 
 from __future__ import annotations
 
 import logging
+import os
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -25,7 +27,7 @@ from syncline_design.logs.readers.epochs import (
     nanoseconds_of,
 )
 from syncline_design.logs.readers.las_header import MAGIC, TIMED, LasClaims, claims_of
-from syncline_design.logs.readers.laz_cut import mended
+from syncline_design.logs.readers.laz_cut import mended, whole_points
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
 from syncline_design.logs.readers.stream import UNSET, Frame, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
@@ -33,6 +35,7 @@ from syncline_design.spec.load import BadInput
 
 FORMAT = "LAS or LAZ cloud"
 PIECE_BYTES = 1 << 25
+LEAST_RECORD = 34  # bytes of LASzip's record without items
 PANIC = "PanicException"  # what a library in Rust raises beside all exceptions of Python
 MOST_ROWS = 50_000  # the size of a chunk as most writers pack them
 NARROWER = 30  # times fewer points at once, where a piece cannot be read as a whole
@@ -84,7 +87,9 @@ class LasRecording(BatchRecording):
         claims = self._claims
         size = self.path.stat().st_size
         there = claims.points
-        if not claims.packed:
+        if claims.packed:
+            there = whole_points(self.path, claims, self._record())
+        else:
             there = min(there, (size - claims.offset) // claims.record)
         rows, count, said = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record)), 0, ""
         while rows and count < there:
@@ -112,25 +117,38 @@ class LasRecording(BatchRecording):
     def _from(self, first: int, end: int, rows: int) -> Iterator[Any]:
         """Points from one on, some at a time; those before are unpacked once more."""
         with self.path.open("rb") as file, quiet("laspy"):
-            reader = self._reader(file)
+            with no_panic_shown() if self._claims.packed else nullcontext():
+                reader = self._reader(file)
             self._frame = _frame(reader.header)
             at = 0
-            while at < first:
-                at += len(reader.read_points(min(first - at, MOST_ROWS)))
             while at < end:
-                points = reader.read_points(min(rows, end - at))
+                wanted = min(first - at, MOST_ROWS) if at < first else min(rows, end - at)
+                with no_panic_shown() if self._claims.packed else nullcontext():
+                    points = reader.read_points(wanted)
                 if not len(points):
                     return
                 at += len(points)
-                yield points
+                if at > first:
+                    yield points
+
+    def _record(self) -> bytes:
+        """LASzip's own record of the header."""
+        try:
+            with self.path.open("rb") as file:
+                header = self._laspy.LasHeader.read_from(file)
+            found = header.vlrs.get("LasZipVlr")
+            record = bytes(found[0].record_data_bytes()) if found else b""
+        except Exception as error:  # as below
+            record, found = b"", str(error)
+        if len(record) < LEAST_RECORD:
+            raise refuse(self.path, "no record of LASzip in a packed cloud", found=str(found)[:120])
+        return record
 
     def _reader(self, file: BinaryIO) -> Any:
         """laspy's, unpacking from front to back: a cut file has lost its table of chunks."""
         if not self._claims.packed:
             return self._laspy.open(file, closefd=False)
-        header = self._laspy.LasHeader.read_from(file)
-        record = header.vlrs.get("LasZipVlr")[0].record_data_bytes()
-        source = mended(self.path, file, self._claims, bytes(record))
+        source = mended(self.path, file, self._claims, self._record())
         source.seek(0)
         return self._laspy.open(source, closefd=False, laz_backend=self._laspy.LazBackend.Lazrs)
 
@@ -195,12 +213,27 @@ def quiet(name: str) -> Iterator[None]:
         logger.setLevel(before)
 
 
+@contextmanager
+def no_panic_shown() -> Iterator[None]:
+    """Without the trace that a library in Rust writes to the second stream when it panics."""
+    sys.stderr.flush()
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, 2)
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
 _NAMES = ("point_x_m", "point_y_m", "point_z_m", "intensity", "point_source_id")
 _NONE: NDArray[Any] = np.zeros(0)
 
 
 def _columns(points: Any) -> dict[str, NDArray[Any]]:
-    columns = {f"point_{a}_m": np.asarray(getattr(points, a), dtype=float) for a in "xyz"}
+    with np.errstate(over="ignore", invalid="ignore"):  # of scales that a damaged header claims
+        columns = {f"point_{a}_m": np.asarray(getattr(points, a), dtype=float) for a in "xyz"}
     for name in ("intensity", "point_source_id"):
         columns[name] = np.asarray(points[name])
     return columns

@@ -13,8 +13,12 @@ from typing import Any, BinaryIO
 
 from syncline_design.logs.readers.las_header import LasClaims
 from syncline_design.logs.readers.reader import library
+from syncline_design.logs.refusals import refuse
 
 CHUNK_PLACE = 12  # of the chunk size in LASzip's record
+ITEMS_PLACE = 32  # of the number of items, each with type, size and version (2 bytes each)
+LAYERS = {10: 9, 11: 1, 12: 2, 13: 1}  # of an item's type in a chunk that is packed in layers
+EXTRA_BYTES = 14  # an item with a layer for each of its bytes
 LEAST_CHUNK = 100
 POINTER = 8  # bytes at the first point, that say where the table is
 
@@ -70,18 +74,78 @@ class MendedFile(io.RawIOBase):
 
 
 def mended(path: Path, file: BinaryIO, claims: LasClaims, record: bytes) -> BinaryIO | MendedFile:
-    """The file itself where its table is there; else one with a table; record: LASzip's own."""
+    """The file itself where its table can be one; else one with a table; record: LASzip's own."""
     size = path.stat().st_size
-    file.seek(claims.offset)
-    (table,) = struct.unpack("<q", file.read(POINTER).ljust(POINTER, b"\0"))
-    file.seek(0)
-    if table == -1 or claims.offset + POINTER <= table <= size - POINTER:
+    if _has_table(file, claims, size):
         return file
     (chunk,) = struct.unpack_from("<I", record.ljust(16, b"\0"), CHUNK_PLACE)
     if not LEAST_CHUNK <= chunk < 2**31:  # chunks of sizes that only the table told
-        return file
+        raise refuse(
+            path,
+            "the table of chunks is missing or damaged, and with it the size of each chunk",
+            hint="copy the file once more: it was cut",
+        )
     lazrs = library("lazrs", path, "LAZ cloud")
     tail = io.BytesIO()
     entries = [(chunk, 1)] * -(-claims.points // chunk)
     lazrs.write_chunk_table(tail, entries, lazrs.LazVlr(record))
     return MendedFile(file, claims.offset, size, tail.getvalue())
+
+
+def _has_table(file: BinaryIO, claims: LasClaims, size: int) -> bool:
+    """Whether the table's head is there and its count possible: the library believes any count."""
+    at = _number(file, claims.offset, "<q")
+    if at == -1:  # written behind the points, where a writer could not go back
+        at = _number(file, size - POINTER, "<q")
+    if not claims.offset + POINTER <= at <= size - POINTER:
+        return False
+    version, count = _number(file, at, "<I"), _number(file, at + 4, "<I")
+    # the first point of every chunk stands there as it is
+    return version == 0 and 0 < count * claims.record <= size
+
+
+def _number(file: BinaryIO, at: int, code: str) -> int:
+    """One number of a file, -1 where it ends before."""
+    width = struct.calcsize(code)
+    file.seek(max(at, 0))
+    raw = file.read(width)
+    return int(struct.unpack(code, raw)[0]) if len(raw) == width else -1
+
+
+def whole_points(path: Path, claims: LasClaims, record: bytes) -> int:
+    """How many points stand in chunks whose layers fit into the file.
+
+    Points of the formats from 6 on are packed in layers, whose sizes stand behind the first point
+    of each chunk; the library makes room for any size before it reads.
+    """
+    layers = _layers(record)
+    (chunk,) = struct.unpack_from("<I", record.ljust(16, b"\0"), CHUNK_PLACE)
+    if not layers or chunk == 0:
+        return claims.points
+    size, at, points = path.stat().st_size, claims.offset + POINTER, 0
+    head = claims.record + 4 + 4 * layers
+    with path.open("rb") as file:
+        while points < claims.points:
+            file.seek(at + claims.record)
+            raw = file.read(4 + 4 * layers)
+            if len(raw) < 4 + 4 * layers:
+                break
+            count, *sizes = struct.unpack(f"<{1 + layers}I", raw)
+            at += head + sum(sizes)
+            if at > size or not count:
+                break
+            points += min(count, chunk)
+    return min(points, claims.points)
+
+
+def _layers(record: bytes) -> int:
+    """Layers of a chunk by the items of LASzip's record; 0 where points are packed one by one."""
+    if len(record) < ITEMS_PLACE + 2:
+        return 0
+    (items,) = struct.unpack_from("<H", record, ITEMS_PLACE)
+    if len(record) < ITEMS_PLACE + 2 + 6 * items:
+        return 0
+    kinds = [struct.unpack_from("<3H", record, ITEMS_PLACE + 2 + 6 * k)[:2] for k in range(items)]
+    if any(kind not in LAYERS and kind != EXTRA_BYTES for kind, _ in kinds):
+        return 0
+    return sum(size if kind == EXTRA_BYTES else LAYERS[kind] for kind, size in kinds)
