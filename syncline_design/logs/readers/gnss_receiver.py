@@ -141,9 +141,11 @@ class ReceiverRecording(BatchRecording):
     ) -> None:
         key, payload = body[:2], body[4:]
         name = self._name(body)
+        row = _row(body)
+        if row is None and key in ubx.DTYPES:  # a poll, or of another version than that known
+            name, payload = f"{name} ({len(payload)} bytes)", b""
         rows = held.setdefault(name, _Rows())
         rows.key = key
-        row = _row(body)
         tow = self._time_of_week(name, payload) if row is None else ubx.tow_ns(key, row)
         tag = row is not None and "timeTag" in (row.dtype.names or ())
         if tag:

@@ -116,10 +116,11 @@ class PosRecording(BatchRecording):
         size = 7 if self._header.place == "dms" else 3
         if not self._fields:
             self._fields = len(fields)
-        if len(fields) < max(self._fields, LEAST_FIELDS + size - 3):
-            if not line.whole:
+        if len(fields) != self._fields or len(fields) < LEAST_FIELDS + size - 3:
+            if not line.whole and len(fields) < self._fields:
                 return None
-            raise bad_line(self.path, line, "an epoch is cut short", f"{self._fields} fields")
+            message = f"an epoch of {len(fields)} fields among those of {self._fields}"
+            raise bad_line(self.path, line, message, f"{self._fields} fields in every line")
         try:
             stamp = self._stamp(fields[0], fields[1])
             place = [float(cell) for cell in fields[2 : 2 + size]]
@@ -227,7 +228,8 @@ def _recognises(head: Head) -> int:
     if len(fields) < LEAST_FIELDS or not fields[5].isdecimal() or not fields[6].isdecimal():
         return NO
     dated = DATE.match(fields[0]) is not None and CLOCK.match(fields[1]) is not None
-    weekly = fields[0].isdecimal() and len(fields[0]) <= 4 and len(fields) >= 12
+    weekly = fields[0].isdecimal() and len(fields[0]) <= 4 and len(fields) >= 13
+    weekly = weekly and all("." in cell for cell in fields[1:5])
     return BY_SHAPE if dated or weekly else NO
 
 
