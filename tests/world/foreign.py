@@ -1,5 +1,8 @@
 """Noise that is not the model's: what measured logs have and white noise of the spec's size lacks.
 
+The kinds in AS_MEASURED have the sizes, time constants and tails that were fitted to three measured
+sets: a laser robot, motion capture, and a camera on targets.
+
 Every kind is put on the columns of a finished log and stays near the spec's sigma, so that a right
 reader of a clean log finds nothing missing.  Slow noise is a sum of cosines of the log's length
 with variances falling as 1/k, bounded; heavy noise is Student's t with outliers.
@@ -8,11 +11,11 @@ with variances falling as 1/k, bounded; heavy noise is Student's t with outliers
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.world.noise import Noise
+from tests.world.noise import Noise, gauss_markov
 from tests.world.trajectory import Array
 from tests.world.worldlog import WorldLog
 
@@ -124,8 +127,70 @@ KINDS: dict[str, Maker] = {
 }
 
 
+def student(freedom: float, outliers: float) -> Callable[..., Array]:
+    """Student's t of unit variance, some rows normal and six times as large."""
+
+    def drawn(rng: np.random.Generator, rows: int) -> Array:
+        core = rng.standard_t(freedom, rows) / np.sqrt(freedom / (freedom - 2.0))
+        struck = rng.random(rows) < outliers
+        return np.asarray(np.where(struck, 6.0 * rng.standard_normal(rows), core))
+
+    return drawn
+
+
+@dataclass(frozen=True)
+class Part:
+    """Noise on some columns, `share` of their sigma.
+
+    shape: slow, steps, heavy or gm (first-order Gauss-Markov of time_s); freedom, outliers: of
+    heavy noise.
+    """
+
+    names: tuple[str, ...]
+    share: float
+    shape: str
+    time_s: float = 0.0
+    freedom: float = 5.0
+    outliers: float = 0.0
+
+    def draw(self, rng: np.random.Generator, log: WorldLog) -> Array:
+        rows = log.run.stamps_s.size
+        if self.shape == "gm":
+            return gauss_markov(rng, log.run.stamps_s, np.ones(1), self.time_s)[:, 0]
+        if self.shape == "heavy":
+            return student(self.freedom, self.outliers)(rng, rows)
+        return slow(rng, rows) if self.shape == "slow" else steps(rng, rows)
+
+
+AS_MEASURED: dict[str, tuple[Part, ...]] = {
+    "as a laser robot": (
+        Part(POSITION, 0.5, "slow"),
+        Part(("yaw_deg",), 0.2, "slow"),
+        Part(RANGING, 0.25, "gm", 1.0),
+        Part(RANGING, 0.5, "heavy", freedom=6.0),
+    ),
+    "as motion capture": (
+        Part(POSITION, 0.8, "gm", 15.0),
+        Part(POSITION, 0.3, "heavy", freedom=6.0),
+    ),
+    "as a camera": (
+        Part(POSITION, 0.6, "gm", 0.3),
+        Part(ATTITUDE, 0.6, "gm", 1.9),
+        Part(RANGING, 0.5, "slow"),
+        Part((*RANGING, *ATTITUDE), 0.4, "heavy", freedom=4.6, outliers=0.02),
+    ),
+}
+
+
 def foreign(log: WorldLog, kind: str) -> WorldLog:
     """The log with noise of a kind on its columns; `no motion columns` takes those away."""
+    if kind in AS_MEASURED:
+        rng = np.random.default_rng([log.run.seed, 67, sorted(AS_MEASURED).index(kind)])
+        columns = dict(log.columns)
+        for part in AS_MEASURED[kind]:
+            for name in (n for n in part.names if n in columns):
+                columns[name] = columns[name] + part.share * _sigma(log, name) * part.draw(rng, log)
+        return replace(log, columns=columns)
     rng = np.random.default_rng([log.run.seed, 61, sorted(KINDS).index(kind)])
     columns = {**log.columns, **KINDS[kind](rng, log)}
     if kind == "no motion columns":
