@@ -20,6 +20,8 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, load
 
 if TYPE_CHECKING:
+    from syncline_design.acceptance.accept import AcceptSettings
+    from syncline_design.acceptance.result import Acceptance
     from syncline_design.auditing.result import Audit
     from syncline_design.choice.options import ResourceName
     from syncline_design.choice.outcome import Road
@@ -38,6 +40,7 @@ __all__ = [
     "Case",
     "NoVerdict",
     "OutOfTime",
+    "accept",
     "audit",
     "check",
     "diagnose",
@@ -140,7 +143,8 @@ def diagnose(
     logs: a file or several; none: those that the spec names.
     """
     from syncline_design import diagnosis
-    from syncline_design.comparison.meaning import as_measured, meaning, with_design
+    from syncline_design.comparison.meaning import meaning, with_design
+    from syncline_design.verdict.optimise import as_measured
 
     seed = _seed(seed)
     rate = arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
@@ -218,6 +222,21 @@ def audit(
     with _limited(time_limit_s):
         found = audit_files(files)
         return found if spec is None else held_against(found, _case(spec), seed)
+
+
+def accept(
+    spec: SpecOrPath, logs: str | Path | Sequence[str | Path],
+    settings: AcceptSettings | None = None, *, seed: int = 0, time_limit_s: float | None = None,
+) -> Acceptance:  # fmt: skip
+    """Whether logs of the built system bear out what the verdict on a spec rests on.
+
+    settings: `syncline_design.acceptance.accept.AcceptSettings`.
+    """
+    from syncline_design.acceptance import accept as acceptance
+
+    files, seed = _files(logs), _seed(seed)
+    with _limited(time_limit_s):
+        return acceptance.accept(_case(spec), files, settings, seed)
 
 
 def reproduce(*, seed: int = 0, time_limit_s: float | None = None) -> Reproduction:

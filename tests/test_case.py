@@ -15,7 +15,7 @@ from syncline_design.choice.variations import (
     with_figure,
     with_platform_figure,
 )
-from syncline_design.comparison.meaning import as_measured, meaning
+from syncline_design.comparison.meaning import meaning
 from syncline_design.model.quantity import Dimension
 from syncline_design.spec import edit, yaml_text
 from syncline_design.spec import load as load_module
@@ -23,6 +23,7 @@ from syncline_design.spec.catalog import SECTIONS, Catalog
 from syncline_design.spec.load import load
 from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import ParsedFile
+from syncline_design.verdict.optimise import as_measured
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 ROOT = Path(__file__).parents[1]

@@ -273,6 +273,9 @@ def test_what_is_undone_is_what_departed(effect: Effect) -> None:
 
 # Words of the model, of the paper and of the spec that are an effect's name as well.
 OTHER_MEANING = {"lever_arm"}
+# Names of assumptions on a built system, which effects break.
+ASSUMPTIONS = {"latency", "mounting"}
+SPEAK_OF_ASSUMPTIONS = {"assumptions.py", "by_log.py", "result.py", "sarif.py"}
 
 
 def test_no_other_file_names_an_effect() -> None:
@@ -288,7 +291,13 @@ def test_no_other_file_names_an_effect() -> None:
             module = node.module if isinstance(node, ast.ImportFrom) else None
             if module and module.rpartition(".")[2] in registry():
                 named.append((path.name, node.lineno, module))
-    assert [entry for entry in named if entry[2] not in OTHER_MEANING] == []
+    other = [
+        entry
+        for entry in named
+        if entry[2] not in OTHER_MEANING
+        and not (entry[0] in SPEAK_OF_ASSUMPTIONS and entry[2] in ASSUMPTIONS)
+    ]
+    assert other == []
 
 
 @pytest.fixture

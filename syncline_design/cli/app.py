@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from syncline_design import __version__
-from syncline_design.cli import clocks, design, evidence, library, stamps
+from syncline_design.cli import acceptance, clocks, design, evidence, library, stamps
 from syncline_design.cli.shared import NO_VERDICT
 from syncline_design.machine.processes import forget_working_folder
 from syncline_design.machine.streams import say, secure_streams
@@ -51,6 +51,7 @@ app.command("study")(design.study)
 app.command("diff")(design.diff)
 app.command("timing")(clocks.timing)
 app.command("audit")(stamps.audit)
+app.command("accept")(acceptance.accept)
 app.command("reproduce")(evidence.reproduce)
 catalog.command("list")(library.catalog_list)
 catalog.command("show")(library.catalog_show)

@@ -102,13 +102,14 @@ def diagnose(
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
     deadline = deadline_of(time_limit)
-    from syncline_design.comparison.meaning import as_measured, with_design
+    from syncline_design.comparison.meaning import with_design
     from syncline_design.diagnosis import DiagnosisSettings
     from syncline_design.diagnosis import diagnose as diagnose_log
     from syncline_design.report.diagnoses import DIAGNOSE_FORMATS, render_diagnose
     from syncline_design.report.on_diagnosis import on_diagnosis
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
+    from syncline_design.verdict.optimise import as_measured
 
     targets = output_targets(output, DIAGNOSE_FORMATS, [spec, *(log or ())], [write_spec])
     settings = DiagnosisSettings(

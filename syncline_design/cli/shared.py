@@ -57,6 +57,7 @@ SimulateOutput = Annotated[list[str] | None, output_option(formats.SIMULATE_FORM
 DiagnoseOutput = Annotated[list[str] | None, output_option(formats.DIAGNOSE_FORMATS)]
 StudyOutput = Annotated[list[str] | None, output_option(formats.STUDY_FORMATS)]
 DiffOutput = Annotated[list[str] | None, output_option(formats.DIFF_FORMATS)]
+AcceptOutput = Annotated[list[str] | None, output_option(formats.ACCEPT_FORMATS)]
 AuditOutput = Annotated[list[str] | None, output_option(formats.AUDIT_FORMATS)]
 TimingOutput = Annotated[list[str] | None, output_option(formats.TIMING_FORMATS)]
 ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FORMATS)]

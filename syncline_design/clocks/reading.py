@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,6 +16,7 @@ from syncline_design.clocks.files import LogFile, read_files, refused
 from syncline_design.clocks.series import FARTHEST_S, Row, Series, Sheet, SourceKind, series_of
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead
+from syncline_design.spec.load import BadInput
 
 _Read = Callable[[str], tuple[SourceKind, Row, str] | None]
 _LINE_READERS: Final[dict[str, Callable[[], _Read]]] = {
@@ -25,6 +27,7 @@ _LINE_READERS: Final[dict[str, Callable[[], _Read]]] = {
     "ppstest": lambda: pulses.ppstest_row,
 }
 _HEAD: Final = 2000  # lines by which a format is told
+_FIRST_BYTES: Final = 2**18  # of a file by which it is told from others
 _JOURNALS: Final = ("linuxptp", "gpsd", "ppstest")  # formats that stand among other lines
 _FORMATS: Final = (
     "a log of chrony (tracking, statistics, measurements, refclocks), ntpd (loopstats, peerstats), "
@@ -59,6 +62,27 @@ def read_logs(paths: Sequence[Path]) -> ClockLogs:
     notes += [said for _, said in freed if said]
     hashes = tuple(FileRead(str(file.path), file.sha256) for file in files)
     return ClockLogs(tuple(one for one, _ in freed), hashes, tuple(notes))
+
+
+def is_clock_log(path: Path) -> bool:
+    """Whether a file begins as one of the logs that are read here; False where it cannot be."""
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_FIRST_BYTES)
+    except OSError:
+        return False
+    if head.startswith(b"\x1f\x8b"):
+        try:
+            head = zlib.decompressobj(wbits=31).decompress(head, _FIRST_BYTES)
+        except zlib.error:
+            return False
+    if b"\x00" in head:
+        return False
+    lines = tuple(head.decode("utf-8-sig", errors="replace").splitlines())
+    try:
+        return bool(_format(LogFile(path, "", lines, "", (0, ""))))
+    except BadInput:
+        return False
 
 
 def _sheets(file: LogFile) -> tuple[list[Sheet], list[str]]:

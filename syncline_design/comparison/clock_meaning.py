@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields, replace
 from syncline_design.clocks.entry import values_of
 from syncline_design.clocks.result import EntryKind, Timing
 from syncline_design.clocks.study import TimingStudy
-from syncline_design.comparison.meaning import as_measured
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry
 from syncline_design.spec.choices import ClockChoice
 from syncline_design.verdict.named import NamedRole
+from syncline_design.verdict.optimise import as_measured
 from syncline_design.verdict.tree import Verdict, Word
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 

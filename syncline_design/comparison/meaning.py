@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 
 from syncline_design.choice.effect_tables import NoBudget
 from syncline_design.choice.outcome import Explanation
-from syncline_design.choice.problem import build_problem, sole_design
+from syncline_design.choice.problem import build_problem
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
@@ -17,10 +17,9 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice
 from syncline_design.verdict.named import NamedDesign
-from syncline_design.verdict.optimise import pinned_case
 from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
 from syncline_design.verdict.verified import frame
-from syncline_design.verdict.verify import CheckSettings, check_loaded, picked_design
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 WORDS = {
     "meets": "meets its requirements",
@@ -94,16 +93,6 @@ def with_design(found: Diagnosis, means: DesignMeaning | None) -> DiagnosisAndDe
     """The diagnosis with what it means for the design."""
     parts = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
     return DiagnosisAndDesign(**parts, design=means)
-
-
-def as_measured(case: Case, seed: int = 0) -> Case:
-    """The spec of the system that made a log: with choices open, its best design pinned."""
-    if sole_design(build_problem(case)) is not None:
-        return case
-    problem, design = picked_design(case, seed)
-    if problem.combinations == 1:
-        return case
-    return pinned_case(case, problem, design)
 
 
 def meaning(case: Case, entries: Sequence[EffectChoice], seed: int = 0) -> DesignMeaning | None:

@@ -49,4 +49,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=90,
+    breaks="mounting",
 )

@@ -52,4 +52,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=30,
+    breaks="mounting",
 )

@@ -45,4 +45,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
+    breaks="clock",
 )

@@ -57,4 +57,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=100,
+    breaks="mounting",
 )

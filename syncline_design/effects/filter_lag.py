@@ -88,4 +88,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
+    breaks="latency",
 )

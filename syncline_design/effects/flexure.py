@@ -70,4 +70,5 @@ EFFECT = Effect(
     contribute=_contribute,
     tilted=True,
     accelerated=True,
+    breaks="mounting",
 )

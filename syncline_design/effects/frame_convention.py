@@ -143,4 +143,5 @@ EFFECT = Effect(
     sensitivity=None,
     contribute=_contribute,
     undoing=Undoing(CHOICES, _mended),
+    breaks="mounting",
 )

@@ -46,4 +46,5 @@ EFFECT = Effect(
         tried={"position": tuple(float(s) for s in range(-MOST_S, MOST_S + 1) if s)},
         instead_of="latency",
     ),
+    breaks="latency",
 )

@@ -58,4 +58,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=10,
+    breaks="latency",
 )

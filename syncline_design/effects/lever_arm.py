@@ -57,4 +57,5 @@ EFFECT = Effect(
     contribute=_contribute,
     transponder=True,
     rarity=20,
+    breaks="lever_arm",
 )

@@ -52,4 +52,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=80,
+    breaks="mounting",
 )

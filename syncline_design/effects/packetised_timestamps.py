@@ -57,4 +57,5 @@ EFFECT = Effect(
     contribute=_contribute,
     spread=_spread,
     opens="size",
+    breaks="timing",
 )

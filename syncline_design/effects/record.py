@@ -231,6 +231,7 @@ def everywhere(stage: Stage, sensor: Target) -> bool:
     return sensor == "target" or getattr(stage, sensor) is not None
 
 
+Promise = Literal["timing", "latency", "clock", "lever_arm", "mounting", "noise"]
 Opening = Literal["", "factor", "slow", "down", "size", "tails"]
 # Figures that each opening fits, in the order of the effect's parameters.
 OPENED: Mapping[Opening, int] = {"factor": 1, "slow": 2, "down": 2, "size": 1, "tails": 2}
@@ -279,6 +280,7 @@ class Effect:
     noise of its sensor or its "down" part alone, the "size" of its own scatter, the "tails".
     undoing: a discrete one's.
     bounded_by_k: charged with k times its standard deviation, k the coverage factor.
+    breaks: which assumption on a built system it breaks; `noise`: that the sensor is as its figure.
     sentence: for people, a format string over {sensor} and the parameters.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
     """
@@ -305,6 +307,7 @@ class Effect:
     opens: Opening = ""
     undoing: Undoing | None = None
     bounded_by_k: bool = False
+    breaks: Promise = "noise"
     brief: tuple[str, ...] = ()
 
     @property

@@ -51,4 +51,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
+    breaks="timing",
 )

@@ -51,4 +51,5 @@ EFFECT = Effect(
     rarity=130,
     opens="size",
     bounded_by_k=True,
+    breaks="timing",
 )

@@ -56,4 +56,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
+    breaks="timing",
 )

@@ -54,4 +54,5 @@ EFFECT = Effect(
     contribute=_contribute,
     applies=_applies,
     rarity=120,
+    breaks="latency",
 )

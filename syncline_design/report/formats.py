@@ -14,6 +14,7 @@ STUDY_FORMATS: Final = (
 DIFF_FORMATS: Final = ("json", "html", "markdown", "github")
 REPRODUCE_FORMATS: Final = ("json", "html")
 TIMING_FORMATS: Final = ("json", "html", "markdown")
+ACCEPT_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown")
 AUDIT_FORMATS: Final = ("json", "html", "markdown")
 CATALOG_FORMATS: Final = ("json",)
 
@@ -23,6 +24,7 @@ NOT_FOR_A_TERMINAL: Final = ("html", "parquet")
 # Kinds of files and of results that have a JSON Schema.
 FileName = Literal["spec", "catalog", "study"]
 ResultName = Literal[
+    "acceptance",
     "audit",
     "catalog-check",
     "catalog-entry",

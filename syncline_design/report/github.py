@@ -22,8 +22,7 @@ def render_github(verdicts: Sequence[Checked]) -> str:
     lines = [github_command(f) for f in all_findings(verdicts) if f.level not in SILENT]
     for verdict in verdicts:
         text = f"{outcome(verdict).word}. {design_sentence(verdict)}"
-        place = f"file={_property(PurePath(verdict.file).as_posix())},line=1"
-        lines.append(f"::notice {place},title={_property(verdict.name)}::{_data(text)}")
+        lines.append(github_notice(verdict.name, verdict.file, text))
     return "\n".join(lines) + "\n"
 
 
@@ -38,6 +37,12 @@ def github_command(finding: Notice) -> str:
         f"::{_COMMANDS[finding.level]} file={_property(file)},line={finding.line},"
         f"col={finding.column},title={_property(title)}::{_data(message)}"
     )
+
+
+def github_notice(name: str, file: str, text: str) -> str:
+    """The outcome, at the top of the spec."""
+    place = f"file={_property(PurePath(file).as_posix())},line=1"
+    return f"::notice {place},title={_property(name)}::{_data(text)}"
 
 
 def _data(text: str) -> str:

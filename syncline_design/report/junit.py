@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
 
 from syncline_design.report.ci import Notice, findings
@@ -16,9 +16,16 @@ def render_junit(verdicts: Sequence[Checked]) -> str:
 
     Times are 0 and no timestamp is given: the same verdict gives the same bytes.
     """
+    return junit_text(
+        suite_of(verdict.name, verdict.file, findings(verdict), outcome(verdict).word)
+        for verdict in verdicts
+    )
+
+
+def junit_text(members: Iterable[ElementTree.Element]) -> str:
+    """A document of suites with their totals."""
     suites = ElementTree.Element("testsuites", {"name": "syncline-design"})
-    for verdict in verdicts:
-        suites.append(_suite(verdict))
+    suites.extend(members)
     for key in ("tests", "failures", "errors", "skipped"):
         total = sum(int(suite.get(key, "0")) for suite in suites)
         suites.set(key, str(total))
@@ -28,8 +35,8 @@ def render_junit(verdicts: Sequence[Checked]) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + body + "\n"
 
 
-def _suite(verdict: Checked) -> ElementTree.Element:
-    found = findings(verdict)
+def suite_of(name: str, file: str, found: Sequence[Notice], word: str) -> ElementTree.Element:
+    """A suite named after a spec: a test per finding, the outcome and warnings as its output."""
     cases = [finding for finding in found if finding.level != "warning"]
     counts = {
         "tests": len(cases),
@@ -37,13 +44,13 @@ def _suite(verdict: Checked) -> ElementTree.Element:
         "errors": sum(f.level == "undecided" for f in cases),
         "skipped": sum(f.level in ("waived", "not_reached") for f in cases),
     }
-    suite = ElementTree.Element("testsuite", {"name": visible(verdict.name)})
+    suite = ElementTree.Element("testsuite", {"name": visible(name)})
     for key, value in counts.items():
         suite.set(key, str(value))
     suite.set("time", "0")
     for finding in cases:
-        suite.append(_case(finding, verdict.file))
-    lines = [outcome(verdict).word]
+        suite.append(_case(finding, file))
+    lines = [word]
     lines += [f"warning [{f.rule}]: {visible(f.message)}" for f in found if f.level == "warning"]
     ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)
     return suite

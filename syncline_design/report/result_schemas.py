@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final, get_args
 
+from syncline_design.acceptance import result as acceptance
 from syncline_design.auditing import result as auditing
 from syncline_design.clocks import result as clocks
 from syncline_design.comparison import clock_meaning, difference, meaning
@@ -21,6 +22,7 @@ from syncline_design.verdict import optimise
 from syncline_design.verdict import tree as verdict
 
 RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
+    "acceptance": (acceptance.Acceptance, acceptance.SCHEMA),
     "audit": (auditing.Audit, auditing.SCHEMA),
     "catalog-check": (catalog_check.CatalogCheck, catalog_check.SCHEMA),
     "catalog-entry": (catalogs.WholeEntry, catalogs.ENTRY_SCHEMA),

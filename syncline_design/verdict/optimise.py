@@ -20,7 +20,7 @@ from syncline_design.choice.outcome import (
     Road,
     Unfinished,
 )
-from syncline_design.choice.problem import selection_of, sole_design
+from syncline_design.choice.problem import build_problem, selection_of, sole_design
 from syncline_design.choice.slack import Slack, slack_ledger
 from syncline_design.choice.table import Design, Limits, Problem
 from syncline_design.choice.tolerance import (
@@ -50,7 +50,13 @@ from syncline_design.verdict.named import Exclusion, FrontDesign, RankedDesign
 from syncline_design.verdict.open_choice import Picked, pick
 from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
 from syncline_design.verdict.verified import Verified, error_figures
-from syncline_design.verdict.verify import CheckSettings, open_verdict, unfinished_verdict, verify
+from syncline_design.verdict.verify import (
+    CheckSettings,
+    open_verdict,
+    picked_design,
+    unfinished_verdict,
+    verify,
+)
 
 SCHEMA = "syncline-design/optimization/v1"
 # What stands for the tables where time ended before they were made.
@@ -314,6 +320,16 @@ def _tolerances(
 def pinned_text(case: Case, problem: Problem, design: Design) -> str:
     """The spec with a design pinned, for `--write-design`."""
     return pinned_spec_text(case, *_pins(case, problem, design))
+
+
+def as_measured(case: Case, seed: int = 0) -> Case:
+    """The spec of the system that made a log: with choices open, its best design pinned."""
+    if sole_design(build_problem(case)) is not None:
+        return case
+    problem, design = picked_design(case, seed)
+    if problem.combinations == 1:
+        return case
+    return pinned_case(case, problem, design)
 
 
 def pinned_case(case: Case, problem: Problem, design: Design) -> Case:

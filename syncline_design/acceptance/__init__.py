@@ -1,0 +1,1 @@
+"""Does the built system have what its verdict rests on: assumptions against evidence."""

@@ -1,0 +1,80 @@
+"""What a verdict rests on, read off its design and its spec."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Final
+
+from syncline_design.acceptance.result import AssumptionName
+from syncline_design.model.roles import RoleName
+from syncline_design.spec.case import Case, StageCase
+from syncline_design.verdict.named import NamedDesign, NamedRole
+from syncline_design.verdict.tree import Verdict
+
+# What besides its stamps, its delay and its noise a sensor of a role is taken to have right.
+_MOUNTED: Final[dict[str, tuple[AssumptionName, ...]]] = {
+    "position": ("lever_arm",), "attitude": ("mounting",), "ranging": ("lever_arm", "mounting"),
+}  # fmt: skip
+_UNITS: Final[dict[AssumptionName, str]] = {
+    "timing": "s", "latency": "s", "lever_arm": "m", "mounting": "rad", "noise": "1",
+    "clock": "s", "speed": "m/s", "rate": "rad/s",
+}  # fmt: skip
+KeyPath = tuple[str | int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Assumed:
+    """One assumption: where, what, its figure (SI), and the key of the spec that says it."""
+
+    stage: str
+    role: str
+    name: AssumptionName
+    value: float | None
+    key: KeyPath
+
+    @property
+    def unit(self) -> str:
+        """SI unit of its figure."""
+        return _UNITS[self.name]
+
+
+def assumptions(case: Case, verdict: Verdict) -> tuple[Assumed, ...]:
+    """Every assumption of a verdict on a design, stage by stage."""
+    design = verdict.design
+    if design is None:
+        return ()
+    found: list[Assumed] = []
+    for stage, named in zip(case.stages, design.stages, strict=True):
+        for role in stage.roles:
+            found += _of_sensor(stage, role.role, named.roles[role.role])
+        found += _of_vehicle(stage, design, found)
+        found += _of_platform(stage)
+    return tuple(found)
+
+
+def _of_sensor(stage: StageCase, role: RoleName, named: NamedRole) -> Iterator[Assumed]:
+    name, key = stage.choice.name, ("stages", stage.index, role)
+    yield Assumed(name, role, "timing", named.tau_s, (*key, "timestamping"))
+    yield Assumed(name, role, "latency", 0.0, (*key, "timestamping"))
+    for one in _MOUNTED[role]:
+        yield Assumed(name, role, one, 0.0, (*key, "lever_arm") if one == "lever_arm" else key)
+    yield Assumed(name, role, "noise", 1.0, (*key, "sensor"))
+
+
+def _of_vehicle(stage: StageCase, design: NamedDesign, before: list[Assumed]) -> Iterator[Assumed]:
+    """The host clock of a vehicle, at the first of its stages."""
+    vehicle = stage.choice.vehicle_name
+    clock = next((one for one in design.clocks if one.vehicle == vehicle), None)
+    aboard = {one.name for one in design.stages if one.vehicle == vehicle}
+    if clock is None or any(a.name == "clock" and a.stage in aboard for a in before):
+        return
+    key = ("stages", stage.index, "clock")
+    yield Assumed(stage.choice.name, "clock", "clock", clock.offset_bound_s, key)
+
+
+def _of_platform(stage: StageCase) -> Iterator[Assumed]:
+    entry, key = stage.platform.entry, ("stages", stage.index, "platform")
+    name = stage.choice.name
+    yield Assumed(name, "platform", "speed", float(entry.v_max), (*key, "v_max"))
+    yield Assumed(name, "platform", "rate", float(entry.omega_max), (*key, "omega_max"))

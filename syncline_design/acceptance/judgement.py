@@ -1,0 +1,35 @@
+"""One piece of evidence on one assumption, and several of them together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from syncline_design.acceptance.assumptions import Assumed
+from syncline_design.acceptance.result import AssumptionResult, MeasuredFigure, Status, worst
+from syncline_design.spec.case import Case
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """What one piece of evidence says: the status, in words why, and the figure if it has one."""
+
+    status: Status
+    words: str
+    measured: MeasuredFigure | None = None
+
+
+NO_EVIDENCE = Judgement("not_shown", "none of these logs tells of it")
+
+
+def together(case: Case, one: Assumed, said: Sequence[Judgement]) -> AssumptionResult:
+    """A row: what breaks it decides, else what shows it, else that nothing does."""
+    statuses = [each.status for each in said]
+    status = "holds" if "holds" in statuses and "broken" not in statuses else worst(statuses)
+    telling = [each for each in said if each.status == status] or [NO_EVIDENCE]
+    line, column = case.position(one.key)
+    return AssumptionResult(
+        one.stage, one.role, one.name, one.value,
+        next((each.measured for each in telling if each.measured is not None), None),
+        one.unit, status, "; ".join(each.words for each in telling), line, column,
+    )  # fmt: skip

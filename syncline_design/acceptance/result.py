@@ -1,0 +1,105 @@
+"""What `accept` says: one row an assumption (schema syncline-design/acceptance/v1)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+from syncline_design.effects.record import Promise
+from syncline_design.machine.records import Named, Record
+from syncline_design.verdict.tree import Word
+
+SCHEMA: Final = "syncline-design/acceptance/v1"
+Status = Literal["holds", "broken", "not_shown"]
+AssumptionName = Promise | Literal["speed", "rate"]
+NAMES: Final[tuple[AssumptionName, ...]] = (
+    "timing", "latency", "lever_arm", "mounting", "noise", "clock", "speed", "rate",
+)  # fmt: skip
+EXIT_CODES: Final[Mapping[Status, int]] = {"holds": 0, "broken": 1, "not_shown": 3}
+ReadAs = Literal["clock", "log"]
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredFigure(Record):
+    """A figure that evidence gives, with its 95 % interval where there is one, in SI.
+
+    Of a departure that was looked for and not found the value is 0 and the interval what the log
+    would have shown.
+    """
+
+    value: float | None
+    low: float | None = None
+    high: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class AssumptionResult(Record):
+    """One thing that a verdict rests on, and what evidence says of it.
+
+    role: position, attitude or ranging; `clock` of a vehicle's host clock, `platform` of its speed
+    and rate, `target` of the reference.  assumed: a bound (timing, clock, speed, rate), the
+    departure from the spec (0; latency, lever_arm, mounting), or a factor on the spec's figure (1;
+    noise); None where the spec says none.  line, column: where the spec says it.
+    """
+
+    stage: str
+    role: str
+    assumption: AssumptionName
+    assumed: float | None
+    measured: MeasuredFigure | None
+    unit: str
+    status: Status
+    evidence: str
+    line: int
+    column: int
+
+
+@dataclass(frozen=True, slots=True)
+class EvidenceFile(Record):
+    """A file and how it was read; of: what it was assigned to, "" where that was not needed."""
+
+    file: str
+    read_as: ReadAs
+    of: str
+    sha256: str
+
+
+@dataclass(frozen=True, slots=True)
+class AcceptedSpec(Record):
+    """The spec whose verdict is held against the evidence, and that verdict on paper."""
+
+    name: str
+    file: str
+    verdict: Word
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Acceptance(Record):
+    """The outcome: `broken` wins over `not_shown`; a spec that fails on paper is broken as well.
+
+    asked: the assumptions that were asked for, which alone are listed.
+    """
+
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    verdict: Status
+    spec: AcceptedSpec
+    asked: tuple[AssumptionName, ...]
+    assumptions: tuple[AssumptionResult, ...]
+    evidence: tuple[EvidenceFile, ...]
+    notes: tuple[str, ...]
+    version: str
+    seed: int
+
+    @property
+    def exit_code(self) -> int:
+        """0: all hold; 1: one is broken; 3: one is not shown."""
+        return EXIT_CODES[self.verdict]
+
+
+def worst(statuses: Iterable[Status]) -> Status:
+    """Broken before not shown before holds; of none: not shown."""
+    found = set(statuses)
+    if "broken" in found:
+        return "broken"
+    return "holds" if found == {"holds"} else "not_shown"

@@ -1,0 +1,173 @@
+"""What `accept` says: one row an assumption, what is broken first."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Final
+
+from syncline_design.acceptance.result import Acceptance, AssumptionResult, MeasuredFigure, Status
+from syncline_design.report import numbers
+from syncline_design.report.ci import Level, Notice
+from syncline_design.report.document import (
+    Document,
+    Items,
+    Node,
+    Outcome,
+    given,
+    provenance,
+    section,
+    show,
+)
+from syncline_design.report.formats import ACCEPT_FORMATS as ACCEPT_FORMATS
+from syncline_design.report.github import github_command, github_notice
+from syncline_design.report.json_out import json_text
+from syncline_design.report.junit import junit_text, suite_of
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
+from syncline_design.report.sarif import sarif_log
+from syncline_design.report.table import Cell, Table, Tone, table
+
+_OUTCOMES: Final[dict[Status, tuple[Tone, str, str]]] = {
+    "holds": ("good", "\u2713", "holds"),
+    "broken": ("bad", "\u2717", "broken"),
+    "not_shown": ("warn", "!", "not shown"),
+}
+_ORDER: Final[tuple[Status, ...]] = ("broken", "not_shown", "holds")
+_LEVELS: Final[dict[Status, Level]] = {"holds": "pass", "broken": "fail", "not_shown": "undecided"}
+_WORDS: Final[dict[Status, str]] = {
+    "holds": "What was asked holds",
+    "broken": "An assumption is broken",
+    "not_shown": "Not everything is shown by these logs",
+}
+
+
+def on_acceptance(result: Acceptance) -> Document:
+    """The outcome as a document."""
+    return Document(
+        family="Acceptance",
+        outcome=_outcome(result),
+        name=result.spec.name,
+        source=result.spec.file,
+        sentences=tuple(_sentences(result)),
+        facts=(),
+        sections=(
+            *section("assumptions", "What the verdict rests on, against the evidence",
+                     show(_table(result), silent=True), "Assumptions"),
+            *section("notes", "What the logs said besides", _notes(result), "Notes"),
+            *section("evidence", "Evidence", show(_evidence(result), silent=True)),
+            *provenance([("syncline-design", result.version), ("seed", str(result.seed))]),
+        ),
+        title=f"Acceptance: {result.spec.name}",
+    )  # fmt: skip
+
+
+def _outcome(result: Acceptance) -> Outcome:
+    tone, mark, _ = _OUTCOMES[result.verdict]
+    if result.spec.verdict != "meets":
+        return Outcome(tone, mark, "The spec does not meet its requirements on paper")
+    return Outcome(tone, mark, _WORDS[result.verdict])
+
+
+def _sentences(result: Acceptance) -> Iterator[str]:
+    rows = result.assumptions
+    counts = [f"{sum(r.status == s for r in rows)} {_OUTCOMES[s][2]}" for s in _ORDER]
+    yield f"Of {len(rows)} assumptions of the verdict: {', '.join(counts)}."
+    yield from (sentence(row) for row in rows if row.status == "broken")
+
+
+def sentence(row: AssumptionResult) -> str:
+    """`uav position latency is broken: ...; measured 87 ms (...), assumed 0 s`."""
+    figures = ""
+    if row.measured is not None and row.measured.value is not None:
+        figures = f"; measured {_measured(row)}, assumed {_figure(row.assumed, row.unit)}"
+    place = f"{row.stage} {row.role} {row.assumption.replace('_', ' ')}"
+    verb = "" if row.status == "holds" else "is "
+    return f"{place} {verb}{_OUTCOMES[row.status][2]}: {row.evidence}{figures}."
+
+
+def _figure(value: float | None, unit: str) -> str:
+    if value is None:
+        return ""
+    return numbers.number(value) if unit == "1" else numbers.si_quantity(value, unit)
+
+
+def _measured(row: AssumptionResult) -> str:
+    found = row.measured or MeasuredFigure(None)
+    text = _figure(found.value, row.unit)
+    if found.low is None or found.high is None:
+        return text
+    return f"{text} ({_figure(found.low, row.unit)} to {_figure(found.high, row.unit)})"
+
+
+def _table(result: Acceptance) -> Table:
+    rows = []
+    for row in sorted(result.assumptions, key=lambda r: _ORDER.index(r.status)):
+        tone, mark, word = _OUTCOMES[row.status]
+        value = None if row.measured is None else row.measured.value
+        rows.append((
+            Cell(word, None, tone, mark),
+            Cell(f"{row.stage} \u00b7 {row.role}"),
+            Cell(row.assumption.replace("_", " ")),
+            Cell(_figure(row.assumed, row.unit), row.assumed),
+            Cell(_measured(row), value),
+            Cell(row.evidence),
+        ))  # fmt: skip
+    heads = ("Status", "Where", "Assumption", "Assumed #", "Measured (95 %) #", "Evidence")
+    return table("Assumptions", heads, rows)
+
+
+def _notes(result: Acceptance) -> list[Node]:
+    return [Items(tuple(given(note) for note in result.notes))] if result.notes else []
+
+
+def _evidence(result: Acceptance) -> Table:
+    rows = [
+        (Cell(one.file, code=True), Cell(one.read_as), Cell(one.of), Cell(one.sha256, code=True))
+        for one in result.evidence
+    ]
+    return table("Evidence", ("File", "Read as", "Of", "SHA-256"), rows)
+
+
+def acceptance_notices(result: Acceptance) -> list[Notice]:
+    """One finding an assumption, at its place in the spec; and a spec that fails on paper."""
+    file = result.spec.file
+    found = [
+        Notice(_LEVELS[row.status], row.assumption, f"{row.stage}/{row.role}", file, row.line,
+               row.column, sentence(row))
+        for row in result.assumptions
+    ]  # fmt: skip
+    if result.spec.verdict != "meets":
+        text = f"on paper the verdict is {result.spec.verdict}: there is nothing to accept"
+        found.insert(0, Notice("fail", "spec", "", file, 1, 1, text))
+    return found
+
+
+def render_acceptance(name: str, result: Acceptance) -> str:
+    """The text of one format."""
+    match name:
+        case "json":
+            return json_text(result.to_json())
+        case "html":
+            return html(on_acceptance(result))
+        case "markdown":
+            return markdown(on_acceptance(result))
+        case _:
+            return _for_ci(name, result)
+
+
+def _for_ci(name: str, result: Acceptance) -> str:
+    found = acceptance_notices(result)
+    told = [one for one in found if one.level != "pass"]
+    word = _outcome(result).word
+    spec = result.spec
+    match name:
+        case "junit":
+            return junit_text([suite_of(spec.name, spec.file, found, word)])
+        case "sarif":
+            return sarif_log(told)
+        case "github":
+            text = f"{word}. {next(_sentences(result))}"
+            lines = [github_command(one) for one in told]
+            return "\n".join([*lines, github_notice(spec.name, spec.file, text)]) + "\n"
+        case _:
+            raise ValueError(f"unknown format {name}")

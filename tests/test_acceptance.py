@@ -1,0 +1,273 @@
+"""`accept`: every assumption of a verdict against logs whose truth is known."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from xml.etree import ElementTree
+
+import jsonschema
+import pytest
+from typer.testing import CliRunner, Result
+
+from syncline_design.acceptance import accept as acceptance
+from syncline_design.acceptance.accept import AcceptSettings, accept
+from syncline_design.acceptance.assumptions import Assumed, assumptions
+from syncline_design.acceptance.by_log import by_log
+from syncline_design.acceptance.judgement import Judgement, together
+from syncline_design.acceptance.result import NAMES, Acceptance, AssumptionResult
+from syncline_design.cli.app import app
+from syncline_design.diagnosis.result import BlindSpot, Diagnosis, Informative, Rival
+from syncline_design.diagnosis.run import diagnose
+from syncline_design.effects import registry
+from syncline_design.report.on_acceptance import render_acceptance
+from syncline_design.report.result_schemas import result_schema
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import BadInput, load
+from syncline_design.verdict.verify import CheckSettings, check_loaded
+from tests.clock_logs import sessions_csv
+
+ROOT = Path(__file__).parent.parent
+EXAMPLE = ROOT / "examples" / "hidden_latency.yaml"
+LATENCY_S = 0.087  # of the position data in the example's log
+ROWS = 1000
+
+CLOCKED = """\
+syncline: 1
+name: two timelines
+requirements: [{id: ACC-1, kind: accuracy, limit: 0.30 m}]
+catalogs: [clocks.yaml]
+stages:
+  - name: uav
+    platform: {v_max: 2 m/s, omega_max: 0.001 deg/s, distance: 0.1 m, baseline: 0 m}
+    clock: {candidates: [own]}
+    position: {sensor: {modality: position, sigma_position: 1 cm, primitives: []},
+               timestamping: {timeline: utc, error: {distribution: uniform, low: -2 ms,
+                                                     high: 2 ms}}}
+    attitude: {sensor: {modality: attitude, sigma_attitude: 0.01 deg, primitives: []},
+               timestamping: {error: {distribution: constant, value: 0 s}}}
+    ranging: {sensor: {modality: ranging, sigma_range: 1 cm, sigma_bearing: 0.01 deg,
+              primitives: []}, timestamping: {error: {distribution: constant, value: 0 s}}}
+"""
+OWN_CLOCK = """\
+clocks:
+  own: {name: own, offset: {distribution: uniform, low: -1 ms, high: 1 ms},
+        cost: 0 EUR, mass: 0 g, power: 0 W, source: made for this test}
+"""
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+@pytest.fixture(scope="module")
+def short(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The first rows of the example's log."""
+    path = tmp_path_factory.mktemp("log") / "short.csv"
+    lines = EXAMPLE.with_suffix(".csv").read_text("utf-8").splitlines(keepends=True)
+    path.write_text("".join(lines[: ROWS + 1]), "utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(short: Path) -> Diagnosis:
+    return diagnose(load(EXAMPLE), [short])
+
+
+@pytest.fixture(scope="module")
+def late(short: Path, found: Diagnosis) -> Acceptance:
+    """The acceptance on that log, whose diagnosis is made once."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(acceptance, "diagnose", lambda *_: found)
+        return accept(load(EXAMPLE), [short], AcceptSettings())
+
+
+@pytest.fixture(scope="module")
+def known(short: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Case, Diagnosis]:
+    """The same log, and a spec that knows of its latency (so nothing is missing)."""
+    path = tmp_path_factory.mktemp("known") / "known.yaml"
+    listed = (
+        "effects:\n  - {effect: latency, sensor: position, stage: multirotor, "
+        f"parameters: {{latency_s: {LATENCY_S} s}}}}\n"
+    )
+    text = EXAMPLE.read_text("utf-8").replace("limit: 0.3 m", "limit: 30 m")
+    text = text.replace("stages:", "  - {id: S, kind: sync, limit: 1000}\nstages:")
+    path.write_text(text + listed, "utf-8")
+    case = load(path)
+    return case, diagnose(case, [short])
+
+
+def rows_of(result: Acceptance) -> dict[tuple[str, str], AssumptionResult]:
+    return {(row.role, row.assumption): row for row in result.assumptions}
+
+
+def test_the_hidden_latency_is_broken_by_as_much_as_was_hidden(late: Acceptance) -> None:
+    row = rows_of(late)["position", "latency"]
+    assert (late.verdict, late.exit_code, row.status) == ("broken", 1, "broken")
+    assert row.measured is not None
+    assert row.measured.value == pytest.approx(LATENCY_S, abs=1e-3)
+    assert row.measured.low is not None
+    assert row.measured.high is not None
+    assert row.measured.low < LATENCY_S < row.measured.high
+    broken = [key for key, one in rows_of(late).items() if one.status == "broken"]
+    assert broken == [("position", "latency")]
+    line = EXAMPLE.read_text("utf-8").splitlines()[row.line - 1]
+    assert line.strip().startswith("timestamping:")
+
+
+def test_what_no_log_of_places_can_show_is_not_shown(late: Acceptance) -> None:
+    rows = rows_of(late)
+    assert {rows[role, "timing"].status for role in ("position", "attitude", "ranging")} == {
+        "not_shown"
+    }
+    assert rows["platform", "speed"].assumed == 9.0
+    assert {one for _, one in rows} == set(NAMES) - {"clock"}
+
+
+def test_a_latency_that_the_spec_lists_is_no_broken_assumption(
+    known: tuple[Case, Diagnosis],
+) -> None:
+    case, found = known
+    assert found.verdict == "agrees"
+    rows = dict(judged(case, found))
+    assert rows["position", "latency"].status == "holds"
+    assert rows["platform", "rate"].status == "holds"
+
+
+def judged(case: Case, found: Diagnosis) -> Iterator[tuple[tuple[str, str], Judgement]]:
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    for one in assumptions(case, verdict):
+        said = by_log(one, found, last_stage=case.stages[-1].choice.name, has_clock=False)
+        yield (one.role, one.name), said
+
+
+def test_a_log_that_is_not_explained_shows_nothing(known: tuple[Case, Diagnosis]) -> None:
+    case, found = known
+    unexplained = dict(judged(case, replace(found, verdict="unexplained")))
+    assert {one.status for key, one in unexplained.items() if key[0] != "platform"} == {"not_shown"}
+
+
+def test_a_blind_log_shows_only_what_it_is_not_blind_to(known: tuple[Case, Diagnosis]) -> None:
+    case, found = known
+    assert not any(spot.effect == "latency" for spot in found.informative.blind_to)
+    hidden = BlindSpot("latency", "ranging", "multirotor", "latency_s", 1.0, 0.5)
+    rows = dict(judged(case, replace(found, informative=Informative(False, (hidden,)))))
+    assert rows["ranging", "latency"].status == "not_shown"
+    assert rows["position", "latency"].status == "holds"
+
+
+def test_what_a_finding_may_be_instead_is_not_shown(found: Diagnosis) -> None:
+    case = load(EXAMPLE)
+    (finding,) = [f for f in found.findings if f.effect == "latency"]
+    alias = Rival("lever_arm", "position", "multirotor", 1.0, 0.1)
+    either = replace(found, findings=(replace(finding, aliases=(alias,)),))
+    rows = dict(judged(case, either))
+    assert rows["position", "latency"].status == "broken"
+    assert rows["position", "lever_arm"].status == "not_shown"
+    stand_in = replace(found, findings=(replace(finding, kind="stand_in"),), verdict="unexplained")
+    assert dict(judged(case, stand_in))["position", "latency"].status == "not_shown"
+    slight = replace(found, findings=(replace(finding, material=False),), verdict="agrees")
+    assert dict(judged(case, slight))["position", "latency"].status == "holds"
+
+
+def test_one_that_breaks_beats_one_that_holds_and_both_beat_silence() -> None:
+    case = load(EXAMPLE)
+    one = Assumed("multirotor", "position", "timing", 1e-8, ("stages", 0, "position"))
+    holds, broken, silent = (Judgement(s, s) for s in ("holds", "broken", "not_shown"))
+    assert together(case, one, [holds, broken, silent]).status == "broken"
+    assert together(case, one, [silent, holds]).status == "holds"
+    assert together(case, one, [silent]).status == "not_shown"
+    assert together(case, one, []).status == "not_shown"
+
+
+def test_every_effect_breaks_something_that_its_sensor_is_asked_for() -> None:
+    for effect in registry().values():
+        asked = {
+            "lever_arm": {"position", "ranging"}, "mounting": {"attitude", "ranging", "position"},
+        }.get(effect.breaks, {"position", "attitude", "ranging", "target"})  # fmt: skip
+        assert set(effect.sensors) <= asked, effect.name
+
+
+@pytest.fixture
+def clocked(tmp_path: Path) -> Path:
+    (tmp_path / "clocks.yaml").write_text(OWN_CLOCK, "utf-8")
+    path = tmp_path / "clocked.yaml"
+    path.write_text(CLOCKED, "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("sigma_s", "sessions", "status", "code"),
+    [(1e-4, 20, "holds", 0), (1e-2, 20, "broken", 1), (1e-4, 1, "not_shown", 3)],
+)
+def test_clock_logs_against_the_clock_of_the_spec(
+    clocked: Path, sigma_s: float, sessions: int, status: str, code: int
+) -> None:
+    """White offsets of 0.1 ms stay within 1 ms, of 10 ms do not; one session claims nothing."""
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [sigma_s] * sessions, count=300, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    result = json.loads(done.stdout)
+    assert (done.exit_code, result["verdict"]) == (code, status), done.stdout
+    (row,) = result["assumptions"]
+    assert (row["assumption"], row["assumed"], row["status"]) == ("clock", 1e-3, status)
+    assert row["measured"]["value"] > 1.9 * sigma_s  # two sigma hold 95 % of white noise
+    assert {one["read_as"] for one in result["evidence"]} == {"clock"}
+
+
+def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [1e-4] * 20, count=300, step_s=10.0)
+    given = [part for log in logs for part in ("--assign", f"uav/position={log}")]
+    done = run("accept", clocked, *given, "--only", "timing", "-o", "json:-")
+    statuses = {row["role"]: row["status"] for row in json.loads(done.stdout)["assumptions"]}
+    assert statuses == {"position": "holds", "attitude": "not_shown", "ranging": "not_shown"}
+    assert done.exit_code == 3
+
+
+def test_what_cannot_be_asked_is_refused(clocked: Path, tmp_path: Path) -> None:
+    for arguments, words in (
+        (["--only", "colour"], "expected some of timing"),
+        (["--assign", "clock.log"], "expected OF=LOG"),
+        (["--assign", "boat=x.log"], "a vehicle or STAGE/ROLE: uav, uav/position"),
+        ([tmp_path / "none.csv"], "none.csv"),
+    ):
+        done = run("accept", clocked, *arguments)
+        assert (done.exit_code, done.stdout) == (2, ""), done.stderr
+        assert words in done.stderr
+
+
+def test_a_clock_log_of_several_vehicles_needs_an_owner(tmp_path: Path) -> None:
+    (log,) = sessions_csv(tmp_path, [1e-4], count=300, step_s=10.0)
+    with pytest.raises(BadInput, match="several vehicles"):
+        accept(load(ROOT / "specs" / "rov_relay.yaml"), [log], AcceptSettings(("clock",)))
+
+
+def test_a_spec_that_fails_on_paper_is_not_accepted(clocked: Path) -> None:
+    clocked.write_text(CLOCKED.replace("0.30 m", "1 mm"), "utf-8")
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [1e-4] * 20, count=300, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock")
+    assert done.exit_code == 1
+    assert "does not meet its requirements on paper" in done.stdout
+
+
+def test_every_format_says_the_same(late: Acceptance) -> None:
+    written = json.loads(render_acceptance("json", late))
+    jsonschema.validate(written, result_schema("acceptance"))
+    suite = ElementTree.fromstring(render_acceptance("junit", late))[0]
+    counts = [sum(r.status == s for r in late.assumptions) for s in ("broken", "not_shown")]
+    assert [int(suite.get(key, "")) for key in ("failures", "errors")] == counts
+    sarif = json.loads(render_acceptance("sarif", late))["runs"][0]["results"]
+    assert [one["level"] for one in sarif].count("error") == counts[0]
+    lines = render_acceptance("github", late).splitlines()
+    assert sum(line.startswith("::error") for line in lines) == sum(counts)
+    for name in ("markdown", "html"):
+        text = render_acceptance(name, late)
+        assert "broken" in text
+        assert "older than their stamps" in text
