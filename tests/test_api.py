@@ -19,6 +19,7 @@ from syncline_design.cli.app import app
 SPECS = Path(__file__).parent.parent / "specs"
 SPEC = SPECS / "position_track.yaml"
 FUNCTIONS = (
+    "accept",
     "audit",
     "check",
     "diagnose",
