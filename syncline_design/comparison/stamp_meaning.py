@@ -12,11 +12,11 @@ from dataclasses import dataclass, replace
 from typing import Final, cast
 
 from syncline_design.auditing.result import Audit, StreamAudit
-from syncline_design.comparison.meaning import as_measured
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_timestamping_text
 from syncline_design.verdict.named import NamedRole
+from syncline_design.verdict.optimise import as_measured
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
