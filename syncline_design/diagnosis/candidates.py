@@ -12,6 +12,7 @@ from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect, Target
+from syncline_design.model.system import Stage
 
 STEP_TIMES = 24  # places along the log where a step is looked for at first
 EDGE = 0.15  # share of the rows at either end where a step is not looked for: it would be a latency
@@ -62,9 +63,17 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
                     continue  # attitude and rates are the better system's
                 if _has_tails(view, effect, sensor, k):
                     continue
-                if effect.applies(stage, sensor) and not _is_noise_of_heading(view, effect, k):
+                if _can_have(effect, stage, sensor, k) and not _is_noise_of_heading(
+                    view, effect, k
+                ):
                     found.append(Candidate(effect, sensor, k))
     return tuple(found)
+
+
+def _can_have(effect: Effect, stage: Stage, sensor: Target, index: int) -> bool:
+    """Whether a stage can have it; a later one's position is its transponder's place."""
+    carried = effect.transponder and sensor == "position" and index > 0
+    return carried or effect.applies(stage, sensor)
 
 
 def _has_tails(view: Scene, effect: Effect, sensor: str, index: int) -> bool:

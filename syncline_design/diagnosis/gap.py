@@ -102,19 +102,26 @@ def regime_fold(data: Data) -> tuple[str, Folds]:
     return f"{name} above {limit:.3g} {unit}", Folds(((training, held),))
 
 
-def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> Gap:
+def gap(
+    data: Data,
+    model: Model,
+    folds: Folds,
+    extra: Array | None = None,
+    untouched: Array | None = None,
+) -> Gap:
     """Evaluate a model on held-out rows, its parameters fitted on the other rows.
 
     Around the fitted parameters the error is linear, so a fit to part of the rows is one step.
-    extra: columns (n, 3, p) of an effect that was not chosen, as a placebo.
+    extra: columns (n, 3, p) of an effect that was not chosen, as a placebo.  untouched (n, 3) [m]:
+    the error of the log as it came, where gross faults were undone in it: what "before" means.
     """
     if not folds.pairs:
         return Gap()
     columns = np.nan_to_num(slopes(data.view, model.acting))
-    held_out = columns.shape[2] > 0
+    moved = columns.shape[2] > 0 or untouched is not None
     if extra is not None:
         columns = np.concatenate([columns, extra], axis=2)
-    plain = data.error(())
+    plain = data.error(()) if untouched is None else untouched
     spec = clipped(model.level, spec_bounds(data.structure))
     totals = {name: _Sums() for name in ("before", "after", "fitted", "expected")}
     saved = []
@@ -138,7 +145,7 @@ def gap(data: Data, model: Model, folds: Folds, extra: Array | None = None) -> G
     return Gap(
         held_out=scores,
         expected_rms_m=expected.rms_m,
-        closed_fraction=closed_share(scores) if held_out else None,
+        closed_fraction=closed_share(scores) if moved else None,
         nll_saved_per_sample=Saved(before.nll_per_sample - after.nll_per_sample, spread),
     )
 

@@ -56,7 +56,10 @@ from syncline_design.diagnosis.sight import informative, smallest_seen
 from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.survey import survey_m, with_shown_survey
 from syncline_design.diagnosis.system import Measured, measured
+from syncline_design.diagnosis.untouched import untouched_error
+from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
+from syncline_design.effects.record import Array
 from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
@@ -123,7 +126,8 @@ def diagnose_measured(
     view = data.view
     progress("testing what remains", 0.7)
     promise = None if case is None else promise_of(case)
-    weighed_up = _weighed_up(data, search, result, faults, promise)
+    untouched = untouched_error(inputs, data) if faults else None
+    weighed_up = _weighed_up(data, search, result, faults, promise, untouched)
     checks = log_checks(view)
     sound = all(c.severity != "contradiction" for c in checks)
     verdict = outcome(weighed_up.findings, sound and not weighed_up.remaining.material)
@@ -139,8 +143,8 @@ def diagnose_measured(
         remaining=remaining,
         where=strongest(cells),
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
-        gap=_whole_gap(data, search, result),
-        steps=_steps(data, result),
+        gap=_whole_gap(data, search, result, untouched),
+        steps=_steps(data, result, faults, untouched),
         unseen=_unseen(data, search, result, settings.exclude_effects),
         log=_log_read(replace(inputs.log, notes=view.log.notes), data),
         noise=_noise(data, result),
@@ -167,12 +171,15 @@ def _weighed_up(
     result: SearchResult,
     faults: Sequence[Gross],
     promise: Promise | None,
+    untouched: Array | None,
 ) -> _WeighedUp:
     """Findings and remainder of a settled model, each with whether it matters."""
     rest = remainder(data, result.model, search.rng)
     left = rest.p < REMAINDER_SHARE * search.settings.false_alarm_rate
     weights = weighed(promise, data)
     named = findings(result.final, faults, weights, left)
+    if untouched is not None:
+        named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
     causes = [entry_of(one) for one in named if one.kind != "noise" and one.material]
     material = left and weights.left(rest.size_m, causes)
     if material:
@@ -188,6 +195,15 @@ def _weighed_up(
         material=material,
     )
     return _WeighedUp(named, remaining)
+
+
+def _with_sizes(
+    named: Sequence[Finding], faults: Sequence[Gross], size_m: float
+) -> tuple[Finding, ...]:
+    """A gross fault that is alone has made all of the difference that undoing it makes."""
+    if len(faults) != 1:
+        return tuple(named)
+    return (replace(named[0], size_m=size_m), *named[1:])
 
 
 def outcome(named: Sequence[Finding], settled: bool) -> LogOutcome:
@@ -208,7 +224,9 @@ def stand_ins(
     if made_m**2 >= NAMED_SHARE * (made_m**2 + left_m**2):
         return tuple(named)
     return tuple(
-        replace(one, kind="stand_in") if one.kind == "cause" and one.size_m is not None else one
+        replace(one, kind="stand_in")
+        if one.kind == "cause" and registry()[one.effect].undoing is None
+        else one
         for one in named
     )
 
@@ -267,32 +285,41 @@ def expected_size(inputs: Measured) -> float:
     return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
 
 
-def _steps(data: Data, result: SearchResult) -> tuple[Gap, ...]:
-    """The gap after each addition."""
+def _steps(
+    data: Data, result: SearchResult, faults: Sequence[Gross], untouched: Array | None
+) -> tuple[Gap, ...]:
+    """The gap after each addition, gross faults undone first."""
     folds = block_folds(data)
-    found = [(label, gap(data, model, folds)) for label, model in result.final.stairs]
+    labelled: list[tuple[tuple[tuple[str, str, int], ...], Model]] = [
+        ((label,), model) for label, model in result.final.stairs
+    ]
+    if untouched is not None:
+        labelled.insert(0, (tuple(one.acting.label for one in faults), result.base))
+    found = [(labels, gap(data, model, folds, None, untouched)) for labels, model in labelled]
     return tuple(
-        replace(one, added=f"{name} ({sensor})")
-        for (name, sensor, _), one in found
+        replace(one, added=", ".join(f"{name} ({sensor})" for name, sensor, _ in labels))
+        for labels, one in found
         if one.held_out is not None
     )
 
 
-def _whole_gap(data: Data, search: Search, result: SearchResult) -> WholeGap:
+def _whole_gap(
+    data: Data, search: Search, result: SearchResult, untouched: Array | None
+) -> WholeGap:
     """On blocks of the log, on its fastest part, and with a placebo."""
-    blocks = gap(data, result.model, block_folds(data))
+    blocks = gap(data, result.model, block_folds(data), None, untouched)
     name, fold = regime_fold(data)
     return WholeGap(
         held_out=blocks.held_out,
         expected_rms_m=blocks.expected_rms_m,
         closed_fraction=blocks.closed_fraction,
         nll_saved_per_sample=blocks.nll_saved_per_sample,
-        regime=replace(gap(data, result.model, fold), held_rows=name),
-        placebo=_placebo(data, search, result),
+        regime=replace(gap(data, result.model, fold, None, untouched), held_rows=name),
+        placebo=_placebo(data, search, result, untouched),
     )
 
 
-def _placebo(data: Data, search: Search, result: SearchResult) -> Gap:
+def _placebo(data: Data, search: Search, result: SearchResult, untouched: Array | None) -> Gap:
     """The gap with one more effect, drawn from those that were not chosen."""
     free = [s for s in search.free_signatures(result.model) if not s.at]
     if not free or not result.model.labels:
@@ -300,7 +327,7 @@ def _placebo(data: Data, search: Search, result: SearchResult) -> Gap:
     chosen = free[int(search.rng.integers(len(free)))]
     name, sensor, _ = chosen.candidate.label
     columns = np.nan_to_num(chosen.columns)
-    found = gap(data, result.model, block_folds(data), columns)
+    found = gap(data, result.model, block_folds(data), columns, untouched)
     return replace(found, added=f"{name} ({sensor})")
 
 
