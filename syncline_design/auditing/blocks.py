@@ -14,7 +14,8 @@ LEAST_MESSAGES: Final = 10  # of a block
 LOW: Final = 25.0  # per cent
 _GAP: Final = 3.0  # of the usual length: a block with a gap in it lies nowhere
 _STEEP: Final = 1.0  # of the spread: how much a course may rise within a block
-LOADED: Final = 1.8  # a spread so many times the usual: the host is busy, delays are longer
+LOADED_FEW: Final = 7.0  # over the messages of a block: how much more chance alone gives few
+LOADED: Final = 1.7  # a spread so many times the usual: the host is busy, delays are longer
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,7 +53,8 @@ def blocks_of(time_s: Array, late_s: Array) -> Blocks | None:
         middle[k] = float(time_s[part].mean())
         low[k], width[k] = _level(time_s[part] - middle[k], late_s[part])
     usual = float(np.median(width))
-    usable = _calm(_around(width) < LOADED * usual + 1e-12)
+    loaded = LOADED + LOADED_FEW * count / time_s.size
+    usable = _calm(_around(width) < loaded * usual + 1e-12)
     span = time_s[edges[1:] - 1] - time_s[edges[:-1]]
     whole = span <= _GAP * float(np.median(span)) + 1e-12
     usable &= ~_stray(low, _noise(low)) & whole
@@ -80,9 +82,9 @@ def _calm(usable: Mask) -> Mask:
 
 
 def _around(width: Array) -> Array:
-    """Mean of each block's spread and its neighbours': ten messages alone say little."""
+    """Median of each block's spread and its neighbours': ten messages alone say little."""
     padded = np.concatenate([width[:1], width, width[-1:]])
-    return np.asarray((padded[:-2] + padded[1:-1] + padded[2:]) / 3.0)
+    return np.asarray(np.median([padded[:-2], padded[1:-1], padded[2:]], axis=0))
 
 
 def _noise(low: Array) -> float:
