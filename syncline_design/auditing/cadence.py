@@ -100,25 +100,29 @@ def about_rhythm(when: Array) -> Array | None:
     return np.concatenate(kept) if len(kept) > 3 else None
 
 
-def missing(series: Series, pace: Cadence, level_s: float) -> tuple[StampFault, ...]:
+def missing(
+    series: Series, pace: Cadence, level_s: float, *, blurred: bool = False
+) -> tuple[StampFault, ...]:
     """Gaps and single losses: stamps and receipts leave out what should have come.
 
     level_s: scatter of receipts minus stamps; an interval that only the stamps show is a step.
+    blurred: stamps are too coarse, or scatter too much, to tell a late message from a lost one.
     """
     if pace.interval.size < 8 or pace.period_s <= 0.0:
         return ()
     lost = _lost(series, pace, level_s) if pace.regular else _holes(pace)
     if not lost.any():
         return ()
-    singles = lost[(lost > 0) & (lost < LONG_GAP)]
-    share = float(singles.sum()) / (pace.interval.size + float(lost.sum()))
+    few = lost[(lost > 0) & (lost < LONG_GAP)]
+    share = float(few.sum()) / (pace.interval.size + float(lost.sum()))
     long_ = (lost >= LONG_GAP) if pace.regular else lost > 0
-    if singles.size > 5 and pace.regular:  # how long a chance run of single losses may be
+    if few.size > 5 and pace.regular:  # how long a chance run of single losses may be
         run = LONG_GAP
         while pace.interval.size * share**run > 0.02 and run < 50:
             run += 1
         long_ = lost >= run
-    return (*_gaps(series, pace, long_), *_losses(series, pace, np.where(long_, 0.0, lost)))
+    singles = () if blurred else _losses(series, pace, np.where(long_, 0.0, lost))
+    return (*_gaps(series, pace, long_), *singles)
 
 
 def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
@@ -140,7 +144,7 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
 
 def _stays(series: Series, pace: Cadence, k: int) -> bool:
     """Whether messages after an interval are all later by it, not only the next one."""
-    around = np.arange(max(0, k - 5), min(pace.places.size, k + 7))
+    around = np.arange(max(0, k - 14), min(pace.places.size, k + 16))
     stamp = series.stamp[pace.places[around]]
     dev = seconds(stamp - stamp[0]) - (around - around[0]) * pace.period_s
     after = around > k

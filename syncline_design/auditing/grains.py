@@ -18,6 +18,7 @@ GRAINS: Final = (
 ROUNDING_NS: Final = 600  # of a file that keeps microseconds, or doubles of Unix seconds
 TIMERS: Final = (0.016, 0.008, 0.004, 0.005, 0.01, 0.02, 0.0125, 0.025, 0.032, 0.04, 0.05, 0.1)
 _COHERENT: Final = 0.75
+_EVENLY: Final = 0.25  # scatter of the distance between skips
 _BUNCHED: Final = 0.25  # share of neighbours that come together
 _TOGETHER: Final = 0.1  # of the mean interval
 
@@ -68,9 +69,18 @@ def _alternates(stamp: np.ndarray, grain: int) -> bool:
     near = (np.abs(counts - usual) <= 1) & (counts != usual)
     multiples = counts % usual == 0
     odd = int(np.sum(near & ~multiples)) + (int(np.sum(near)) if usual == 1 else 0)
-    if usual == 1:  # an interval of 0 or 2 grains beside 1: 0 cannot be a lost message
+    if usual == 1:  # of 0 and 2 grains beside 1, 0 cannot be a lost message
         odd = int(np.sum(counts == 0))
-    return odd >= 3
+    return odd >= 3 or (usual == 1 and skips_evenly(counts))
+
+
+def skips_evenly(counts: Array) -> bool:
+    """Whether single ticks are left out at even distances: a beat, and no lost messages."""
+    skips = np.flatnonzero(counts == 2)
+    if skips.size < 6 or float(np.mean((counts == 1) | (counts == 2))) < 0.99:
+        return False
+    apart = np.diff(skips)
+    return bool(spread(apart) < _EVENLY * float(np.median(apart)))
 
 
 def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
@@ -130,6 +140,9 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
     if about is None:
         return None
     period = float(interval[interval < 2.5 * np.median(interval)].mean())
+    beat = _beat(interval)
+    if beat is not None:
+        return _packets(series, interval, beat, True, 1.0, pace)
     uneven = float(np.percentile(about, 95) - np.percentile(about, 5))
     if uneven < 0.5 * min(TIMERS):
         return None
@@ -137,6 +150,17 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
     if timer is None or uneven < 0.5 * timer or timer > 1.5 * period:
         return None
     return _packets(series, interval, timer, True, 1.0, pace)
+
+
+def _beat(interval: Array) -> float | None:
+    """The timer of a sensor that is a little slower than it: now and then a tick stays empty."""
+    for timer in TIMERS:
+        counts = np.round(interval / timer)
+        one = interval[counts == 1]
+        if one.size < 0.5 * interval.size or abs(float(np.median(one)) / timer - 1.0) > 0.002:
+            continue
+        return timer if skips_evenly(counts) else None
+    return None
 
 
 def best_timer(when: Array) -> float | None:

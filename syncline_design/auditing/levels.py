@@ -19,6 +19,7 @@ from syncline_design.auditing.series import Array, Mask
 from syncline_design.machine.deadline import in_force
 
 Kind = Literal["drift", "step", "episode", "relock", "holdover"]
+_LONGEST: Final = 0.4  # of the log: what settles more slowly is drift
 _LEAST_BLOCKS: Final = 3  # of an episode
 MOST_SHAPES: Final = 6
 SURE: Final = 8.0  # sigma of a size that is believed
@@ -85,7 +86,7 @@ def shapes_of(blocks: Blocks, *, least_s: float = 0.0) -> tuple[Shape, ...]:
         if best is None:
             break
         better = (*found, _refined(time_s[keep], low[keep], found, best))
-        grown = polished(better, [True] * len(better), blocks)
+        grown = polished(better, [True] * len(better), blocks, within=1.1)
         if not _believed(grown[-1], blocks, least_s):
             break
         found = grown
@@ -263,15 +264,18 @@ def _pruned(
     return kept
 
 
-def polished(shapes: tuple[Shape, ...], fixed: Sequence[bool], blocks: Blocks) -> tuple[Shape, ...]:
+def polished(
+    shapes: tuple[Shape, ...], fixed: Sequence[bool], blocks: Blocks, within: float = 0.5
+) -> tuple[Shape, ...]:
     """Sizes and time constants by robust least squares, begins kept where they are known.
 
-    Blocks in which something begins or ends hold both sides of it and are left out.
+    Blocks in which something begins or ends hold both sides of it and are left out; within: how
+    far from it, in blocks.
     """
     from scipy.optimize import least_squares
 
     curved = [k for k, s in enumerate(shapes) if s.kind in ("relock", "holdover")]
-    use = blocks.usable & ~_straddling(shapes, blocks.time_s, 0.5 * blocks.length_s)
+    use = blocks.usable & ~_straddling(shapes, blocks.time_s, within * blocks.length_s)
     time_s, low = blocks.time_s[use], blocks.low_s[use]
     if not curved:
         return _fitted(time_s, low, shapes, blocks)
@@ -279,7 +283,7 @@ def polished(shapes: tuple[Shape, ...], fixed: Sequence[bool], blocks: Blocks) -
     if time_s.size < start.size + len(shapes) + 4:
         return _fitted(time_s, low, shapes, blocks)
 
-    limits = math.log(blocks.length_s), math.log(float(np.ptp(time_s)))
+    limits = math.log(blocks.length_s), math.log(_LONGEST * float(np.ptp(time_s)))
 
     def rest(values: Array) -> Array:
         moved = _set(shapes, fixed, start + values * scale, limits)

@@ -173,6 +173,7 @@ def without_spikes(series: Series) -> Repaired:
         span = _spike(stamp, int(fall), out)
         if span is None or not _returns(late, span):
             continue
+        span = _with_partner(late, span)
         count += 1
         deepest = min(deepest, int(stamp[fall + 1] - stamp[fall]))
         out[span] = True
@@ -222,6 +223,17 @@ def _returns(late: NDArray[np.float64], span: slice) -> bool:
         return True
     away = abs(float(np.median(late[span])) - float(np.median(before)))
     return abs(float(np.median(after)) - float(np.median(before))) < 0.5 * away
+
+
+def _with_partner(late: NDArray[np.float64], span: slice) -> slice:
+    """Of two messages that changed places both are out of order."""
+    before = late[max(0, span.start - 6) : span.start - 1]
+    if span.start < 2 or not before.size:
+        return span
+    level = float(np.median(before))
+    away = abs(float(np.median(late[span])) - level)
+    moved = abs(float(late[span.start - 1]) - level)
+    return slice(span.start - 1, span.stop) if moved > 0.6 * away else span
 
 
 def remaining_falls(series: Series) -> StampFault | None:

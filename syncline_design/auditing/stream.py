@@ -158,7 +158,9 @@ def _last(
     """What is looked for once everything else is taken out."""
     names = {fault.fault for fault in found}
     if "packetised" not in names:
-        found += missing(series, pace, level_scatter(series))
+        coarse = grain is not None and grain.size_s > 0.5 * pace.period_s
+        late = "stamped_on_arrival" in names and pace.jitter_s > 0.1 * pace.period_s
+        found += missing(series, pace, level_scatter(series), blurred=coarse or late)
     if not names & {"packetised", "truncated_stamps", "stamped_on_arrival"}:
         arrived = arrival.stamped_on_arrival(series, pace)
         found += [arrived] if arrived is not None else []
