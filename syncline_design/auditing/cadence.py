@@ -14,6 +14,9 @@ import numpy as np
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Mask, Series, scatter, seconds, spread
 
+_LEAST_INTERVALS: Final = 20  # to know a rhythm by
+_MOST_GAPS: Final = 0.05  # of all intervals, or two: more are how the messages come
+_MOST_LOST: Final = 0.2  # of all messages: more are left out on purpose
 _UNEVEN: Final = 0.03  # of an interval: from here on a late message may look like a lost one
 REGULAR: Final = 0.35  # of an interval: larger irregularities are no rhythm
 _PLACED: Final = 0.2  # of an interval: how near to its place a message after a loss is
@@ -108,7 +111,7 @@ def missing(
     level_s: scatter of receipts minus stamps; an interval that only the stamps show is a step.
     blurred: stamps are too coarse, or scatter too much, to tell a late message from a lost one.
     """
-    if pace.interval.size < 8 or pace.period_s <= 0.0:
+    if pace.interval.size < _LEAST_INTERVALS or pace.period_s <= 0.0:
         return ()
     lost = _lost(series, pace, level_s) if pace.regular else _holes(pace)
     if not lost.any():
@@ -121,6 +124,9 @@ def missing(
         while pace.interval.size * share**run > 0.02 and run < 50:
             run += 1
         long_ = lost >= run
+    if long_.sum() > max(2.0, _MOST_GAPS * long_.size):
+        return ()
+    blurred = blurred or float(lost[~long_].sum()) > _MOST_LOST * lost.size
     singles = () if blurred else _losses(series, pace, np.where(long_, 0.0, lost))
     return (*_gaps(series, pace, long_), *singles)
 

@@ -17,6 +17,8 @@ GRAINS: Final = (
 )  # fmt: skip
 ROUNDING_NS: Final = 600  # of a file that keeps microseconds, or doubles of Unix seconds
 TIMERS: Final = (0.016, 0.008, 0.004, 0.005, 0.01, 0.02, 0.0125, 0.025, 0.032, 0.04, 0.05, 0.1)
+FTDI_S: Final = 0.016
+_FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _COHERENT: Final = 0.75
 _EVENLY: Final = 0.25  # scatter of the distance between skips
 _BUNCHED: Final = 0.25  # share of neighbours that come together
@@ -48,10 +50,21 @@ def truncated(series: Series, pace: Cadence, file_step_ns: float) -> Grain | Non
         rest = np.minimum(rest, grain - rest)
         if float(np.mean(rest <= ROUNDING_NS)) < 0.995:
             continue
-        if not _alternates(stamp, grain) or _ticks(stamp, grain):
+        if not _alternates(stamp, grain) or _ticks(stamp, grain) or _epochs(series, pace, grain):
             return None
         return _grain(series, pace, grain)
     return None
+
+
+def _epochs(series: Series, pace: Cadence, grain: int) -> bool:
+    """Whether messages of one coarse stamp also come together: several of one epoch."""
+    same = np.diff(series.stamp[pace.places]) == 0
+    if grain <= _FINE or float(np.mean(same)) < 0.2:
+        return False
+    if series.receive is None:
+        return True
+    passed = np.diff(series.receive[pace.places])
+    return float(np.median(passed[same])) < 0.3 * float(passed.mean())
 
 
 def _ticks(stamp: np.ndarray, grain: int) -> bool:
@@ -70,7 +83,7 @@ def _alternates(stamp: np.ndarray, grain: int) -> bool:
     multiples = counts % usual == 0
     odd = int(np.sum(near & ~multiples)) + (int(np.sum(near)) if usual == 1 else 0)
     if usual == 1:  # of 0 and 2 grains beside 1, 0 cannot be a lost message
-        odd = int(np.sum(counts == 0))
+        odd = int(np.sum(counts == 0)) if grain <= _FINE else 0
     return odd >= 3 or (usual == 1 and skips_evenly(counts))
 
 
@@ -99,10 +112,20 @@ def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
 
 
 def packetised(series: Series, pace: Cadence) -> Grain | None:
-    """Stamps that come in bunches, or on the grid of a timer with a phase of its own."""
+    """Stamps that come in bunches, or on the grid of a timer with a phase of its own.
+
+    Without receipts only of the one timer that no scheduler has: a task of a flight controller
+    stamps at its own ticks and is right.
+    """
     stamp = series.stamp[pace.places]
     if stamp.size < 40:
         return None
+    found = _packetised(series, pace, stamp)
+    known = found is not None and found.size_s == FTDI_S
+    return found if series.receive is not None or known else None
+
+
+def _packetised(series: Series, pace: Cadence, stamp: np.ndarray) -> Grain | None:
     when = (stamp - stamp[0]) / NS
     interval = np.diff(when)
     mean = float(when[-1]) / (when.size - 1)

@@ -18,12 +18,15 @@ from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.series import Array, Mask
 from syncline_design.machine.deadline import in_force
 
-Kind = Literal["drift", "step", "episode", "relock", "holdover"]
-_LONGEST: Final = 0.4  # of the log: what settles more slowly is drift
+Kind = Literal["drift", "bend", "step", "episode", "relock", "holdover"]
+_LONGEST: Final = 0.3  # of the log: what settles more slowly is drift
 _LEAST_BLOCKS: Final = 3  # of an episode
 MOST_SHAPES: Final = 6
 SURE: Final = 8.0  # sigma of a size that is believed
-_PENALTY: Final = {"drift": 0.0, "step": 6.0, "episode": 14.0, "relock": 14.0, "holdover": 20.0}
+# what a shape has to explain beyond chance for its freedom, in units of the noise squared
+_PENALTY: Final = {
+    "drift": 0.0, "bend": 12.0, "step": 6.0, "episode": 14.0, "relock": 14.0, "holdover": 20.0,
+}  # fmt: skip
 _EXTRA: Final = 0.004  # of what a shape explains: its freedom also fits what is nearly right
 _STEP_SHARE: Final = 0.25  # of the delays' spread: smaller steps are not named
 _DRIFT_SHARE: Final = 0.4  # of the delays' spread, over the whole log
@@ -35,7 +38,8 @@ _SETTLINGS: Final = (0.01, 0.02, 0.04, 0.08, 0.16)  # of the log
 class Shape:
     """An offset over time; size: seconds of receipt minus stamp (drift: over the whole log).
 
-    begin_s, end_s: of a step its place and the end of the log; settle_s: time constant.
+    begin_s, end_s: of a step its place and the end of the log; settle_s: time constant.  bend: how
+    a rate changes slowly, a Legendre polynomial of `order` over the log.
     """
 
     kind: Kind
@@ -44,11 +48,14 @@ class Shape:
     begin_s: float = 0.0
     end_s: float = 0.0
     settle_s: float = 0.0
+    order: int = 1
 
     def at(self, time_s: Array) -> Array:
         """Its course for a size of 1."""
         if self.kind == "drift":
             return (time_s - self.begin_s) / (self.end_s - self.begin_s)
+        if self.kind == "bend":
+            return _legendre(time_s, self)
         if self.kind == "step":
             return np.where(time_s >= self.begin_s, 1.0, 0.0)
         if self.kind == "episode":
@@ -61,6 +68,13 @@ class Shape:
 
 
 Family = tuple[list[Shape], Array]
+
+
+def _legendre(time_s: Array, shape: Shape) -> Array:
+    place = 2.0 * (time_s - shape.begin_s) / (shape.end_s - shape.begin_s) - 1.0
+    only = np.zeros(shape.order + 1)
+    only[-1] = 1.0
+    return np.asarray(np.polynomial.legendre.legval(place, only))
 
 
 def course(shapes: tuple[Shape, ...], time_s: Array) -> Array:
@@ -98,7 +112,9 @@ def shapes_of(blocks: Blocks, *, least_s: float = 0.0) -> tuple[Shape, ...]:
 def _believed(shape: Shape, blocks: Blocks, least_s: float) -> bool:
     share = _DRIFT_SHARE if shape.kind == "drift" else _STEP_SHARE
     floor = max(share * blocks.spread_s, least_s, SURE * shape.sigma_s)
-    return abs(shape.size_s) > floor and (shape.kind in ("drift", "step") or _seen(shape, blocks))
+    return abs(shape.size_s) > floor and (
+        shape.kind in ("drift", "bend", "step") or _seen(shape, blocks)
+    )
 
 
 def _seen(shape: Shape, blocks: Blocks) -> bool:
@@ -160,6 +176,8 @@ def _families(time_s: Array) -> Iterator[Family]:
     edges = 0.5 * (time_s[1:] + time_s[:-1])
     drift = [Shape("drift", begin_s=first, end_s=last)]
     yield drift, _courses(drift, time_s)
+    bends = [Shape("bend", begin_s=first, end_s=last, order=k) for k in (2, 3, 4)]
+    yield bends, np.stack([bend.at(time_s) for bend in bends])
     steps = [Shape("step", begin_s=float(e), end_s=last) for e in edges[1:-1]]
     yield steps, _courses(steps, time_s)
     knots = edges[:: max(1, edges.size // _KNOTS)]
@@ -202,7 +220,7 @@ def _courses(shapes: list[Shape], time_s: Array) -> Array:
 
 def _refined(time_s: Array, low: Array, found: tuple[Shape, ...], shape: Shape) -> Shape:
     """Begin, end and settling of a shape, made finer one after another."""
-    if shape.kind == "drift":
+    if shape.kind in ("drift", "bend"):
         return shape
     base = np.linalg.qr(_columns(found, time_s))[0]
     rest = low - base @ (base.T @ low)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.auditing.result import Consequence, StampFault
-from syncline_design.auditing.series import NS, Mask, Series, scatter, seconds
+from syncline_design.auditing.series import NS, Mask, Series, seconds
 from syncline_design.logs.readers.stream import UNSET
 
 # where counters of devices begin anew [ns]: 16, 24, 31 and 32 bits of ns, us, ms and 10 us
@@ -19,6 +19,7 @@ _BITS: Final = tuple(
 )
 _CALENDAR: Final = tuple(int(s * NS) for s in (60, 3600, 43_200, 86_400, 604_800))
 WRAPS: Final = tuple(sorted(w for w in {*_BITS, *_CALENDAR} if w > 100_000_000))
+WEEK_NS: Final = 604_800 * 10**9
 LONGEST_SPIKE: Final = 5  # messages that go back and return
 MOST_SPIKES: Final = 100_000
 
@@ -34,11 +35,12 @@ class Repaired:
 def without_unset(series: Series) -> Repaired:
     """Stamps of zero among others that are far from it, and those that the reader calls unset."""
     stamp = series.stamp
-    zero = (stamp == 0) | (stamp == UNSET)
+    empty = stamp == UNSET
+    zero = (stamp == 0) | (empty if series.receive is not None else False)
     others = stamp[~zero]
     near = others.size and float(np.median(np.abs(others))) < 5 * NS
     if near:  # a counter that begins here passes zero once
-        zero = stamp == UNSET
+        zero = empty if series.receive is not None else np.zeros(stamp.size, bool)
         isolated = _runs_of(stamp == 0)
         for begin, end in isolated:
             if end - begin > 2:
@@ -240,15 +242,22 @@ def remaining_falls(series: Series) -> StampFault | None:
     """Stamps that went back and stayed behind, where no other cause was found."""
     places = series.places()
     change = np.diff(series.stamp[places])
-    noise = 0.0 if change.size < 3 else scatter(seconds(change))
-    falls = np.flatnonzero(seconds(change) < -min(1e-9, noise))
+    falls = np.flatnonzero(change < 0)
     if not falls.size:
         return None
     times = series.seconds[places]
     deepest = int(change[falls].min())
-    return StampFault(
-        "backward_jump", {"count": float(falls.size), "seconds": deepest / NS},
-        float(times[falls[0] + 1]), float(times[falls[-1] + 1]),
-        f"{falls.size} times a stamp lies before the one of the message before, by up to "
-        f"{-deepest / NS:.6g} s",
-    )  # fmt: skip
+    begin, end = float(times[falls[0] + 1]), float(times[falls[-1] + 1])
+    back = f"{falls.size} times a stamp lies before the one of the message before, by up to "
+    evidence = f"{back}{-deepest / NS:.6g} s"
+    parameters: dict[str, float | str] = {"count": float(falls.size), "seconds": deepest / NS}
+    weeks = round(-deepest / (1024 * WEEK_NS))
+    if weeks and abs(-deepest - weeks * 1024 * WEEK_NS) < 3600 * NS:
+        follows = Consequence("backward_jump", parameters, evidence)
+        return StampFault(
+            "epoch_offset", {"seconds": -weeks * 1024 * WEEK_NS / NS, "kind": "week_rollover"},
+            float(times[falls[int(np.argmin(change[falls]))] + 1]), float(times[-1]),
+            f"stamps fall by {weeks * 1024} GPS weeks: the receiver's week number rolled over",
+            (follows,),
+        )  # fmt: skip
+    return StampFault("backward_jump", parameters, begin, end, evidence)

@@ -19,7 +19,7 @@ from syncline_design.auditing.result import (
     StampNames,
     StreamAudit,
 )
-from syncline_design.auditing.stream import Examined, examined
+from syncline_design.auditing.stream import Examined, examined, is_receipt
 from syncline_design.auditing.together import held_together
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.stream import UNSET, Incomplete, Stream
@@ -27,7 +27,6 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead, content_of, note_read
 from syncline_design.spec.load import BadInput
 
-_RECORDED: Final = ("log time", "record time", "receive", "capture", "arrival")
 _CSV: Final = "CSV"
 
 
@@ -127,27 +126,30 @@ def _is_told(stream: Stream) -> bool:
     stamps = stream.stamps
     if stamps is None or stamps.primary_ns.size == 0:
         return False
-    return stamps.secondary_ns is not None or not _is_recorders(stamps.primary)
-
-
-def _is_recorders(name: str) -> bool:
-    return name.replace("_", " ").lower().startswith(_RECORDED)
+    if "points" in stream.quantity and stamps.secondary_ns is None:
+        return False  # a cloud in a file lies in the order of space
+    return stamps.secondary_ns is not None or not is_receipt(stamps.primary)
 
 
 def _untold(opened: _Opened, stream: Stream) -> StreamAudit:
-    """A stream whose messages carry no time."""
+    """A stream whose messages carry no time of their own, or points in no order of time."""
     stamps = stream.stamps
     names = StampNames(None, None) if stamps is None else StampNames(None, stamps.primary)
+    why = "anything: its messages carry no stamp of their own"
+    if stamps is not None and "points" in stream.quantity and not is_receipt(stamps.primary):
+        names = StampNames(stamps.primary, None)
+        why = "anything: one time a point, and points lie in the order of space"
     duration = None
-    if stamps is not None and stamps.primary_ns.size > 1:
-        duration = float(np.ptp(stamps.primary_ns)) / 1e9
+    known = np.zeros(0) if stamps is None else stamps.primary_ns[stamps.primary_ns != UNSET]
+    if known.size > 1:
+        duration = float(np.ptp(known)) / 1e9
     return StreamAudit(
         name=stream.name, file=str(opened.path), messages=stream.messages, duration_s=duration,
         rate_hz=(stream.messages - 1) / duration if duration else None, shape="unknown",
         stamps=names, timeline=stream.timeline, quantity=stream.quantity, faults=(), offset_s=None,
         residual_s=ResidualTime(None, None, None), smallest_seen=SmallestSeen(None, None),
         tau_crit_s=None, error_m=None,
-        cannot_show=("anything: its messages carry no stamp of their own",), notes=stream.notes,
+        cannot_show=(why,), notes=stream.notes,
         trace=(), partial=stream.partial,
     )  # fmt: skip
 

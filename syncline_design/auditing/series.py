@@ -19,8 +19,8 @@ UNIX_S = 6e8  # later than this since 1970: a calendar's clock (1989)
 class Series:
     """Messages in the order of the file.
 
-    stamp, receive: nanoseconds; receive None: the file tells one time only.  good: those whose
-    stamp is usable.  start: receipt (or stamp) of the run's first message.
+    stamp, receive: nanoseconds; receive None: the file tells one time only, or two of one clock.
+    good: those whose stamp is usable.  start: receipt (or stamp) of the run's first message.
     """
 
     stamp: Nanoseconds
@@ -29,14 +29,13 @@ class Series:
     start: int
 
     @property
-    def times(self) -> Nanoseconds:
-        """Receipts, where there are none the stamps."""
-        return self.stamp if self.receive is None else self.receive
-
-    @property
     def seconds(self) -> Array:
-        """Seconds of receipt since the first message of the run."""
-        return seconds(self.times - self.start)
+        """Seconds of receipt since the first message of the run; without receipts, of the latest
+        stamp so far."""
+        if self.receive is not None:
+            return seconds(self.receive - self.start)
+        known = np.where(self.good, self.stamp, np.iinfo(np.int64).min)
+        return seconds(np.maximum(np.maximum.accumulate(known), self.start) - self.start)
 
     def places(self) -> NDArray[np.intp]:
         return np.flatnonzero(self.good)

@@ -25,6 +25,7 @@ _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip
 _TRANSPORT_S: Final = 0.05
 _DRIFTING_S: Final = 0.03  # over the log: slower drifts do not blur whole seconds
+_WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
 _LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
 
@@ -47,7 +48,6 @@ class Shifts:
     series: Series
     faults: tuple[StampFault, ...]
     shifts: tuple[Shift, ...]
-    drift_ppm: float | None
     blocks: Blocks | None
 
 
@@ -57,7 +57,7 @@ def without_slips(series: Series, known_s: float | None) -> Shifts:
     Which stretch is right: the one whose stamps lie just before their receipts, where the constant
     is known; else the longest.
     """
-    nothing = Shifts(series, (), (), None, None)
+    nothing = Shifts(series, (), (), None)
     if series.receive is None or series.good.sum() < 2 * _LEAST_RUN:
         return nothing
     places = series.places()
@@ -82,7 +82,7 @@ def without_slips(series: Series, known_s: float | None) -> Shifts:
         Shift(float(series.seconds[places[b]]), None, float(turns[b]), "receipt", 1.0)
         for b, e in found if (b, e) not in own and e == places.size
     )  # fmt: skip
-    return Shifts(replace(series, stamp=moved), faults, others, None, None)
+    return Shifts(replace(series, stamp=moved), faults, others, None)
 
 
 def _slope(time_s: Array, late: Array) -> Array:
@@ -169,7 +169,7 @@ def _slip(times: Array, turns: Array, run: tuple[int, int], stamp: np.ndarray) -
 
 def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     """Steps, drift, episodes and settling, named where they are the stamps' own."""
-    nothing = Shifts(series, (), (), None, None)
+    nothing = Shifts(series, (), (), None)
     if series.receive is None or series.good.sum() < 2:
         return nothing
     places = series.places()
@@ -189,22 +189,24 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
         judged = [(shape, side) for shape, side in judged if side == "stamp"]
     found, sides = tuple(shape for shape, _ in judged), [side for _, side in judged]
     found = polished(found, [side == "stamp" for side in sides], blocks)
-    own = tuple(s for s, side in zip(found, sides, strict=True) if side != "receipt")
+    wander = float(np.ptp(course(tuple(s for s in found if s.kind in ("drift", "bend")), time_s)))
+    own = tuple(
+        s for s, side in zip(found, sides, strict=True)
+        if side == "stamp" or (side == "unknown" and not _may_be_wander(s, wander))
+    )  # fmt: skip
     whole = series.stamp.copy()
     whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
-    faults = tuple(_named(shape, time_s, blocks) for shape in own)
+    faults = tuple(_all_named(own, time_s))
     shifts = tuple(
         Shift(s.begin_s, None if s.kind == "step" else s.end_s, s.size_s, side, blocks.length_s)
         for s, side in zip(found, sides, strict=True) if s.kind in ("step", "episode")
     )  # fmt: skip
-    ppm = next((f.parameters["ppm"] for f in faults if f.fault == "drift"), None)
-    assert not isinstance(ppm, str)
-    return Shifts(replace(series, stamp=whole), faults, shifts, ppm, blocks)
+    return Shifts(replace(series, stamp=whole), faults, shifts, blocks)
 
 
 def _placed(shape: Shape, time_s: Array, late: Array, blocks: Blocks) -> Shape:
     """Begin (and end) to the message: where the jump parts the messages best."""
-    if shape.kind in ("drift", "holdover"):
+    if shape.kind in ("drift", "bend", "holdover"):
         return shape
     begin = _change(shape.begin_s, shape.size_s, time_s, late, blocks)
     if shape.kind == "episode":
@@ -254,7 +256,7 @@ def _has_tail(late: Array) -> bool:
 
 def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple[Shape, Side]:
     """A shape put where the stamps' own rhythm breaks, and whether it breaks there at all."""
-    if shape.kind in ("drift", "holdover") or not pace.regular:
+    if shape.kind in ("drift", "bend", "holdover") or not pace.regular:
         return shape, "unknown"
     side, at = _broken(pace, shape.begin_s, -shape.size_s, time_s, blocks)
     if at is not None:
@@ -297,17 +299,44 @@ def _broken(
     return ("receipt" if noise < abs(jump_s) and abs(moved) < bound else "unknown"), None
 
 
-def _named(shape: Shape, time_s: Array, blocks: Blocks) -> StampFault:
+def _may_be_wander(shape: Shape, wander_s: float) -> bool:
+    """Whether a small shift of a clock that runs away may be how its rate changes."""
+    return shape.kind not in ("drift", "bend") and abs(shape.size_s) < _WANDER * wander_s
+
+
+def _all_named(shapes: Sequence[Shape], time_s: Array) -> Iterator[StampFault]:
+    """One fault for all that moves slowly, one for every other shape."""
+    slow = tuple(s for s in shapes if s.kind in ("drift", "bend"))
+    if slow:
+        yield _drift(slow, time_s)
+    for shape in shapes:
+        if shape not in slow:
+            yield _named(shape, time_s)
+
+
+def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
+    """Rate of the stamps against receipts: its mean, and from where to where it changes."""
+    grid = np.linspace(float(time_s[0]), float(time_s[-1]), 101)
+    moved = -course(slow, grid)
+    length = float(grid[-1] - grid[0])
+    ppm = 1e6 * float(moved[-1] - moved[0]) / length
+    sure = max(abs(s.size_s) / max(s.sigma_s, 1e-12) for s in slow)
+    parameters: dict[str, float | str] = {"ppm": ppm}
+    words = f"stamps run {abs(ppm):.4g} ppm {'fast' if ppm > 0 else 'slow'} against receipts"
+    if len(slow) > 1 or slow[0].kind == "bend":
+        rate = 1e6 * np.diff(moved) / np.diff(grid)
+        parameters |= {"kind": "wandering", "ppm_low": float(rate.min()),
+                       "ppm_high": float(rate.max())}  # fmt: skip
+        words += f" in the mean, between {rate.min():+.3g} and {rate.max():+.3g} ppm"
+    span = float(np.ptp(moved)) * 1e3
+    words += f": {span:.4g} ms over the log, {sure:.3g} times its uncertainty"
+    return StampFault("drift", parameters, None, None, words)
+
+
+def _named(shape: Shape, time_s: Array) -> StampFault:
     end = float(time_s[-1])
     size = -shape.size_s
     sure = f"{abs(shape.size_s) / max(shape.sigma_s, 1e-12):.3g} times its uncertainty"
-    if shape.kind == "drift":
-        ppm = 1e6 * size / (shape.end_s - shape.begin_s)
-        return StampFault(
-            "drift", {"ppm": ppm}, None, None,
-            f"stamps run {abs(ppm):.4g} ppm {'fast' if ppm > 0 else 'slow'} against receipts: "
-            f"{abs(size) * 1e3:.4g} ms over the log, {sure}",
-        )  # fmt: skip
     if shape.kind in ("step", "episode"):
         stop = end if shape.kind == "step" else shape.end_s
         lasts = "and stay so" if shape.kind == "step" else f"until {stop:.4g} s"

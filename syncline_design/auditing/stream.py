@@ -21,10 +21,12 @@ from syncline_design.auditing.result import (
 )
 from syncline_design.auditing.series import NS, Array, Series, seconds, series_of
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
-from syncline_design.logs.readers.stream import Stream
+from syncline_design.logs.readers.stream import Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
 
+RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
 TRACE_POINTS: Final = 240
+_NONE: Final = Stamps("", None, np.zeros(0, np.int64))
 _LARGE_STEP_NS: Final = 1e6
 # epochs of a counter without a calendar
 _COUNTERS: Final = ("boot", "unknown", "week_seconds", "day_seconds", "hour_seconds")
@@ -52,7 +54,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     in_force().check()
     stamps = stream.stamps
     assert stamps is not None
-    raw = series_of(stamps.primary_ns, stamps.secondary_ns, start)
+    raw = series_of(stamps.primary_ns, _receipts(stamps), start)
     found: list[StampFault] = []
     series, unit, step_ns = _ordered(raw, found)
     grain = _grain(series, step_ns, found)
@@ -67,7 +69,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         series = order.without_duplicates(series).series
     series = _take(order.without_spikes(series), found)
     epoch = None if unit else epoch_fault(series)
-    found[:] = _with_epoch(found, epoch)
+    found[:] = _with_epoch(found, _as_declared(epoch, stream))
     known = _known(epoch, series, unit is not None)
     slips = without_slips(series, known)
     least = max(_coarse(raw), grain.size_s if grain is not None else 0.0)
@@ -77,6 +79,16 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     pace = cadence(series)
     _last(series, pace, stream, known, grain, found)
     return _summed(stream, raw, series, pace, found, (slips, moved), known, grain)
+
+
+def _receipts(stamps: Stamps) -> Nanoseconds | None:
+    """The second time where another clock told it: one clock cannot be held against itself."""
+    return stamps.secondary_ns if is_receipt(stamps.secondary) else None
+
+
+def is_receipt(name: str | None) -> bool:
+    """Whether a time of this name was told by what received a message."""
+    return name is not None and name.replace("_", " ").lower().startswith(RECEIVED)
 
 
 def _ordered(raw: Series, found: list[StampFault]) -> tuple[Series, StampFault | None, float]:
@@ -100,6 +112,14 @@ def _grain(series: Series, step_ns: float, found: list[StampFault]) -> grains.Gr
     if grain is not None:
         found.append(grain.fault)
     return grain
+
+
+def _as_declared(epoch: StampFault | None, stream: Stream) -> StampFault | None:
+    """GPS time where the format says GPS time is no fault."""
+    declared = stream.timeline == "gps" and "gps" in (stream.stamps or _NONE).primary.lower()
+    if epoch is None or not declared or epoch.parameters["kind"] != "gps":
+        return epoch
+    return replace(epoch, counts=False, evidence=f"{epoch.evidence}, as the format says")
 
 
 def _with_epoch(found: list[StampFault], epoch: StampFault | None) -> list[StampFault]:
