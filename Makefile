@@ -24,7 +24,7 @@ demo: $(RUN)
 	@echo "HTML report: $(CURDIR)/out/uav_corridor.html"
 
 test: lint
-	$(BIN)/python -m pytest -n $(JOBS)
+	$(BIN)/python -m pytest -n $(JOBS) --dist worksteal
 
 lint: $(DEV)
 	$(BIN)/ruff check .

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+import command
 from syncline_design.spec.folders import other_kind, spec_files
 from syncline_design.spec.load import BadInput
 
@@ -19,10 +20,15 @@ CATALOG = "sensors:\n  mine: {modality: position, sigma_position: 1 cm, primitiv
 STUDY = 'study: 1\nname: x\nbase: [a.yaml]\ngrid: {"stages[0].distance": [1 m, 2 m]}\n'
 
 
-def check(*arguments: str, seed: str = "0") -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": seed}
+def check(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return command.run("check", *arguments)
+
+
+def check_seeded(folder: Path, seed: int) -> subprocess.CompletedProcess[str]:
+    """In an interpreter of that hash seed."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "PYTHONHASHSEED": str(seed)}
     return subprocess.run(
-        [sys.executable, "-m", "syncline_design.cli", "check", *arguments],
+        [sys.executable, "-m", "syncline_design.cli", "check", str(folder)],
         env=environment, capture_output=True, text=True, check=False, timeout=120,
     )  # fmt: skip
 
@@ -137,6 +143,6 @@ def test_error_lines_come_in_the_same_order_whatever_the_hash_seed(tmp_path: Pat
         bare.replace("- name: usv", "- name: usv\n    colour: 3"), "utf-8"
     )
     (tmp_path / "b.yaml").write_text("syncline: 1\n", "utf-8")
-    runs = {check(str(tmp_path), seed=str(seed)).stderr for seed in range(5)}
+    runs = {check_seeded(tmp_path, seed).stderr for seed in range(5)}
     assert len(runs) == 1
     assert len(runs.pop().splitlines()) >= 4

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import subprocess
-import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
 import pytest
+
+import command as commands
 
 ROOT = Path(__file__).resolve().parent.parent
 TRACK, USV = "specs/position_track.yaml", "specs/usv_mapping.yaml"
@@ -30,11 +30,7 @@ COMMANDS = {
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    environment = {**os.environ, "NO_COLOR": "1", "COLUMNS": "200", "PYTHONPATH": str(ROOT)}
-    return subprocess.run(
-        [sys.executable, "-m", "syncline_design.cli", *arguments],
-        cwd=ROOT, env=environment, capture_output=True, text=True, check=False, timeout=120,
-    )  # fmt: skip
+    return commands.run(*arguments, environment={"NO_COLOR": "1", "COLUMNS": "200"})
 
 
 @pytest.mark.parametrize("command", COMMANDS)

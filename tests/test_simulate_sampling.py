@@ -209,6 +209,23 @@ def test_a_longer_run_begins_with_the_shorter_one() -> None:
     np.testing.assert_array_equal(short, long[:9_000])
 
 
+@pytest.mark.parametrize("envelope", ["limits", "inside", "trajectory"])
+@pytest.mark.parametrize("effect", ["", "latency", "heavy_tails"])
+def test_part_of_a_job_is_the_beginning_of_the_whole(envelope, effect: str) -> None:
+    """Bit for bit, whatever acts: what scatters is drawn row by row."""
+    settings = SimulationSettings(samples=sampling.JOB, envelope=envelope)
+    parameters = {
+        "latency": (("latency_s", 0.01),),
+        "heavy_tails": (("degrees_of_freedom", 4.0), ("outlier_rate", 0.1)),
+    }
+    effects = [EffectEntry(effect, "position", "vessel", parameters[effect])] if effect else []
+    system = dataclasses.replace(survey(), effects=tuple(effects))
+    whole = sampling.job_errors(system, settings, 1)
+    for count in (1, 500, sampling.JOB - 1):
+        part = sampling.job_errors(system, settings, 1, count)
+        np.testing.assert_array_equal(part, whole[:, :count])
+
+
 def test_jobs_are_independent_streams() -> None:
     """Neighbouring jobs are uncorrelated: |r| < 5 / sqrt(n)."""
     system, settings = gaussian_ball(), SimulationSettings()
@@ -264,7 +281,7 @@ def test_quantile_intervals_cover() -> None:
     limit = exact_quantile(0.9)
     for seed in range(1000):
         settings = SimulationSettings(500, seed=seed, quantiles=quantiles, limit_m=limit, workers=1)
-        kept = sampling.job_errors(gaussian_ball(), settings, 0)[:, :500]
+        kept = sampling.job_errors(gaussian_ball(), settings, 0, 500)
         found = Values(np.linalg.norm(kept, axis=0))
         for k, quantile in enumerate(quantiles):
             estimate = quantile_estimates(found, (quantile,), 0.95)[0]

@@ -28,18 +28,28 @@ Shifts = Mapping[tuple[str, RoleName], Array]  # timestamp error mu [s] of (stag
 
 @dataclass(frozen=True, slots=True)
 class RandomSource:
-    """Pseudo-random numbers of one stream: `count` draws each of as many numbers as asked for."""
+    """Pseudo-random numbers of one stream: `count` draws each of as many numbers as asked for.
+
+    of: how many are drawn, of which the first `count` are used: these are the same whatever the
+    count.
+    """
 
     generator: np.random.Generator
     count: int
+    of: int | None = None
 
     def uniform(self, rows: int) -> Array:
         """(rows, count), uniform on [0, 1)."""
-        return self.generator.random((rows, self.count))
+        return self._used(self.generator.random((rows, self.of or self.count)))
 
     def normal(self, rows: int) -> Array:
         """(rows, count), standard normal."""
-        return self.generator.standard_normal((rows, self.count))
+        return self._used(self.generator.standard_normal((rows, self.of or self.count)))
+
+    def _used(self, drawn: Array) -> Array:
+        if drawn.shape[1] == self.count:
+            return drawn
+        return np.ascontiguousarray(drawn[:, : self.count])
 
 
 def generator(seed: int, *key: int) -> np.random.Generator:

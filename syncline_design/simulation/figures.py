@@ -92,7 +92,7 @@ class Statistics:
     worst_at: tuple[WorstSituation, ...]
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=64)
 def error_statistics(system: System, seed: int = 0) -> Statistics:
     """The statistical figures of a design; raises SimulationError where it makes no sense."""
     wanted = tuple(WANTED.values())

@@ -111,11 +111,17 @@ def proportion_interval(
     near = (successes + 0.5) / (trials + 1.0)
     reach = 8.0 * math.sqrt(near * (1.0 - near) / trials)
     bracket = max(near - reach, 0.0), min(near + reach, 1.0)
+    z = _score(tail)
     if successes > 0:
-        low = _rising_root(lambda p: 1.0 - binomial_cdf(successes - 1, trials, p) - tail, bracket)
+        low = _rising_root(lambda p: -_score(binomial_cdf(successes - 1, trials, p)) - z, bracket)
     if successes < trials:
-        high = _rising_root(lambda p: tail - binomial_cdf(successes, trials, p), bracket)
+        high = _rising_root(lambda p: z - _score(binomial_cdf(successes, trials, p)), bracket)
     return low, high
+
+
+def _score(probability: float) -> float:
+    """The standard normal quantile: what a binomial tail is nearly a straight line in."""
+    return NormalDist().inv_cdf(min(max(probability, 1e-300), 1.0 - 2.0**-53))
 
 
 def _rising_root(function: Callable[[float], float], bracket: tuple[float, float]) -> float:
@@ -129,15 +135,19 @@ def _rising_root(function: Callable[[float], float], bracket: tuple[float, float
         low, at_low = 0.0, function(0.0)
     if at_high < 0.0:
         high, at_high = 1.0, function(1.0)
+    kept = 0.0  # the side that the last guess left where it was
+    before = math.inf
     for _ in range(200):
         if high - low <= 1e-12 * high or at_high == at_low:
             break
         guess = high - at_high * (high - low) / (at_high - at_low)
-        value = function(guess)
-        if abs(value) < 1e-13:
+        if abs(guess - before) <= 1e-14 * guess:
             return guess
+        before, value = guess, function(guess)
         if value > 0.0:
-            high, at_high, at_low = guess, value, 0.5 * at_low
+            high, at_high, at_low = guess, value, at_low * (0.5 if kept < 0.0 else 1.0)
+            kept = -1.0
         else:
-            low, at_low, at_high = guess, value, 0.5 * at_high
+            low, at_low, at_high = guess, value, at_high * (0.5 if kept > 0.0 else 1.0)
+            kept = 1.0
     return 0.5 * (low + high)

@@ -32,15 +32,21 @@ EFFECTS_STREAM = 4  # apart, so that a spec with and without an effect shares it
 Consume = Callable[[int, Array], None]
 
 
-def job_errors(system: System, settings: SimulationSettings, job: int) -> Array:
-    """Errors [m] of the whole chain, NED, (3, JOB), of one job."""
+def job_errors(system: System, settings: SimulationSettings, job: int, count: int = JOB) -> Array:
+    """Errors [m] of the whole chain, NED, of the first `count` samples of one job, (3, count).
+
+    They are the same whatever the count; noise that effects draw, row by row, is drawn for all.
+    """
+    acting = acting_effects.by_stage(system)
+    needed = JOB if any(map(_scatters, acting.values())) else count
     stream = generator(settings.seed, PLAIN_STREAM, job)
+    source = RandomSource(stream, needed, JOB)
     if settings.envelope == "trajectory":
-        apart = generator(settings.seed, EFFECTS_STREAM, job)
-        return trajectory_errors(system, settings, stream, apart, JOB)
-    if acting_effects.by_stage(system):
-        return _errors_with_effects(system, settings, stream, job)
-    source = RandomSource(stream, JOB)
+        apart = RandomSource(generator(settings.seed, EFFECTS_STREAM, job), needed, JOB)
+        return trajectory_errors(system, settings, source, apart)[:, :count]
+    if acting:
+        apart = RandomSource(generator(settings.seed, EFFECTS_STREAM, job), needed, JOB)
+        return _errors_with_effects(system, settings, source, apart)[:, :count]
     shifts = timing_draws(system, source)
     carried: known_effects.Carried | None = None
     for index in range(len(system.stages)):
@@ -50,22 +56,23 @@ def job_errors(system: System, settings: SimulationSettings, job: int) -> Array:
     return carried.error_m
 
 
+def _scatters(acting: tuple[acting_effects.Acting, ...]) -> bool:
+    return any(one.effect.kind == "stochastic" for one in acting)
+
+
 def _errors_with_effects(
-    system: System, settings: SimulationSettings, stream: np.random.Generator, job: int
+    system: System, settings: SimulationSettings, source: RandomSource, apart: RandomSource
 ) -> Array:
     """The same with known effects: times, places and tilts over the horizon."""
-    source = RandomSource(stream, JOB)
-    apart = generator(settings.seed, EFFECTS_STREAM, job)
-    around = RandomSource(apart, JOB)
     acting = acting_effects.by_stage(system)
-    moment = moment_draw(system.horizon, around)
+    moment = moment_draw(system.horizon, apart)
     shifts = timing_draws(system, source)
     carried: known_effects.Carried | None = None
     for index, stage in enumerate(system.stages):
         draw = stage_draw(system, index, shifts, source, settings.envelope == "inside")
-        where = (moment, lean_draw(system, around))
+        where = (moment, lean_draw(system, apart))
         effects = acting.get(stage.name, ())
-        carried = known_effects.placed_error(draw, where, effects, apart, carried)
+        carried = known_effects.placed_error(draw, where, effects, apart.generator, carried)
     assert carried is not None
     return carried.error_m
 
@@ -129,8 +136,9 @@ def run_jobs(
                     job = next(jobs, None)
                 if job is None:
                     return
-                errors = job_errors(system, settings, job)
-                consume(job * JOB, errors[:, : last - job * JOB])
+                first_of_job = job * JOB
+                count = min(JOB, last - first_of_job)
+                consume(first_of_job, job_errors(system, settings, job, count)[:, :count])
         except BaseException as failure:
             failures.append(failure)
 

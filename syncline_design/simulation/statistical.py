@@ -305,15 +305,20 @@ class Rays:
             low, at_low = high, at_high
             high *= 2.0
             at_high = self.within(high) - p
+        kept = 0  # the side that the last radius left where it was
         for _ in range(60):
             if high - low <= 1e-8 * high:
                 break
             radius = high - at_high * (high - low) / (at_high - at_low)
             value = self.within(radius) - p
+            if abs(value) <= 1e-12:
+                return radius
             if value < 0.0:
-                low, at_low, at_high = radius, value, 0.5 * at_high
+                low, at_low, at_high = radius, value, at_high * (0.5 if kept > 0 else 1.0)
+                kept = 1
             else:
-                high, at_high, at_low = radius, value, 0.5 * at_low
+                high, at_high, at_low = radius, value, at_low * (0.5 if kept < 0 else 1.0)
+                kept = -1
         return high
 
 

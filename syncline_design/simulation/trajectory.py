@@ -68,18 +68,16 @@ class Along:
 def trajectory_errors(
     system: System,
     settings: SimulationSettings,
-    stream: np.random.Generator,
-    apart: np.random.Generator,
-    count: int,
+    source: RandomSource,
+    apart: RandomSource,
 ) -> Array:
-    """Errors [m] of the chain at `count` random moments, NED, (3, count).
+    """Errors [m] of the chain at random moments, as many as the sources give, NED, (3, count).
 
-    apart: the stream of what effects draw.
+    apart: what effects draw from.
     """
-    source = RandomSource(stream, count)
     shifts = timing_draws(system, source)
     acting = acting_effects.by_stage(system)
-    mission = moment_draw(system.horizon, RandomSource(apart, count)) if acting else None
+    mission = moment_draw(system.horizon, apart) if acting else None
     moment = source.uniform(1)[0]
     repeated = settings.trajectory is None or str(settings.trajectory) in MANOEUVRES
     carried: known_effects.Carried | None = None
@@ -94,7 +92,8 @@ def trajectory_errors(
         noise = _noise(system, index, shifts, source)
         motion = Along(track, time_s)
         effects = acting.get(stage.name, ())
-        carried = known_effects.moved_error((rows, motion, noise), effects, apart, carried)
+        state = (rows, motion, noise)
+        carried = known_effects.moved_error(state, effects, apart.generator, carried)
         if repeated:
             moment = source.uniform(1)[0]  # vehicles on manoeuvres of their own are not in step
     assert carried is not None

@@ -133,8 +133,8 @@ def count_share(share: Share) -> tuple[Counts, int]:
     counts, within = no_counts(), 0
     jobs = range(share.first // JOB, -(-share.last // JOB))
     for job in jobs[share.part :: share.parts]:
-        errors = job_errors(share.system, share.settings, job)
-        lengths = norm(errors[:, : share.last - job * JOB])
+        count = min(JOB, share.last - job * JOB)
+        lengths = norm(job_errors(share.system, share.settings, job, count))
         add_counts(counts, lengths)
         within += int(np.count_nonzero(lengths <= share.limit_m))
     return counts, within
