@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from syncline_design.logs.columns import TIME, known_names, si_columns
+from syncline_design.logs.columns import RANGING, TIME, known_names, si_columns
 from syncline_design.logs.readers import open_recording, reader_of
 from syncline_design.logs.readers.reader import head_of
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
@@ -21,16 +21,13 @@ def row_sources(
     paths: Sequence[Path], choice: LogChoice, stages: Sequence[str], poses: bool
 ) -> list[RowSource]:
     """Every file opened; raises BadInput.  Recordings are read as one, whatever their number."""
-    tables: list[RowSource] = []
-    recordings = []
-    for path in paths:
-        table = _table(path, choice.columns, stages)
-        if table is not None:
-            tables.append(table)
-        else:
-            recordings.append(open_recording(path))
-    if not recordings:
+    found = {path: _table(path, choice.columns, stages) for path in paths}
+    tables = [table for table in found.values() if table is not None]
+    if len(tables) == len(found):
         return tables
+    tables = [one for one in tables if not _is_trajectory(one, choice.columns, stages)]
+    read = {one.path for one in tables}
+    recordings = [open_recording(path) for path in paths if path not in read]
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
     return [*tables, *sources_of(recordings, choice, prefix, poses)]
 
@@ -55,6 +52,20 @@ def _table(path: Path, mapping: Mapping[str, str], stages: Sequence[str]) -> Row
     if TIME in found and len(found) > 1:
         return source
     return None if _is_stream(path) else source
+
+
+def _is_trajectory(table: RowSource, mapping: Mapping[str, str], stages: Sequence[str]) -> bool:
+    """Whether a table beside recordings is one more of them: places or attitudes and no more.
+
+    One with ranges, targets or a reference says by its columns' names which part it plays.
+    """
+    if mapping or table.path.suffix.lower() in TABLES:
+        return False
+    found = si_columns(table.header, mapping, known_names(stages))
+    parted = ("reference_", "target_", *(f"{stage}_" for stage in stages))
+    if any(name.startswith(parted) or name in RANGING for name in found):
+        return False
+    return _is_stream(table.path)
 
 
 def _reader_name(path: Path) -> str | None:

@@ -28,6 +28,7 @@ MOST_ROWS = 20_000
 MGA = 0x13  # of these the first byte of the payload belongs to the name
 FORMAT = "NMEA or u-blox log"
 HIGH = "NAV-HPPOSLLH"
+WHOLE, PARTS = "NAV-PVT", (HIGH, "NAV-POSLLH", "NAV-VELNED")
 
 
 @dataclass(slots=True)
@@ -85,7 +86,7 @@ class ReceiverRecording(BatchRecording):
         fixes = nmea.Fixes()
         count, total = FrameCount(), 0
         held: dict[str, _Rows] = {}
-        if wanted == "NAV-PVT" and self._high is None:
+        if wanted == WHOLE and self._high is None:
             self._high = self._high_precision()
         with self.path.open("rb") as file:
             for what, body in frames(file, count):
@@ -205,7 +206,7 @@ class ReceiverRecording(BatchRecording):
         if found is None:
             return {}
         columns = ubx.columns_of(name, found)
-        if name == "NAV-PVT" and self._high is not None:
+        if name == WHOLE and self._high is not None:
             self._join(columns, np.array(rows.stamps, dtype=np.int64))
         return columns
 
@@ -292,9 +293,12 @@ class ReceiverRecording(BatchRecording):
         if "position" in quantity:
             fine = "0.1 mm" if name == HIGH else "1e-7 deg (1.1 cm)"
             notes += (f"positions in steps of {fine}",)
-            if name == "NAV-PVT" and self._has_high():
+            if name == WHOLE and self._has_high():
                 notes += (f"joined with {HIGH} by iTOW: steps of 0.1 mm",)
         columns = tuple(ubx.columns_of(name, _empty(name))) if quantity else ()
+        if name in PARTS and WHOLE in self._known.values():
+            quantity = ()
+            notes += (f"what it measures is in {WHOLE} too, whose times are not rounded to 1 ms",)
         frame = "wgs84" if "position" in quantity else "ned" if quantity else "unknown"
         return Facts(
             quantity=quantity,

@@ -1,0 +1,136 @@
+"""One simulated flight in every flat format: what is read is what was flown, to the last digit.
+
+Then one hidden delay of the receiver, found from pairs of formats as from the package's own table.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from syncline_design.logs.readers import open_recording
+from syncline_design.logs.readers.epochs import WEEK_NS, gps_to_utc, week_start_ns
+from tests import flat_flight_logs as made
+from tests.flight_logs import TO_ENU, TO_FLU, Flight, flight, geodetic
+from tests.test_diagnose_recordings import FIXES, LATE_S, TRUTH, found, latency, table
+
+pytest.importorskip("pyubx2")
+
+FLOWN = flight(8.0)
+DEGREE_M = 111_320.0
+EXACT_NS, MICROSECOND, MILLISECOND = 0, 1_000, 1_000_000
+# writer, stream, error of a stamp [ns], of a place [m], of a velocity [m/s], of an attitude [deg]
+Writer = Callable[[Path, Flight], Path]
+FORMATS: dict[str, tuple[Writer, str, int, float, float, float]] = {
+    "nmea": (made.write_nmea, "fix", MICROSECOND, 2e-4, 1e-5, 0),
+    "ubx": (made.write_ubx, "NAV-PVT", 1, 2e-4, 6e-4, 0),
+    "ubx-coarse": (
+        lambda p, f: made.write_ubx(p, f, fine=False), "NAV-PVT", 1, 0.01, 6e-4, 0
+    ),
+    "pos": (made.write_pos, "flight", 0, 2e-4, 1e-5, 0),
+    "sbet": (made.write_sbet, "flight", 120, 1e-6, 1e-9, 1e-7),
+    "csv": (made.write_german_csv, "flight", 0, 2e-5, 1e-9, 1e-7),
+    "tum": (made.write_tum, "flight", 0, 1e-8, 0, 1e-6),
+    "euroc": (made.write_euroc, "flight", 0, 1e-8, 1e-8, 1e-6),
+    "dataflash": (
+        lambda p, f: made.write_dataflash(p, f, f), "GPS", MICROSECOND, 0.01, 1e-5, 0
+    ),
+}  # fmt: skip
+
+
+def read(path: Path, name: str) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+    """UTC stamps and columns of a stream."""
+    recording = open_recording(path)
+    (stream,) = [s for s in recording.streams() if s.name == name]
+    pieces = list(recording.samples(name))
+    columns = {key: np.concatenate([p.columns[key] for p in pieces]) for key in pieces[0].columns}
+    stamps = np.concatenate([p.primary_ns for p in pieces])
+    if stream.timeline == "boot":  # through the receiver's own time
+        apart = columns["clock_utc_ns"] - stamps
+        stamps = stamps + int(np.median(apart))
+    elif stream.timeline == "unknown":
+        week = (int(FLOWN.stamp_ns[0]) - week_start_ns(0)) // WEEK_NS
+        stamps = gps_to_utc(stamps + week_start_ns(int(week)))
+    elif stream.timeline == "gps":
+        stamps = gps_to_utc(stamps)
+    return stamps, columns
+
+
+def places(columns: dict[str, np.ndarray]) -> np.ndarray:
+    """Metres from the truth along north, east, up."""
+    if "position_x_m" in columns:
+        local = np.stack([columns[f"position_{a}_m"] for a in "xyz"], axis=1)
+        return local - TO_ENU.apply(FLOWN.place)
+    globe = geodetic(FLOWN.place)
+    height = columns.get("height_m", columns.get("height_msl_m", np.zeros(0)) + made.GEOID_M)
+    north = (columns["latitude_deg"] - globe[:, 0]) * DEGREE_M
+    east = (columns["longitude_deg"] - globe[:, 1]) * DEGREE_M * np.cos(np.radians(globe[:, 0]))
+    return np.stack([north, east, height - globe[:, 2]], axis=1)
+
+
+def turns(columns: dict[str, np.ndarray]) -> Rotation:
+    if "quaternion_w" in columns:
+        given = Rotation.from_quat(np.stack([columns[f"quaternion_{a}"] for a in "xyzw"], axis=1))
+        return TO_ENU.inv() * given * TO_FLU
+    unit = "deg" if "yaw_deg" in columns else "rad"
+    euler = np.stack([columns[f"{n}_{unit}"] for n in ("yaw", "pitch", "roll")], axis=1)
+    return Rotation.from_euler("ZYX", euler, degrees=unit == "deg")
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_what_is_read_is_what_was_flown(tmp_path: Path, name: str) -> None:
+    write, stream, near_ns, near_m, near_mps, near_deg = FORMATS[name]
+    path = write(tmp_path / f"flight.{name}", FLOWN)
+    stamps, columns = read(path, stream)
+    if stream == "GPS":  # milliseconds of the receiver set the boot clock against UTC
+        near_ns = MILLISECOND
+    assert np.max(np.abs(stamps - FLOWN.stamp_ns)) <= near_ns
+    assert np.max(np.abs(places(columns))) < near_m
+    if near_mps:
+        axes = ("north", "east") if name == "nmea" else ("north", "east", "down")
+        truth = FLOWN.velocity
+        if "velocity_x_mps" in columns:
+            axes, truth = ("x", "y", "z"), TO_ENU.apply(FLOWN.velocity)
+        velocity = np.stack([columns[f"velocity_{axis}_mps"] for axis in axes], axis=1)
+        assert np.max(np.abs(velocity - truth[:, : len(axes)])) < near_mps
+    if near_deg:
+        apart = np.degrees((turns(columns) * FLOWN.turn.inv()).magnitude())
+        assert np.max(apart) < near_deg
+
+
+PAIRS: dict[str, Callable[[Path], tuple[list[Path], str]]] = {
+    "nmea against sbet": lambda p: (
+        [made.write_nmea(p / "gnss.log", FIXES), made.write_sbet(p / "ref.out", TRUTH)], ""
+    ),
+    "ubx against csv": lambda p: (
+        [made.write_ubx(p / "gnss.ubx", FIXES), made.write_german_csv(p / "ref.csv", TRUTH)], ""
+    ),
+    "pos against tum": lambda p: (
+        [made.write_pos(p / "gnss.pos", FIXES), made.write_tum(p / "ref.txt", TRUTH)],
+        "{frame: enu, body: flu}",
+    ),
+    "dataflash": lambda p: ([made.write_dataflash(p / "flight.bin", TRUTH, FIXES)], ""),
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def oracle(tmp_path_factory: pytest.TempPathFactory) -> tuple[float, float]:
+    folder = tmp_path_factory.mktemp("oracle")
+    return latency(found(folder, table(folder / "oracle.csv", FIXES, TRUTH)))
+
+
+@pytest.mark.parametrize("name", PAIRS)
+def test_the_same_delay_is_found_from_every_pair(
+    tmp_path: Path, name: str, oracle: tuple[float, float]
+) -> None:
+    files, log = PAIRS[name](tmp_path)
+    result = found(tmp_path, *files, log=log)
+    value, sigma = latency(result)
+    assert abs(value - LATE_S) < 4.0 * sigma
+    # a log in 1e-7 deg, cm and 0.01 deg adds its own quantisation to both sides
+    assert abs(value - oracle[0]) < (1.5 if name == "dataflash" else 0.6) * oracle[1]
+    assert [f.effect for f in result.findings if f.kind == "cause"] == ["latency"]
