@@ -20,12 +20,12 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, load
 
 if TYPE_CHECKING:
-    from syncline_design.acceptance.accept import AcceptSettings
-    from syncline_design.acceptance.result import Acceptance
     from syncline_design.auditing.result import Audit
     from syncline_design.choice.options import ResourceName
     from syncline_design.choice.outcome import Road
     from syncline_design.clocks.study import TimingSettings
+    from syncline_design.comparison.accept import AcceptSettings
+    from syncline_design.comparison.acceptance import Acceptance
     from syncline_design.comparison.clock_meaning import TimingAndSpec
     from syncline_design.comparison.difference import Difference
     from syncline_design.comparison.meaning import DiagnosisAndDesign
@@ -230,9 +230,9 @@ def accept(
 ) -> Acceptance:  # fmt: skip
     """Whether logs of the built system bear out what the verdict on a spec rests on.
 
-    settings: `syncline_design.acceptance.accept.AcceptSettings`.
+    settings: `syncline_design.comparison.accept.AcceptSettings`.
     """
-    from syncline_design.acceptance import accept as acceptance
+    from syncline_design.comparison import accept as acceptance
 
     files, seed = _files(logs), _seed(seed)
     with _limited(time_limit_s):

@@ -9,16 +9,17 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import jsonschema
+import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from syncline_design.acceptance import accept as acceptance
-from syncline_design.acceptance.accept import AcceptSettings, accept
-from syncline_design.acceptance.assumptions import Assumed, assumptions
-from syncline_design.acceptance.by_log import by_log
-from syncline_design.acceptance.judgement import Judgement, together
-from syncline_design.acceptance.result import NAMES, Acceptance, AssumptionResult
 from syncline_design.cli.app import app
+from syncline_design.comparison import accept as acceptance
+from syncline_design.comparison.accept import AcceptSettings, accept
+from syncline_design.comparison.acceptance import NAMES, Acceptance, AssumptionResult
+from syncline_design.comparison.assumptions import Assumed, assumptions
+from syncline_design.comparison.by_log import by_log
+from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.diagnosis.result import BlindSpot, Diagnosis, Informative, Rival
 from syncline_design.diagnosis.run import diagnose
 from syncline_design.effects import registry
@@ -227,6 +228,31 @@ def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
     statuses = {row["role"]: row["status"] for row in json.loads(done.stdout)["assumptions"]}
     assert statuses == {"position": "holds", "attitude": "not_shown", "ranging": "not_shown"}
     assert done.exit_code == 3
+
+
+def stamped(path: Path, fault_s: float) -> Path:
+    """Ten minutes at 10 Hz, received with gamma delays of 0.1 ms; the second half moved."""
+    rng = np.random.default_rng(7)
+    true_s = 1.7e9 + 0.1 * np.arange(6000)
+    stamp_s = true_s + np.where(np.arange(6000) < 3000, 0.0, fault_s)
+    receive_s = true_s + 1e-4 * rng.gamma(2.0, size=6000)
+    rows = (f"{a:.9f},{b:.9f}" for a, b in zip(stamp_s, receive_s, strict=True))
+    path.write_text("\n".join(["stamp_s,receive_s", *rows]) + "\n", "utf-8")
+    return path
+
+
+@pytest.mark.parametrize(("fault_s", "status"), [(0.0, "holds"), (1.0, "broken")])
+def test_stamps_and_receipts_of_one_sensor(clocked: Path, fault_s: float, status: str) -> None:
+    """Delays of 0.1 ms scatter by less than the 2 ms assumed; a slip of a second is a fault."""
+    log = stamped(clocked.parent / "uav_position.csv", fault_s)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    result = json.loads(done.stdout)
+    rows = {row["role"]: row for row in result["assumptions"]}
+    assert rows["position"]["status"] == status, rows["position"]
+    assert ("slip" in rows["position"]["evidence"]) == (status == "broken")
+    assert rows["attitude"]["status"] == "not_shown"
+    assert [one["read_as"] for one in result["evidence"]] == ["stamps"]
+    assert done.exit_code == {"holds": 3, "broken": 1}[status]
 
 
 def test_what_cannot_be_asked_is_refused(clocked: Path, tmp_path: Path) -> None:

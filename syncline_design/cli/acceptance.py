@@ -24,7 +24,7 @@ from syncline_design.cli.shared import (
 _ASSIGNED = "expected OF=LOG, such as uav=tracking.log"
 
 if TYPE_CHECKING:
-    from syncline_design.acceptance.result import AssumptionName
+    from syncline_design.comparison.acceptance import AssumptionName
 
 
 @guarded
@@ -52,8 +52,8 @@ def accept(
 ) -> int:
     """Hold logs of the built system against everything that its verdict rests on."""
     deadline = deadline_of(time_limit)
-    from syncline_design.acceptance.accept import AcceptSettings
-    from syncline_design.acceptance.accept import accept as accept_logs
+    from syncline_design.comparison.accept import AcceptSettings
+    from syncline_design.comparison.accept import accept as accept_logs
     from syncline_design.report.on_acceptance import (
         ACCEPT_FORMATS,
         on_acceptance,
@@ -84,7 +84,7 @@ def _assigned(texts: list[str]) -> dict[str, tuple[Path, ...]]:
 
 
 def _asked(only: str | None) -> tuple[AssumptionName, ...]:
-    from syncline_design.acceptance.result import NAMES
+    from syncline_design.comparison.acceptance import NAMES
 
     if only is None:
         return NAMES

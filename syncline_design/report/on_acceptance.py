@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Final
 
-from syncline_design.acceptance.result import Acceptance, AssumptionResult, MeasuredFigure, Status
+from syncline_design.comparison.acceptance import (
+    Acceptance,
+    AssumptionResult,
+    MeasuredFigure,
+    Status,
+)
 from syncline_design.report import numbers
 from syncline_design.report.ci import Level, Notice
 from syncline_design.report.document import (

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Final, get_args
 
-from syncline_design.acceptance import result as acceptance
 from syncline_design.auditing import result as auditing
 from syncline_design.clocks import result as clocks
-from syncline_design.comparison import clock_meaning, difference, meaning
+from syncline_design.comparison import acceptance, clock_meaning, difference, meaning
 from syncline_design.diagnosis import result as diagnosis
 from syncline_design.machine.records import schema_of
 from syncline_design.paper import reproduce

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
-from syncline_design.acceptance.assumptions import Assumed
-from syncline_design.acceptance.judgement import Judgement
-from syncline_design.acceptance.result import MeasuredFigure, Status
+from syncline_design.comparison.acceptance import MeasuredFigure, Status
+from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.judgement import Judgement
 from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding
 from syncline_design.effects import registry
 from syncline_design.machine.sentences import sentence_list

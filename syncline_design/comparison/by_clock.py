@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from syncline_design.acceptance.assumptions import Assumed
-from syncline_design.acceptance.judgement import Judgement
-from syncline_design.acceptance.result import MeasuredFigure, Status
 from syncline_design.clocks.study import TimingStudy
+from syncline_design.comparison.acceptance import MeasuredFigure, Status
+from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.judgement import Judgement
 from syncline_design.model.quantity import format_duration
 
 

@@ -2,35 +2,35 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
 from syncline_design import __version__
-from syncline_design.acceptance.assumptions import Assumed, assumptions
-from syncline_design.acceptance.by_clock import by_clock
-from syncline_design.acceptance.by_log import by_log
-from syncline_design.acceptance.judgement import Judgement, together
-from syncline_design.acceptance.result import (
+from syncline_design.auditing.result import Audit
+from syncline_design.auditing.run import audit
+from syncline_design.clocks.study import TimingSettings, TimingStudy, study_logs
+from syncline_design.comparison.acceptance import (
     NAMES,
     Acceptance,
     AcceptedSpec,
     AssumptionName,
     AssumptionResult,
-    EvidenceFile,
     worst,
 )
-from syncline_design.clocks.reading import is_clock_log
-from syncline_design.clocks.study import TimingSettings, TimingStudy, study_logs
+from syncline_design.comparison.assumptions import Assumed, assumptions
+from syncline_design.comparison.by_clock import by_clock
+from syncline_design.comparison.by_log import by_log
+from syncline_design.comparison.by_stamps import by_stamps
+from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_files
+from syncline_design.comparison.judgement import Judgement, together
+from syncline_design.comparison.stamp_meaning import held_against
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import diagnose
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case
-from syncline_design.spec.load import BadInput
-from syncline_design.spec.yaml_text import Flaw
 from syncline_design.verdict.optimise import as_measured
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
@@ -52,9 +52,10 @@ class AcceptSettings:
 
 @dataclass(frozen=True, slots=True)
 class _Evidence:
-    """Studies of clocks by what they tell of, and the diagnosis of the measured log."""
+    """Studies of clocks by what they tell of, the audit of stamps, the measured log's diagnosis."""
 
     clocks: Mapping[str, TimingStudy]
+    stamps: Audit | None
     log: Diagnosis | None
 
 
@@ -68,9 +69,9 @@ def accept(
     settings = settings or AcceptSettings()
     in_force().doing("checking the spec")
     verdict = check_loaded(case, CheckSettings(seed=seed))
-    of_clocks, of_places = _sorted_logs(case, logs, settings)
+    files = evidence_files(case, logs, settings.assigned)
     rests_on = [one for one in assumptions(case, verdict) if one.name in settings.asked]
-    evidence = _evidence(case, of_clocks, of_places, settings, seed)
+    evidence = _evidence(case, files, settings, seed)
     rows = tuple(_row(case, one, evidence, rests_on) for one in rests_on)
     sound = verdict.verdict == "meets"
     return Acceptance(
@@ -78,66 +79,31 @@ def accept(
         spec=AcceptedSpec(verdict.name, verdict.file, verdict.verdict),
         asked=settings.asked,
         assumptions=rows,
-        evidence=tuple(_files(of_clocks, of_places)),
+        evidence=tuple(files.records),
         notes=tuple(_notes(verdict, evidence)),
         version=__version__,
         seed=seed,
     )
 
 
-def _sorted_logs(
-    case: Case, logs: Sequence[Path], settings: AcceptSettings
-) -> tuple[dict[str, list[Path]], list[Path]]:
-    """(clock logs by what they tell of, logs of places)."""
-    of_clocks = {name: list(paths) for name, paths in settings.assigned.items()}
-    _demand_places(case, of_clocks)
-    plain = [path for path in logs if is_clock_log(path)]
-    if plain:
-        of_clocks.setdefault(_only_vehicle(case, plain[0]), []).extend(plain)
-    return of_clocks, [path for path in logs if path not in plain]
+def _evidence(case: Case, files: EvidenceFiles, settings: AcceptSettings, seed: int) -> _Evidence:
+    studies = {name: study_logs(paths, settings.timing) for name, paths in files.clocks.items()}
+    audited = None
+    if files.stamps and "timing" in settings.asked:
+        audited = held_against(audit(files.stamps), case, seed)
+    return _Evidence(studies, audited, _diagnosed(case, files, settings, seed))
 
 
-def _vehicles(case: Case) -> list[str]:
-    return list(dict.fromkeys(stage.choice.vehicle_name for stage in case.stages))
-
-
-def _sensors(case: Case) -> list[str]:
-    return [f"{stage.choice.name}/{role.role}" for stage in case.stages for role in stage.roles]
-
-
-def _demand_places(case: Case, assigned: Mapping[str, Sequence[Path]]) -> None:
-    known = [*_vehicles(case), *_sensors(case)]
-    wrong = next((name for name in assigned if name not in known), None)
-    if wrong is not None:
-        expected = "a vehicle or STAGE/ROLE: " + ", ".join(known)
-        raise BadInput((Flaw(str(case.path), 0, 0, "", f"--assign {wrong}: not in the spec",
-                             expected, repr(wrong), ""),))  # fmt: skip
-
-
-def _only_vehicle(case: Case, log: Path) -> str:
-    """Whose clock an unassigned clock log tells of."""
-    clocked = [name for name in _vehicles(case) if case.clocks(name)]
-    known = clocked or _vehicles(case)
-    if len(known) > 1:
-        raise BadInput((Flaw(str(log), 0, 0, "", "a clock log, and the spec has several vehicles",
-                             "--assign VEHICLE=LOG for each", ", ".join(known), ""),))  # fmt: skip
-    return known[0]
-
-
-def _evidence(
-    case: Case,
-    of_clocks: Mapping[str, list[Path]],
-    of_places: list[Path],
-    settings: AcceptSettings,
-    seed: int,
-) -> _Evidence:
-    studies = {name: study_logs(paths, settings.timing) for name, paths in of_clocks.items()}
-    wanted = any(name not in CLOCKS for name in settings.asked) or not studies
-    found = None
-    if of_places or (wanted and case.spec.log is not None and case.spec.log.files):
-        found = diagnose(as_measured(case, seed), of_places,
-                         DiagnosisSettings(seed=seed))  # fmt: skip
-    return _Evidence(studies, found)
+def _diagnosed(
+    case: Case, files: EvidenceFiles, settings: AcceptSettings, seed: int
+) -> Diagnosis | None:
+    """Of the measured logs given, or of those that the spec names where they are asked for."""
+    wanted = any(name not in CLOCKS for name in settings.asked)
+    places = [path for path in files.places if wanted or path not in files.stamps]
+    named = case.spec.log is not None and bool(case.spec.log.files)
+    if not places and not (wanted and named):
+        return None
+    return diagnose(as_measured(case, seed), places, DiagnosisSettings(seed=seed))
 
 
 def _row(
@@ -156,25 +122,12 @@ def _said(
         yield by_clock(one, evidence.clocks[vehicle])
     if one.name == "timing" and f"{one.stage}/{one.role}" in evidence.clocks:
         yield by_clock(one, evidence.clocks[f"{one.stage}/{one.role}"])
+    stamped = None if evidence.stamps is None else by_stamps(one, evidence.stamps)
+    if one.name == "timing" and stamped is not None:
+        yield stamped
     if evidence.log is not None:
         clocked = any(a.name == "clock" and vehicles[a.stage] == vehicle for a in rests_on)
         yield by_log(one, evidence.log, last_stage=case.stages[-1].choice.name, has_clock=clocked)
-
-
-def _files(of_clocks: Mapping[str, list[Path]], of_places: list[Path]) -> Iterator[EvidenceFile]:
-    for name, paths in of_clocks.items():
-        for path in paths:
-            yield EvidenceFile(str(path), "clock", name, _digest(path))
-    for path in of_places:
-        yield EvidenceFile(str(path), "log", "", _digest(path))
-
-
-def _digest(path: Path) -> str:
-    """SHA-256 of a file; of a folder none."""
-    if not path.is_file():
-        return ""
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _notes(verdict: Verdict, evidence: _Evidence) -> Iterator[str]:
@@ -182,6 +135,8 @@ def _notes(verdict: Verdict, evidence: _Evidence) -> Iterator[str]:
         yield f"on paper the spec's verdict is {verdict.verdict}: there is nothing to accept"
     for name, study in evidence.clocks.items():
         yield from (f"clock of {name}: {note}" for note in study.timing.notes)
+    if evidence.stamps is not None:
+        yield from evidence.stamps.notes
     if evidence.log is not None:
         yield from evidence.log.log.notes
         yield from (c.message for c in evidence.log.checks)

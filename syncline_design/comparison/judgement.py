@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from syncline_design.acceptance.assumptions import Assumed
-from syncline_design.acceptance.result import AssumptionResult, MeasuredFigure, Status, worst
+from syncline_design.comparison.acceptance import AssumptionResult, MeasuredFigure, Status, worst
+from syncline_design.comparison.assumptions import Assumed
 from syncline_design.spec.case import Case
 
 

@@ -17,7 +17,7 @@ NAMES: Final[tuple[AssumptionName, ...]] = (
     "timing", "latency", "lever_arm", "mounting", "noise", "clock", "speed", "rate",
 )  # fmt: skip
 EXIT_CODES: Final[Mapping[Status, int]] = {"holds": 0, "broken": 1, "not_shown": 3}
-ReadAs = Literal["clock", "log"]
+ReadAs = Literal["clock", "stamps", "log"]
 
 
 @dataclass(frozen=True, slots=True)

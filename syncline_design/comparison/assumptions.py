@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Final
 
-from syncline_design.acceptance.result import AssumptionName
+from syncline_design.comparison.acceptance import AssumptionName
+from syncline_design.comparison.stamp_meaning import ARRIVAL
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.verdict.named import NamedDesign, NamedRole
@@ -25,13 +26,17 @@ KeyPath = tuple[str | int, ...]
 
 @dataclass(frozen=True, slots=True)
 class Assumed:
-    """One assumption: where, what, its figure (SI), and the key of the spec that says it."""
+    """One assumption: where, what, its figure (SI), and the key of the spec that says it.
+
+    on_arrival: of a timing, whether the design itself stamps on arrival.
+    """
 
     stage: str
     role: str
     name: AssumptionName
     value: float | None
     key: KeyPath
+    on_arrival: bool = False
 
     @property
     def unit(self) -> str:
@@ -55,7 +60,8 @@ def assumptions(case: Case, verdict: Verdict) -> tuple[Assumed, ...]:
 
 def _of_sensor(stage: StageCase, role: RoleName, named: NamedRole) -> Iterator[Assumed]:
     name, key = stage.choice.name, ("stages", stage.index, role)
-    yield Assumed(name, role, "timing", named.tau_s, (*key, "timestamping"))
+    on_arrival = named.primitive == ARRIVAL
+    yield Assumed(name, role, "timing", named.tau_s, (*key, "timestamping"), on_arrival)
     yield Assumed(name, role, "latency", 0.0, (*key, "timestamping"))
     for one in _MOUNTED[role]:
         yield Assumed(name, role, one, 0.0, (*key, "lever_arm") if one == "lever_arm" else key)
