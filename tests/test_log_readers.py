@@ -48,7 +48,7 @@ def test_a_missing_library_is_one_clear_line(tmp_path: Path) -> None:
         library("no_such_library.part", tmp_path / "a.bag", "ROS 1 bag")
     (flaw,) = caught.value.problems
     assert flaw.message == "reading a ROS 1 bag needs the library no-such-library"
-    assert "pip install 'syncline-design[logs]'" in flaw.hint
+    assert "pip install no-such-library (all formats: the extra `logs`)" in flaw.hint
 
 
 def test_every_reader_says_what_it_reads() -> None:

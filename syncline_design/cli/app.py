@@ -13,7 +13,7 @@ import typer
 from typer.core import TyperGroup
 
 from syncline_design import __version__
-from syncline_design.cli import acceptance, clocks, design, evidence, library, stamps
+from syncline_design.cli import acceptance, clocks, design, evidence, library, logs, stamps
 from syncline_design.cli.shared import NO_VERDICT
 from syncline_design.machine.processes import forget_working_folder
 from syncline_design.machine.streams import say, secure_streams
@@ -42,6 +42,8 @@ catalog = typer.Typer(
     help="Look into the built-in catalogs, check and grow your own.", no_args_is_help=True
 )
 app.add_typer(catalog, name="catalog")
+log = typer.Typer(help="Look into logs of every kind.", no_args_is_help=True)
+app.add_typer(log, name="log")
 
 app.command("check")(design.check)
 app.command("optimize")(design.optimize)
@@ -57,6 +59,7 @@ catalog.command("list")(library.catalog_list)
 catalog.command("show")(library.catalog_show)
 catalog.command("check")(library.catalog_check)
 catalog.command("add")(library.catalog_add)
+log.command("inspect")(logs.inspect)
 app.command("schema")(library.schema)
 app.command("init")(library.init)
 

@@ -58,6 +58,7 @@ DiagnoseOutput = Annotated[list[str] | None, output_option(formats.DIAGNOSE_FORM
 StudyOutput = Annotated[list[str] | None, output_option(formats.STUDY_FORMATS)]
 DiffOutput = Annotated[list[str] | None, output_option(formats.DIFF_FORMATS)]
 AcceptOutput = Annotated[list[str] | None, output_option(formats.ACCEPT_FORMATS)]
+LogOutput = Annotated[list[str] | None, output_option(formats.LOG_FORMATS)]
 AuditOutput = Annotated[list[str] | None, output_option(formats.AUDIT_FORMATS)]
 TimingOutput = Annotated[list[str] | None, output_option(formats.TIMING_FORMATS)]
 ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FORMATS)]

@@ -26,6 +26,10 @@ CLEARLY: Final = 15.0  # and by this many times what noise alone would do for ea
 WIDTHS: Final = (0, 1, 4)  # figures beside turn and shift: none, the delay, the lever too
 
 
+class StillError(Exception):
+    """The motion does not tell how two frames stand to each other; says why."""
+
+
 @dataclass(frozen=True, slots=True)
 class Laid:
     """How one trajectory came onto the other: x -> turn x + shift."""
@@ -56,7 +60,7 @@ class Track:
 def laid(moved: Track, onto: Array, any_turn: bool) -> Laid | None:
     """The turn and shift that bring the first places onto the second (n, 3), pair by pair.
 
-    None where the places are too few or too near each other to tell, or already in one frame.
+    None where they are in one frame already; StillError where the motion cannot tell the turn.
     Begun by Kabsch's solution (Umeyama, IEEE PAMI 13 (1991), without scale); then Gauss-Newton of
     onto = turn (place - delay velocity + body lever) + shift, with Huber's weights.
     """
@@ -66,12 +70,14 @@ def laid(moved: Track, onto: Array, any_turn: bool) -> Laid | None:
         known &= np.isfinite(moved.body).all(axis=(1, 2))
     b = onto[known]
     if b.shape[0] < LEAST_POINTS:
-        return None
+        raise StillError(f"only {b.shape[0]} common positions")
     body = None if moved.body is None else moved.body[known]
     own = Track(moved.place[known], moved.velocity[known], body)
     extent = _rms(b - b.mean(axis=0))
-    if extent < LEAST_EXTENT_M or _rms(own.place - b) < ONE_FRAME * extent:
+    if _rms(own.place - b) < max(ONE_FRAME * extent, ONE_FRAME * LEAST_EXTENT_M):
         return None
+    if extent < LEAST_EXTENT_M:
+        raise StillError(f"the positions extend over {extent:.2g} m")
     begun = _kabsch(own.place, b, any_turn)
     best = _fitted(own, b, begun, any_turn, WIDTHS[0])
     for width in WIDTHS[1:]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from syncline_design.logs.columns import RANGING, TIME, known_names, si_columns
 from syncline_design.logs.readers import open_recording, reader_of
 from syncline_design.logs.readers.reader import head_of
+from syncline_design.logs.roles import offers_of
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
 from syncline_design.logs.stream_sources import sources_of
 from syncline_design.spec.load import BadInput
@@ -29,7 +30,7 @@ def row_sources(
     read = {one.path for one in tables}
     recordings = [open_recording(path) for path in paths if path not in read]
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
-    return [*tables, *sources_of(recordings, choice, prefix, poses)]
+    return [*tables, *sources_of(offers_of(recordings), choice, prefix, poses)]
 
 
 def _table(path: Path, mapping: Mapping[str, str], stages: Sequence[str]) -> RowSource | None:

@@ -131,7 +131,9 @@ def _position(
     best = max(there, key=_measured_first)
     if best.stream.frame == "wgs84" and best.stream.nature in ("measured", "unknown"):
         return Part("position", best, "high", "a receiver's own positions (WGS 84)")
-    return Part("position", best, "low", "the only positions that are left, none of a receiver")
+    return Part(
+        "position", best, "low", "the only positions that are left, no receiver's own fixes"
+    )
 
 
 def _measured_first(offer: Offer) -> tuple[int, int, int, int]:
@@ -157,13 +159,32 @@ def _reference(
         return Part("reference", best, "medium", "of several files the last is the reference")
     if not there:
         return None
-    best = max(there, key=_reference_rank)
+    globe = tested.stream.frame == "wgs84"
+    best = max(
+        there,
+        key=lambda o: (
+            not _same_kind(o, tested),
+            *_reference_rank(o)[:2],
+            globe and o.stream.frame == "wgs84",
+            o.stream.messages,
+        ),
+    )
+    if _same_kind(best, tested):
+        return Part("reference", best, "low", "a receiver's positions too, maybe of the same one: "
+                    "what both share cannot show")  # fmt: skip
     if best.stream.nature == "truth":
         return Part("reference", best, "high", "the simulation's truth")
     if best.stream.nature == "fused":
         return Part("reference", best, "low", "estimated with the tested positions themselves: no "
                     "independent reference, but delays against other sensors show")  # fmt: skip
     return Part("reference", best, "medium", "positions of another system in the same file")
+
+
+def _same_kind(one: Offer, tested: Offer) -> bool:
+    """Whether both are plain fixes of a receiver in one file: often of one and the same."""
+    plain = [o.stream.frame == "wgs84" and not o.stream.has_attitude
+             and o.stream.nature in ("measured", "unknown") for o in (one, tested)]  # fmt: skip
+    return all(plain)
 
 
 def _reference_rank(offer: Offer) -> tuple[int, int, int]:

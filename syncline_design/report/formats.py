@@ -15,6 +15,7 @@ DIFF_FORMATS: Final = ("json", "html", "markdown", "github")
 REPRODUCE_FORMATS: Final = ("json", "html")
 TIMING_FORMATS: Final = ("json", "html", "markdown")
 ACCEPT_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown")
+LOG_FORMATS: Final = ("json", "html", "markdown")
 AUDIT_FORMATS: Final = ("json", "html", "markdown")
 CATALOG_FORMATS: Final = ("json",)
 
@@ -31,6 +32,7 @@ ResultName = Literal[
     "catalog-list",
     "diagnosis",
     "difference",
+    "log",
     "optimisation",
     "reproduction",
     "simulation",

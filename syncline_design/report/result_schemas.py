@@ -9,6 +9,7 @@ from syncline_design.auditing import result as auditing
 from syncline_design.clocks import result as clocks
 from syncline_design.comparison import acceptance, clock_meaning, difference, meaning
 from syncline_design.diagnosis import result as diagnosis
+from syncline_design.logs import inspection
 from syncline_design.machine.records import schema_of
 from syncline_design.paper import reproduce
 from syncline_design.report import catalogs
@@ -28,6 +29,7 @@ RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "catalog-list": (catalogs.CatalogList, catalogs.LIST_SCHEMA),
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
+    "log": (inspection.LogInspection, inspection.SCHEMA),
     "optimisation": (optimise.Optimisation, optimise.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),

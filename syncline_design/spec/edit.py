@@ -108,6 +108,13 @@ def with_effects_text(case: Case, effects: Sequence[EffectChoice]) -> str:
     return _changed(case, [((), {"effects": entries})], "with effects that `diagnose` found")
 
 
+def with_log_text(case: Case, log: Mapping[str, Any]) -> str:
+    """The spec with a mapping of streams in its `log:`, beside what stands there already."""
+    data = parse(case.text, str(case.path)).data
+    whole = {**data.get("log", {}), **log}
+    return _changed(case, [((), {"log": whole})], "with the mapping that `log inspect` proposes")
+
+
 def effect_entry(effect: EffectChoice) -> dict[str, Any]:
     """One effect as plain data of a spec: bare SI figures, as the parameter names say."""
     entry: dict[str, Any] = {"effect": effect.effect, "sensor": effect.sensor}

@@ -68,5 +68,5 @@ def library(name: str, path: Path, format: str) -> Any:  # noqa: A002
         raise refuse(
             path,
             f"reading a {format} needs the library {own}",
-            hint=f"python -m pip install 'syncline-design[{EXTRA}]'",
+            hint=f"python -m pip install {own} (all formats: the extra `{EXTRA}`)",
         ) from None

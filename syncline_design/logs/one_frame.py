@@ -1,0 +1,220 @@
+"""Streams in one local frame and above one datum, whatever each of them is about."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Final
+
+import numpy as np
+
+from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
+from syncline_design.effects.record import Array
+from syncline_design.logs.columns import ATTITUDE, POSITION, VELOCITY
+from syncline_design.logs.frame_fit import Laid, StillError, Track, laid, mean_turn
+from syncline_design.logs.places import geodetic_to_ned
+from syncline_design.logs.readers.stream import UNSET, Nanoseconds
+from syncline_design.logs.refusals import refuse
+from syncline_design.logs.roles import Part, Role
+from syncline_design.logs.smoothing import velocity_of
+from syncline_design.logs.stream_values import GLOBE, Values, height_of, separation_of
+from syncline_design.spec.log_block import LogChoice
+
+WORTH_SAYING_RAD: Final = 1e-4
+TILTED: Final = 0.3  # what a turn about any axis has to leave of the rest, where down is not told
+
+
+def on_one_datum(
+    several: Sequence[Values], parts: Mapping[Role, Part], values: Mapping[int, Values]
+) -> None:
+    """Heights of all places above the ellipsoid; left out where one is above sea level only."""
+    separation = separation_of(several)
+    roles: tuple[Role, ...] = ("position", "reference")
+    placed = [values[id(parts[r].offer)] for r in roles if r in parts]
+    told = {}
+    for one in placed:
+        told[id(one)] = height_of(one, separation) if one.has(GLOBE) else None
+        if one.origin is not None:
+            known = separation is not None
+            one.origin = one.origin + np.array([0.0, 0.0, separation or 0.0])
+            told[id(one)] = known
+            above = f"plus {separation:.2f} m" if known else "as it is, though above sea level"
+            one.note(f"the height of its origin was taken {above}")
+    if True in told.values() and False in told.values():
+        for one in placed:
+            if told[id(one)] is False:
+                one.columns.pop("height_m", None)
+                one.columns.pop(POSITION[2], None)
+                one.note("its height is above sea level, the other's above the ellipsoid: not used")
+
+
+def in_one_frame(
+    parts: Mapping[Role, Part], values: Mapping[int, Values], choice: LogChoice, pair: bool
+) -> None:
+    """Tested and reference in one local frame, where a stated origin does not see to it."""
+    tested = values[id(parts["position"].offer)]
+    reference = values[id(parts["reference"].offer)]
+    for one, other in ((tested, reference), (reference, tested)):
+        if one.has(GLOBE) and not other.has(GLOBE):
+            if other.origin is not None:
+                _about(one, other.origin, f"the origin of {other.offer.name}")
+                return
+            if choice.origin is not None:
+                return  # `places` makes it local there
+            first = _first_place(one)
+            _about(one, first, "its own first fix")
+    if tested.has(POSITION[:2]) and reference.has(POSITION[:2]) and choice.origin is None:
+        _lay(reference, tested, pair)
+
+
+def _first_place(one: Values) -> Array:
+    place = np.stack([one.columns[n] for n in GLOBE], axis=1)
+    heights = one.columns.get("height_m", np.zeros(place.shape[0]))
+    whole = np.column_stack([place, heights])
+    known = np.flatnonzero(np.isfinite(whole).all(axis=1))
+    if not known.shape[0]:
+        raise refuse(one.offer.path, f"{one.offer.name} holds no position")
+    first: Array = whole[known[0]]
+    return first
+
+
+def _about(one: Values, origin: Array, where: str) -> None:
+    """Places in WGS 84 to north, east, down about an origin."""
+    heights = one.columns.pop("height_m", None)
+    place = np.column_stack(
+        [one.columns.pop(GLOBE[0]), one.columns.pop(GLOBE[1]),
+         np.full(one.time_ns.shape, origin[2]) if heights is None else heights]
+    )  # fmt: skip
+    local = geodetic_to_ned(place, origin)
+    one.put(POSITION, local)
+    if heights is None:
+        del one.columns[POSITION[2]]
+    at = f"{np.degrees(origin[0]):.7f} deg, {np.degrees(origin[1]):.7f} deg, {origin[2]:.3f} m"
+    one.note(f"WGS 84 positions were made north, east, down about {where}, {at}")
+
+
+def _lay(reference: Values, tested: Values, pair: bool) -> None:
+    """The reference's frame onto the tested one's, where they are not the same already."""
+    flat = _drop_idle_down(reference, tested)
+    track = _track(reference, tested.time_ns)
+    onto = tested.vectors(POSITION) if not flat else flattened(tested)
+    free = reference.assumed or tested.assumed
+    try:
+        fit = laid(track, onto, any_turn=False)
+        freely = laid(track, onto, any_turn=True) if fit is not None and free and not flat else None
+    except StillError as still:
+        raise refuse(
+            reference.offer.path,
+            f"nothing relates the frame of {reference.offer.name} to that of {tested.offer.name}, "
+            f"and the log cannot: {still}",
+            expected="a log that moves, or frames that are known",
+            hint="state the origin: log: {origin: [47.3 deg, 8.55 deg, 460 m]}",
+        ) from None
+    if fit is not None and freely is not None and freely.rms_m < TILTED * fit.rms_m:
+        fit = freely
+    if fit is not None:
+        _move(reference, fit)
+        _say_laid(reference, tested, fit)
+    if pair and (reference.assumed or tested.assumed or fit is not None):
+        _lay_bodies(reference, tested)
+
+
+def _drop_idle_down(reference: Values, tested: Values) -> bool:
+    """A reference that only ever says one height tells none."""
+    down = reference.columns.get(POSITION[2])
+    idle = down is None or float(np.nanmax(down) - np.nanmin(down)) == 0.0
+    if idle and down is not None:
+        del reference.columns[POSITION[2]]
+        reference.columns.pop(VELOCITY[2], None)
+        tested.columns.pop(POSITION[2], None)
+        reference.note("its height never changes: down is not compared, and its motion is level")
+    return idle or POSITION[2] not in tested.columns
+
+
+def flattened(one: Values) -> Array:
+    zero = np.zeros(one.time_ns.shape)
+    return np.stack([one.columns[n] for n in POSITION[:2]] + [zero], axis=1)
+
+
+def _track(one: Values, stamps: Nanoseconds) -> Track:
+    """Its places, velocities and body axes at other stamps; NaN outside its own."""
+    order = np.argsort(one.time_ns, kind="stable")
+    base = int(one.time_ns[order[0]])
+    own, at = (one.time_ns[order] - base) / 1e9, (stamps - base) / 1e9
+    zero = np.zeros(own.shape)
+    places = np.stack([one.columns.get(n, zero)[order] for n in POSITION], axis=1)
+    speeds = slope_of(own, places)
+
+    def between(vectors: Array) -> Array:
+        parts = [np.interp(at, own, column, np.nan, np.nan) for column in vectors.T]
+        return np.stack(parts, axis=1)
+
+    body = None
+    if one.has(ATTITUDE):
+        nearest = order[np.clip(np.searchsorted(own, at), 0, own.shape[0] - 1)]
+        body = euler_to_rotation(one.vectors(ATTITUDE)[nearest])
+    return Track(between(places), between(speeds), body)
+
+
+def _move(one: Values, fit: Laid) -> None:
+    down = POSITION[2] in one.columns
+    places = one.vectors(POSITION) if down else flattened(one)
+    one.put(POSITION, places @ fit.turn.T + fit.shift_m)
+    if not down:
+        del one.columns[POSITION[2]]
+    if one.has(VELOCITY[:2]):
+        level = np.zeros(one.time_ns.shape)
+        moved = np.stack([one.columns.get(n, level) for n in VELOCITY], axis=1) @ fit.turn.T
+        one.columns |= {n: moved[:, k] for k, n in enumerate(VELOCITY) if n in one.columns}
+    if one.has(ATTITUDE):
+        turned = fit.turn @ euler_to_rotation(one.vectors(ATTITUDE))
+        one.put(ATTITUDE, rotation_to_euler(turned))
+
+
+def _say_laid(reference: Values, tested: Values, fit: Laid) -> None:
+    turn = f"{np.degrees(fit.heading_rad):.3f} deg about down"
+    if fit.tilt_rad > WORTH_SAYING_RAD:
+        turn += f" and {np.degrees(fit.tilt_rad):.3f} deg of tilt"
+    reference.note(
+        f"nothing relates its frame to that of {tested.offer.name}: it was turned by {turn} and "
+        f"shifted by {np.linalg.norm(fit.shift_m):.3f} m onto it (left: {fit.rms_m:.3f} m RMS over "
+        f"{fit.extent_m:.1f} m); a constant shift or turn between the two cannot be found"
+    )
+
+
+def _lay_bodies(reference: Values, tested: Values) -> None:
+    """A constant turn between the bodies, where their axes are not told."""
+    order = np.argsort(reference.time_ns, kind="stable")
+    own = reference.time_ns[order]
+    nearest = order[np.clip(np.searchsorted(own, tested.time_ns), 0, own.shape[0] - 1)]
+    inside = (tested.time_ns >= own[0]) & (tested.time_ns <= own[-1])
+    a = euler_to_rotation(reference.vectors(ATTITUDE)[nearest[inside]])
+    b = euler_to_rotation(tested.vectors(ATTITUDE)[inside])
+    between = np.swapaxes(a, 1, 2) @ b
+    known = np.isfinite(between).all(axis=(1, 2))
+    if not np.any(known):
+        return
+    turn = mean_turn(between[known])
+    whole = euler_to_rotation(reference.vectors(ATTITUDE)) @ turn
+    reference.put(ATTITUDE, rotation_to_euler(whole))
+    angle = np.degrees(np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0)))
+    reference.note(
+        f"its body axes were turned by {angle:.3f} deg, constant, onto those of "
+        f"{tested.offer.name}: a constant mounting error between the two cannot be found"
+    )
+
+
+def seconds_of(time_ns: Nanoseconds) -> Array:
+    set_ = time_ns != UNSET
+    base = int(time_ns[set_].min()) if np.any(set_) else 0
+    seconds: Array = np.where(set_, (time_ns - base) / 1e9, np.nan)
+    return seconds
+
+
+def slope_of(seconds: Array, places: Array) -> Array:
+    """Velocity by rising stamps, each stamp once; given back in the order of the file."""
+    slope = np.full(places.shape, np.nan)
+    known = np.flatnonzero(np.isfinite(seconds) & np.isfinite(places).all(axis=1))
+    order = known[np.argsort(seconds[known], kind="stable")]
+    if np.unique(seconds[order]).shape[0] >= 3:
+        slope[order] = velocity_of(seconds[order], places[order])
+    return slope
