@@ -123,6 +123,18 @@ FACTS: dict[str, tuple[int, dict[str, Fact]]] = {  # streams, and facts of some
         "NAV-HPPOSLLH": Fact("gps", 29), "NAV-SAT": Fact("gps", 3),
     }),
     "ubx/ubx_20080526.ubx": (11, {"RXM-RAW": Fact("gps", 242), "GPGSV": Fact("unknown", 869)}),
+    "gpsd/hemi.json": (2, {
+        "TPV": Fact("utc", 215, utc("2018-09-07T19:39:13"), utc("2018-09-07T19:41:00")),
+        "ATT": Fact("unknown", 4),
+    }),
+    "gpsd/ublox-8-time.json": (2, {
+        "TPV": Fact("utc", 132, utc("2017-12-01T17:22:37"), utc("2017-12-01T17:24:05")),
+        "SKY": Fact("unknown", 9),
+    }),
+    "gpsd/ublox-zed-f9p-hp.json": (2, {
+        "TPV": Fact("utc", 29, utc("2019-04-22T21:19:20"), utc("2019-04-22T21:19:48")),
+        "SKY": Fact("unknown", 3),
+    }),
     "pos/rover_1Hz_rtk.pos": (1, {
         "rover_1Hz_rtk":
             Fact("gps", 531, utc("2023-07-11T06:04:32"), utc("2023-07-11T06:25:00")),

@@ -307,3 +307,47 @@ def test_an_absurd_length_does_not_swallow_what_follows(tmp_path: Path) -> None:
     absurd = b"\xb5b\x01\x07\xff\xff"
     recording = opened(tmp_path, pvt(at), absurd, pvt(at), pvt(at))
     assert by_name(recording)["NAV-PVT"].messages == 3
+
+
+# gpsd
+
+
+TPV = (
+    '{"class":"TPV","mode":3,"time":"2026-05-04T10:00:00.250Z","lat":47.5,"lon":-8.25,'
+    '"altHAE":460.5,"altMSL":412.5,"geoidSep":48.0,"track":30.0,"speed":2.0,"climb":0.5}\n'
+)
+
+
+def test_reports_of_gpsd_between_its_nmea(tmp_path: Path) -> None:
+    other = '{"class":"TPV","mode":1}\n{"class":"ATT","heading":274.0}\n'
+    recording = opened(tmp_path, sentence("GPHDT,1.0,T"), other.encode(), TPV.encode())
+    streams = by_name(recording)
+    assert recording.format == "gpsd JSON log"
+    assert stamps_of(streams["TPV"]) == [UNSET, unix_ns(2026, 5, 4, 10, micro=250_000)]
+    assert (streams["TPV"].timeline, streams["TPV"].frame) == ("utc", "wgs84")
+    assert any("1 reports have no time" in note for note in streams["TPV"].notes)
+    assert streams["ATT"].stamps is None
+    assert columns_of(recording, "ATT")["yaw_deg"].tolist() == [274.0]
+    row = {name: float(column[1]) for name, column in columns_of(recording, "TPV").items()}
+    assert (row["latitude_deg"], row["longitude_deg"], row["height_m"]) == (47.5, -8.25, 460.5)
+    assert (row["height_msl_m"], row["separation_m"]) == (412.5, 48.0)
+    assert row["velocity_north_mps"] == pytest.approx(3**0.5)
+    assert row["velocity_east_mps"] == pytest.approx(1.0)
+    assert row["velocity_down_mps"] == -0.5
+
+
+def test_a_time_after_many_reports_without(tmp_path: Path) -> None:
+    before = '{"class":"ATT","heading":274.0}\n' * 40_000  # more than a block of lines
+    after = '{"class":"ATT","time":"2026-05-04T10:00:00Z","heading":1.0}\n'
+    stamps = stamps_of(by_name(opened(tmp_path, before.encode(), after.encode()))["ATT"])
+    assert len(stamps) == 40_001
+    assert stamps[-2:] == [UNSET, unix_ns(2026, 5, 4, 10)]
+
+
+def test_damaged_reports_are_counted(tmp_path: Path) -> None:
+    recording = opened(tmp_path, TPV.encode(), TPV.encode()[:70] + b"\n", TPV.encode()[:-20])
+    assert by_name(recording)["TPV"].messages == 1
+    assert recording.incomplete is not None
+    assert "2 lines" in recording.incomplete.reason
+    with pytest.raises(BadInput, match="no time of a report"):
+        opened(tmp_path, TPV.replace("10:00", "25:00").encode()).streams()

@@ -74,6 +74,12 @@ class Tally:
     secondary: StampColumn
     columns: tuple[str, ...]
 
+    def fill(self) -> None:
+        """Messages before the first that has a time are such without it."""
+        lacking = self.messages - len(self.primary)
+        if lacking:
+            self.primary.extend(np.full(lacking, UNSET, dtype=np.int64))
+
 
 class BatchRecording(ABC):
     """A `Recording` over the batches of one file."""
@@ -123,9 +129,10 @@ class BatchRecording(ABC):
                     raise refuse(self.path, "too many streams", expected=most)
                 columns = tuple(batch.columns)
                 tally = tallies[batch.stream] = Tally(0, StampColumn(), StampColumn(), columns)
-            tally.messages += batch.messages
             if batch.primary_ns is not None:
+                tally.fill()
                 tally.primary.extend(batch.primary_ns)
+            tally.messages += batch.messages
             if batch.secondary_ns is not None:
                 tally.secondary.extend(batch.secondary_ns)
         return tallies
@@ -134,6 +141,7 @@ class BatchRecording(ABC):
         facts = self._facts(name)
         stamps = None
         if len(tally.primary):
+            tally.fill()
             whole = len(tally.secondary) == len(tally.primary)
             second = tally.secondary.values() if whole and facts.secondary else None
             label = facts.secondary if second is not None else None
