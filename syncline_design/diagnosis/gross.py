@@ -35,7 +35,6 @@ SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of secon
 SEARCHED_TO = 0.1  # what is searched so widely has to help so much
 FAR_BETTER = 0.5  # of the error of the best fault of the list
 SHORT_SHIFT_S = 0.5  # a shorter shift of stamps is a latency, to be fitted
-CONVENTION, SLIP = "frame_convention", "integer_second_slip"
 NEARLY_FREE = 2.0  # the same for what is searched
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
 
@@ -255,8 +254,8 @@ def _trials(
 def _searched(system: System, log: Log, base: Scene, exclude: Sequence[str]) -> list[Trial]:
     """The best of all conventions, to be re-simulated."""
     found = []
-    effect = registry()[CONVENTION]
-    for one in best_repairs(system, base.log) if CONVENTION not in exclude else []:
+    effect = _undone(by_mending=True)
+    for one in best_repairs(system, base.log) if effect.name not in exclude else []:
         acting = Acting(effect, one.sensor, 0, {"convention": one.convention})  # type: ignore[dict-item]
         found.append(Trial(acting, partial(_error, system, log, base, one.mend), one.mend))
     return found
@@ -286,9 +285,19 @@ def _shifts(
 def _shift_named(shift: Shift) -> Acting:
     """Whole seconds of the positions are a slip, anything else a delay."""
     seconds = float(round(shift.seconds)) if shift.whole else shift.seconds
-    if shift.whole and shift.sensor == "position":
-        return Acting(registry()[SLIP], shift.sensor, 0, {"seconds": seconds})
-    return Acting(registry()["latency"], shift.sensor, 0, {"latency_s": seconds})
+    slip = _undone(by_mending=False)
+    assert slip.undoing is not None
+    as_delay = registry()[slip.undoing.instead_of]
+    effect = slip if shift.whole and shift.sensor in slip.sensors else as_delay
+    return Acting(effect, shift.sensor, 0, {effect.parameters[0].name: seconds})
+
+
+def _undone(*, by_mending: bool) -> Effect:
+    """The one discrete effect that a log is freed of by mending columns, or by pairing anew."""
+    return next(
+        one for one in registry().values()
+        if one.undoing is not None and (one.undoing.mend is not None) == by_mending
+    )  # fmt: skip
 
 
 def _shifted(log: Log, sensor: Target, seconds: float, reread: Reread | None) -> Log:
