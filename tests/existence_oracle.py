@@ -90,10 +90,18 @@ def _verdict(case: Case, good: list[Outcome]) -> list[str]:
     word = verdict["verdict"]
     if good:
         least = min(one.cost for one in good)
-        same = word == "meets" and abs(verdict["design"]["cost"] - least) < 1e-6
+        same = word == _word(case, verdict) and abs(verdict["design"]["cost"] - least) < 1e-6
         return [] if same else [f"verdict {word}, the oracle meets at {least}"]
     pinned = word == "fails"  # a spec that leaves one design only
     return [] if word == "infeasible" or pinned else [f"verdict {word}, the oracle finds none"]
+
+
+def _word(case: Case, verdict: Raw) -> str:
+    """Meets, unless the spacing of samples is asked for and not told."""
+    asked = any(one.kind == "sample_spacing" for one in case.spec.requirements)
+    chosen = [one["roles"]["ranging"]["sensor"] for one in verdict["design"]["stages"]]
+    told = all(case.catalog.sensors[name].rate is not None for name in chosen)
+    return "meets" if told or not asked else "indeterminate"
 
 
 def _excluded(case: Case, plain: Plain) -> list[str]:
@@ -128,7 +136,7 @@ def _recheck(case: Case, plain: Plain, rng: random.Random) -> list[str]:
             )
             stage, entry = plain.spec["stages"][i]["name"], plain.catalog["timestamping"][method]
             roles.append(RoleSelection(stage, role, name, "arrival", method))  # type: ignore[arg-type]
-            wrong |= bool(plain.codes(i, plain.catalog["sensors"][name]))
+            wrong |= bool({*plain.codes(i, plain.catalog["sensors"][name])} - {"rate"})
             wrong |= bool(plain._codes_of_parts(entry, i)) or plain.lacks_time(entry, i)
         clocks = []
         for i, raw in enumerate(plain.spec["stages"]):

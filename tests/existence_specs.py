@@ -155,6 +155,9 @@ def drawn(seed: int, chains: bool = True) -> tuple[Raw, Raw]:
     }  # fmt: skip
     if rng.random() < 0.2:
         spec["sync_model"] = "per_sensor"
+    if rng.random() < 0.35:
+        limit = f"{rng.choice([0.1, 0.2, 0.6, 1, 2, 6])} m"
+        spec["requirements"].append({"id": "G", "kind": "sample_spacing", "limit": limit})
     return spec, parts
 
 

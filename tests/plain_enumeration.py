@@ -353,7 +353,7 @@ def limits_of(spec: dict[str, Any]) -> dict[str, tuple[str, float]]:
     limits = {
         r["id"]: (r["kind"], r["limit"] if r["kind"] == "sync" else number(r["limit"]))
         for r in spec["requirements"]
-        if r["kind"] != "monte_carlo"
+        if r["kind"] not in ("monte_carlo", "sample_spacing")  # that one bars options
     }
     if "sync" not in {kind for kind, _ in limits.values()}:
         limits["implied"] = ("sync", 1.0)

@@ -6,6 +6,7 @@ Independent of the package.  Angles are tried in steps of a tenth of a degree.
 from __future__ import annotations
 
 import re
+from fractions import Fraction
 from typing import Any
 
 RECEIVERS = ("gnss", "gps")
@@ -103,10 +104,16 @@ def codes_of_sensor(
 
 def spacing_of(sensor: Raw, platform: Raw) -> tuple[float | None, bool]:
     """Ground between two samples at v_max [m]; whether the rate is told; echoes take 2 d / c."""
-    period = 1.0 / figure(sensor["rate"]) if "rate" in sensor else 0.0
+    waits = [1 / exactly(sensor["rate"])] if "rate" in sensor else []
     if sensor.get("type") in ("usbl", "mbes", "single_beam", "imaging_sonar"):
-        period = max(period, 2.0 * figure(platform["distance"]) / 1500.0)
-    return figure(platform["v_max"]) * period if period else None, "rate" in sensor
+        waits.append(2 * exactly(platform["distance"]) / 1500)
+    apart = float(exactly(platform["v_max"]) * max(waits)) if waits else None
+    return apart, "rate" in sensor
+
+
+def exactly(text: str) -> Fraction:
+    """A figure in m, Hz or m/s."""
+    return Fraction(text.split()[0])
 
 
 def codes_of_part(entry: Raw, stage: Raw, spec: Raw) -> list[str]:

@@ -271,3 +271,94 @@ def test_what_a_stage_cannot_ask_is_refused_at_its_place(
 def test_a_switch_is_yes_or_no(key: str, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="yes or no"):
         said(tmp_path, spec_of(["sonar"], **{key: "perhaps"}))
+
+
+# ------------------------------------------------------------------ how close samples are
+
+
+def gap(limit: str, ranging: Any, stage: Raw | None = None, **keys: Any) -> Raw:
+    spec = spec_of(ranging, stage, **keys)
+    spec["requirements"].append({"id": "GAP-1", "kind": "sample_spacing", "limit": limit})
+    return spec
+
+
+def row_of(verdict: Raw, name: str = "GAP-1") -> Raw:
+    return next(row for row in verdict["requirements"] if row["id"] == name)
+
+
+@pytest.mark.parametrize(
+    ("rate", "limit", "ok"),
+    [
+        ("10 Hz", "0.2 m", True),  # 2 m/s at 10 Hz
+        ("10 Hz", "0.199999 m", False),
+        ("9.9999 Hz", "0.2 m", False),
+        ("3 Hz", "0.6666666666666667 m", True),  # 2/3 m, rounded once
+        ("3 Hz", "0.6666666666666 m", False),
+    ],
+)
+def test_samples_are_v_max_over_rate_apart(rate: str, limit: str, ok: bool, tmp_path: Path) -> None:
+    spec = gap(limit, ["own"], at("50 m", medium="air"))
+    verdict = said(tmp_path, spec, own=LIDAR | {"rate": rate})
+    assert verdict["verdict"] == ("meets" if ok else "infeasible")
+    if ok:
+        row = row_of(verdict)
+        assert (row["kind"], row["status"], row["unit"]) == ("sample_spacing", "pass", "m")
+        assert row["value"] == pytest.approx(2.0 / float(rate.split()[0]), rel=1e-12)
+        return
+    (gone,) = verdict["choice"]["excluded"]
+    assert gone["code"] == "rate"
+    assert verdict["infeasibility"]["conflict"]["requirements"][0]["id"] == "GAP-1"
+
+
+@pytest.mark.parametrize(("sound", "apart"), [(None, 4.0 / 3.0), ("1480 m/s", 2000.0 / 1480.0)])
+def test_a_sonar_waits_for_its_echo(sound: str | None, apart: float, tmp_path: Path) -> None:
+    """2 m/s over 2 * 500 m of sound, whatever rate the maker prints."""
+    stage = {"sound_speed": sound} if sound else {}
+    spec = gap("1.5 m", ["own"], {**stage, "medium": "water"})
+    verdict = said(tmp_path, spec, own=SONAR | {"rate": "50 Hz"})
+    assert verdict["verdict"] == "meets"
+    assert row_of(verdict)["value"] == pytest.approx(apart, rel=1e-12)
+
+
+def test_what_helps_where_samples_are_too_far_apart(tmp_path: Path) -> None:
+    """A wider limit, a slower vessel, a nearer floor: 2 v d / c <= 1 m at v = 2 m/s, d = 500 m."""
+    spec = gap("1 m", ["own"], {"medium": "water"})
+    verdict = said(tmp_path, spec, own=SONAR | {"rate": "50 Hz"})
+    assert verdict["verdict"] == "infeasible"
+    fixes = {fix["figure"] or fix["kind"]: fix for fix in verdict["infeasibility"]["fixes"]}
+    assert fixes["sample_spacing"]["requirement"] == "GAP-1"
+    assert 4.0 / 3.0 <= fixes["sample_spacing"]["to"] <= 1.34
+    assert fixes["v_max"]["to"] == pytest.approx(1.5, rel=1e-9)
+    assert fixes["distance"]["to"] == pytest.approx(375.0, rel=1e-9)
+
+
+def test_a_rate_that_nobody_tells_leaves_the_verdict_open(tmp_path: Path) -> None:
+    spec = gap("0.2 m", ["short_lidar"], at("50 m", medium="air"))
+    verdict = said(tmp_path, spec)
+    assert verdict["verdict"] == "indeterminate"
+    row = row_of(verdict)
+    assert (row["status"], row["value"]) == ("indeterminate", None)
+    assert "short_lidar gives no rate" in row["note"]
+    (told,) = [one for one in verdict["warnings"] if one["code"] == "unknown-fact"]
+    assert (told["entry"], told["key"]) == ("short_lidar", "rate")
+    strict = said(tmp_path, spec | {"strict_facts": True})
+    assert [row["code"] for row in strict["choice"]["excluded"]] == ["unknown-fact"]
+
+
+def test_a_pinned_sensor_that_samples_too_seldom_fails_that_requirement(tmp_path: Path) -> None:
+    spec = gap("0.2 m", "own", {**at("50 m", medium="air"), "timestamping": "hardware"})
+    for role in ("position", "attitude", "ranging"):
+        spec["stages"][0][role] |= {"primitive": "pps", "timestamping": "hardware"}
+    verdict = said(tmp_path, spec, own=LIDAR | {"rate": "5 Hz"})
+    assert verdict["verdict"] == "fails"
+    assert (row_of(verdict)["status"], row_of(verdict)["value"]) == ("fail", 0.4)
+    assert not [one for one in verdict["requirements"] if one["id"] == "FACTS"]
+
+
+def test_samples_are_asked_of_a_ranging_sensor(tmp_path: Path) -> None:
+    spec = gap("0.2 m", ["sonar"])
+    del spec["stages"][0]["ranging"], spec["stages"][0]["attitude"]
+    with pytest.raises(BadInput) as refused:
+        said(tmp_path, spec)
+    (flaw,) = refused.value.problems
+    assert flaw.path == "requirements[1].kind"

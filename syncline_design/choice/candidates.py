@@ -12,42 +12,44 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import Literal, overload
+from typing import overload
 
 import numpy as np
 
 from syncline_design.choice.exclusions import Excluded, Exclusions
 from syncline_design.choice.options import (
-    EVERYWHERE,
     RESOURCES,
     Bools,
     Floats,
     Indices,
     Option,
     Options,
-    Requires,
-    ResourceName,
-    Resources,
     Spent,
     numbered,
     ranked,
 )
-from syncline_design.choice.table import RoleTable
+from syncline_design.choice.prices import amount_of, resources_of
+from syncline_design.choice.table import Limits, RoleTable
+from syncline_design.choice.ways import Way, ways_of_stamping
 from syncline_design.machine.deadline import unhurried
-from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName
-from syncline_design.spec.barred import barred_method, barred_sensor, surroundings
-from syncline_design.spec.case import Case, RoleCase, StageCase, usable_primitives
+from syncline_design.spec.barred import barred_sensor, surroundings
+from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
-    ClockEntry,
-    InfrastructureEntry,
     SensorEntry,
-    TimestampingEntry,
 )
-from syncline_design.spec.exact import fraction_of, norm, tau_bound
-from syncline_design.spec.existence import RuledOut, interval_of, out_of_reach
-
-INLINE = "inline"
+from syncline_design.spec.exact import fraction_of, norm
+from syncline_design.spec.existence import (
+    SOUND_MPS,
+    RuledOut,
+    Surroundings,
+    interval_of,
+    is_acoustic,
+    out_of_reach,
+    spacing_m,
+    strongest,
+    too_sparse,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,38 +110,15 @@ def motion_of(stage: StageCase) -> Motion:
     return Motion(fraction_of(platform.v_max), distance, fraction_of(platform.omega_max), ranges)
 
 
-@dataclass(frozen=True, slots=True)
-class _Way:
-    """One way of stamping: a primitive and a method, or why it is none.
-
-    entry: None where the spec gives the error in place; barred: why it cannot work on this stage;
-    served, offered: what does not fit one another.
-    """
-
-    primitive: str
-    method: str
-    tau: Fraction = Fraction(0)
-    timeline: Literal["host", "utc"] = "host"
-    entry: TimestampingEntry | None = None
-    requires: Requires = ()
-    barred: RuledOut | None = None
-    served: str = ""
-    offered: str = ""
-
-    @property
-    def fits(self) -> bool:
-        """Whether it is an option, poor as it may be."""
-        return self.barred is None and not self.offered
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
     """Every candidate of one role, in the order of the spec: a sensor and a way of stamping it.
 
-    barred: why a sensor cannot work here at any distance; near, far: between which distances [m]
-    each measures.  ways_of: numbers of the ways of stamping each sensor; sensor, way: of each row
-    (way -1: stands for the sensor, where it cannot work here); fixed, turned: terms of each
-    sensor's error, [m] and [m] per metre of distance.
+    barred: why a sensor cannot work here at any distance and speed; near, far: between which
+    distances [m] each measures; rate, sound: how often [1/s], and at which speed of sound [m/s];
+    works: whether it measures at this distance, and often enough.  ways_of: numbers of the ways of
+    stamping each sensor; sensor, way: of each row (way -1: stands for the sensor, where it cannot
+    work here); fixed, turned: terms of each sensor's error, [m] and [m] per metre of distance.
     """
 
     case: Case
@@ -148,7 +127,7 @@ class Candidates:
     motion: Motion
     effects: tuple[SensorEffects, ...]
     barred: tuple[RuledOut | None, ...]
-    ways: tuple[_Way, ...]
+    ways: tuple[Way, ...]
     ways_of: tuple[Indices, ...]
     sensor: Indices
     way: Indices
@@ -156,37 +135,38 @@ class Candidates:
     turned: Floats
     near: Floats
     far: Floats
+    rate: Floats
+    sound: Floats
+    works: Bools
     made: dict[int, Option] = field(default_factory=dict)
 
-    def table(self, vehicle: int, sync_limit: float) -> RoleTable:
+    def table(self, vehicle: int, limits: Limits) -> RoleTable:
         """The options that keep their own tau_crit, and what is excluded."""
-        works = self._reaches(self.motion)[self.sensor]
+        works = self.works[self.sensor]
         stands_for, fits = self.way < 0, np.array([*(one.fits for one in self.ways), False])
         fitting = ~stands_for & fits[self.way]
         barred = np.array([one is not None for one in self.barred], dtype=bool)[self.sensor]
         gone = np.where(stands_for, barred | ~works, ~fitting & works)
         here, rest = np.flatnonzero(fitting & works), np.flatnonzero(gone)
         pool, beyond = self._columns(np.flatnonzero(fitting)).parted(works[fitting])
-        keeps = pool.keep_own_tau_crit(sync_limit)
+        keeps = pool.keep_own_tau_crit(limits.sync)
         options, poor = pool.parted(keeps)
         order = np.argsort(np.concatenate([rest, here[~keeps]]), kind="stable")
         name, stage = self.stage.choice.name, self.stage.index
         excluded = Exclusions(_Records(self, rest), poor, order, beyond)
         ordered = options.take(options.by_name())
-        return RoleTable(stage, name, self.role.role, vehicle, ordered, excluded)
+        return RoleTable(
+            stage, name, self.role.role, vehicle, ordered, excluded, self.motion.distance,
+            self.motion.speed,
+        )  # fmt: skip
 
-    def moved(self, table: RoleTable, motion: Motion, sync_limit: float) -> RoleTable:
+    def moved(self, table: RoleTable, motion: Motion, limits: Limits) -> RoleTable:
         """A table of these candidates where the stage moves in another way."""
         there, pool = replace(self, motion=motion, made={}), table.anywhere()
         error, added, crit = (figure[pool.sensor] for figure in there._figures())
         pool = replace(pool, make=there.__call__, error=error, added=added, crit=crit)
-        here, beyond = pool.parted(self._reaches(motion)[pool.sensor])
-        return table.with_pool(here, sync_limit, beyond)
-
-    def _reaches(self, motion: Motion) -> Bools:
-        """Which sensors measure at a stage's distance."""
-        distance = float(motion.distance)
-        return np.asarray((self.near <= distance) & (distance <= self.far))
+        there_now = replace(table, distance_m=motion.distance, speed_mps=motion.speed)
+        return there_now.settled(pool, limits)
 
     @property
     def _rate(self) -> Fraction | None:
@@ -219,7 +199,8 @@ class Candidates:
         host = np.array([way.timeline == "host" for way in self.ways], dtype=bool)
         return Options(
             self.__call__, rows, self._ranks(rows), sensors, method[ways], error, added,
-            tau[ways] + extra[sensors], crit, self.near[sensors], self.far[sensors], host[ways],
+            tau[ways] + extra[sensors], crit, self.near[sensors], self.far[sensors],
+            self.rate[sensors], self.sound[sensors], host[ways],
             tuple(self._spent(sensors, ways)), needs, need[ways],
         )  # fmt: skip
 
@@ -245,7 +226,7 @@ class Candidates:
             self.made[row] = self._option(int(self.sensor[row]), self.ways[self.way[row]])
         return self.made[row]
 
-    def _option(self, place: int, way: _Way) -> Option:
+    def _option(self, place: int, way: Way) -> Option:
         """A sensor with one way of stamping, worked out in fractions and rounded once."""
         sensor, effects, rate = self.role.sensors[place], self.effects[place], self._rate
         error, systematic = self._error(place), effects.systematic_m
@@ -267,6 +248,8 @@ class Candidates:
             noise_systematic_m=effects.noise_m,
             own_rate_mps=rate,
             reach_m=(float(self.near[place]), float(self.far[place])),
+            rate_hz=_finite(sensor.entry.rate, self.rate[place]),
+            sound_mps=_finite(self.stage.choice.sound_speed or SOUND_MPS, self.sound[place]),
         )
 
     def excluded(self, row: int) -> Excluded:
@@ -287,11 +270,14 @@ class Candidates:
         return Excluded(name, "", way.method, reason, figure=way.served, limit=way.offered)
 
     def _why(self, place: int) -> RuledOut:
-        """Why a sensor cannot work here: how far it reaches comes first."""
+        """Why a sensor cannot work here, its strongest reason."""
         sensor, barred = self.role.sensors[place], self.barred[place]
-        short = next(out_of_reach(sensor.id, sensor.entry, surroundings(self.stage)), barred)
-        assert short is not None
-        return short
+        around = surroundings(self.stage, self.case.spec)
+        found = [] if barred is None else [barred]
+        if sensor.entry.modality == "ranging":
+            found += out_of_reach(sensor.id, sensor.entry, around)
+            found += too_sparse(sensor.id, sensor.entry, around)
+        return strongest(found)
 
 
 @dataclass(frozen=True, slots=True)
@@ -321,25 +307,25 @@ def candidates(
 
     usual: what known effects add where by_sensor does not say.
     """
-    ways: list[_Way] = []
+    ways: list[Way] = []
     by_signals: dict[tuple[str, ...], Indices] = {}
-    barred, of_sensor, terms, reach = [], [], [], []
-    around = surroundings(stage)
+    barred, of_sensor, terms, limited = [], [], [], []
+    around = surroundings(stage, case.spec)
     for sensor in unhurried(role.sensors):
         signals = tuple(sensor.entry.serves)
         if signals not in by_signals:
-            found = list(_ways(case, stage, role, sensor.entry))
+            found = list(ways_of_stamping(case, stage, role, sensor.entry))
             by_signals[signals] = np.arange(len(ways), len(ways) + len(found))
             ways += found
         of_sensor.append(by_signals[signals])
         barred.append(barred_sensor(case, stage, around, sensor))
-        reach.append(interval_of(sensor.entry, around.reflectivity))
+        limited.append(_limited(sensor.entry, around))
         terms.append(_error_terms(sensor.entry, role.role))
+    near, far, rate, sound, works = np.array(limited, dtype=float).reshape(-1, 5).T
     shown = [
-        NO_WAY if bar is not None else own if limits == EVERYWHERE else np.append(NO_WAY, own)
-        for own, bar, limits in zip(of_sensor, barred, reach, strict=True)
+        NO_WAY if bar is not None else own if work else np.append(NO_WAY, own)
+        for own, bar, work in zip(of_sensor, barred, works.tolist(), strict=True)
     ]
-    near, far = np.array(reach, dtype=float).reshape(-1, 2).T
     fixed, turned = np.array(terms, dtype=float).reshape(-1, 2).T
     name = stage.choice.name
     effects = tuple(by_sensor.get((name, role.role, one.id), usual) for one in role.sensors)
@@ -347,33 +333,28 @@ def candidates(
     return Candidates(
         case, stage, role, motion_of(stage), effects, tuple(barred), tuple(ways), tuple(of_sensor),
         sensors, np.concatenate([NO_WAY[:0], *shown]), fixed, turned, near, far,
+        rate, sound, works > 0.0,
     )  # fmt: skip
 
 
-def _ways(case: Case, stage: StageCase, role: RoleCase, sensor: SensorEntry) -> Iterator[_Way]:
-    """Every way of stamping a sensor of these signals, or why it is none.
+def _limited(sensor: SensorEntry, around: Surroundings) -> tuple[float, float, float, float, bool]:
+    """Reach [m], rate [1/s] and speed of sound [m/s] of a sensor, and whether it works here.
 
-    Where the spec gives the error in place, a primitive that is pinned has to be the sensor's.
+    Rates are those of ranging sensors, whose samples are asked for.
     """
-    pinned, factor = role.choice.primitive, case.spec.coverage_factor
-    if role.inline is not None:
-        if pinned is not None and pinned not in sensor.serves:
-            yield _Way("", INLINE, served=", ".join(sensor.serves), offered=pinned)
-            return
-        tau, timeline = tau_bound(role.inline.error, factor), role.inline.timeline
-        yield _Way(pinned or INLINE, INLINE, tau, "utc" if timeline == "utc" else "host")
-        return
-    for method in role.methods:
-        entry = method.entry
-        timeline = "utc" if entry.timeline == "utc" else "host"
-        primitives = usable_primitives(sensor, entry, pinned)
-        barred = barred_method(case, stage, method)
-        tau, requires = tau_bound(entry.error, factor), tuple(sorted(entry.requires.items()))
-        for primitive in primitives:
-            yield _Way(primitive, method.id, tau, timeline, entry, requires, barred)
-        if not primitives:
-            offered = pinned or ", ".join(sensor.serves)
-            yield _Way("", method.id, served=", ".join(entry.primitives), offered=offered)
+    near, far = interval_of(sensor, around.reflectivity)
+    if sensor.modality != "ranging":
+        return near, far, math.inf, math.inf, True
+    apart = spacing_m(sensor, around)
+    works = near <= around.nearest and around.farthest <= far
+    works &= around.spacing is None or apart is None or apart <= around.spacing
+    sound = around.sound_speed if is_acoustic(sensor.type) else math.inf
+    return near, far, sensor.rate or math.inf, sound, works
+
+
+def _finite(value: float | None, column: float) -> Fraction | None:
+    """A figure exactly, where it delays anything."""
+    return None if value is None or math.isinf(column) else fraction_of(value)
 
 
 def _error_terms(sensor: SensorEntry, role: RoleName) -> tuple[float, float]:
@@ -400,27 +381,3 @@ def _impossible(
         sensor, primitive, method, barred.reason, code=barred.code, figure=barred.figure,
         limit=barred.limit, impossible=tuple(options),
     )  # fmt: skip
-
-
-Priced = SensorEntry | TimestampingEntry | ClockEntry | InfrastructureEntry
-
-
-def resources_of(case: Case, *entries: Priced | None) -> Resources:
-    """Sums over entries; None where one of them does not say."""
-    sums: dict[str, Fraction | None] = {}
-    for name in RESOURCES:
-        amounts = [amount_of(case, name, entry) for entry in entries]
-        known = [amount for amount in amounts if amount is not None]
-        sums[name] = sum(known, Fraction(0)) if len(known) == len(amounts) else None
-    return Resources(**sums)
-
-
-def amount_of(case: Case, name: ResourceName, entry: Priced | None) -> Fraction | None:
-    """What an entry takes; None where it does not say, or in a currency without a rate (loading
-    refuses those of a spec's own).  Without an entry: nothing."""
-    if entry is None:
-        return Fraction(0)
-    amount = getattr(entry, name)
-    if name == "cost" and isinstance(amount, Quantity):
-        return case.spec.in_currency(amount) if case.spec.can_convert(amount) else None
-    return None if amount is None else fraction_of(amount)

@@ -24,7 +24,8 @@ TRIES = 6
 WIDENING = Fraction(1, 100)  # by which a simulated limit is widened when it does not hold yet
 IMPLIED = "SYNC"
 UNITS_OF = {
-    "accuracy": "m", "sync": "1", "mass": "kg", "power": "W", **dict.fromkeys(JUDGED_KINDS, "m")
+    "accuracy": "m", "sync": "1", "mass": "kg", "power": "W",
+    "sample_spacing": "m", **dict.fromkeys(JUDGED_KINDS, "m")
 }  # fmt: skip
 
 

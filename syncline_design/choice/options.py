@@ -66,6 +66,8 @@ class Option:
     noise_systematic_m: Fraction = Fraction(0)  # the share of it that is in proportion to the noise
     own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
     reach_m: Interval = EVERYWHERE  # distances between which the sensor measures
+    rate_hz: Fraction | None = None  # how often it measures; None: not told, or not asked
+    sound_mps: Fraction | None = None  # of a sensor that waits for its echo
 
     @property
     def names(self) -> Names:
@@ -83,6 +85,13 @@ class Option:
     def systematic(self) -> Fraction:
         """Known systematic error that comes with this sensor [m], exactly."""
         return exactly(self.systematic_m, self.exact_systematic_m)
+
+    def spacing_m(self, speed_mps: Fraction, distance_m: Fraction) -> Fraction:
+        """Ground between two samples [m], as far as it is told: v max(1 / rate, 2 d / c)."""
+        waits = [Fraction(0)]
+        waits += [1 / self.rate_hz] if self.rate_hz else []
+        waits += [2 * distance_m / self.sound_mps] if self.sound_mps else []
+        return speed_mps * max(waits)
 
     def added_m(self) -> float:
         """What the sensor adds to the total [m], its systematic part included."""
@@ -191,7 +200,8 @@ class Options(Sequence[Option]):
 
     make: the option at a place of the source; at: that place.  rank: place in the order of names.
     error, added: sensor error alone, and with its systematic part [m]; crit: its own tau_crit [s].
-    near, far: distances between which the sensor measures [m].
+    near, far: distances between which the sensor measures [m]; rate: how often [1/s], sound: its
+    speed where a sensor waits for its echo [m/s], both infinite where they delay nothing.
     sensor, method: numbers that tell them apart.  needs: kinds of `requires`; need: which.
     """
 
@@ -206,6 +216,8 @@ class Options(Sequence[Option]):
     crit: Floats
     near: Floats
     far: Floats
+    rate: Floats
+    sound: Floats
     host: Bools
     spends: tuple[Spent, ...]
     needs: tuple[Requires, ...]
@@ -230,6 +242,8 @@ class Options(Sequence[Option]):
             _floats(o.tau_crit_s for o in options),
             _floats(o.reach_m[0] for o in options),
             _floats(o.reach_m[1] for o in options),
+            _floats(float(o.rate_hz) if o.rate_hz else math.inf for o in options),
+            _floats(float(o.sound_mps) if o.sound_mps else math.inf for o in options),
             np.array([o.timeline == "host" for o in options], dtype=bool),
             spends,
             needs,
@@ -351,6 +365,20 @@ class Options(Sequence[Option]):
     def reach(self, near: float, far: float) -> Bools:
         """Which options measure at some distance between two [m]."""
         return np.asarray((self.near <= far) & (near <= self.far))
+
+    def spacing(self, speed_mps: float, distance_m: float) -> Floats:
+        """Ground between two samples [m], as far as it is told."""
+        return np.maximum(speed_mps / self.rate, 2.0 * speed_mps * distance_m / self.sound)
+
+    def keep_spacing(self, speed_mps: Fraction, distance_m: Fraction, limit: float | None) -> Bools:
+        """Which options take samples no farther apart than a limit; close calls are exact."""
+        if limit is None:
+            return np.ones(len(self), dtype=bool)
+        apart = self.spacing(float(speed_mps), float(distance_m))
+        keeps = np.asarray(apart <= limit * (1.0 - MARGIN))
+        for row in np.flatnonzero(~keeps & (apart <= limit * (1.0 + MARGIN))).tolist():
+            keeps[row] = float(self[row].spacing_m(speed_mps, distance_m)) <= limit
+        return keeps
 
     def _own_ratios(self) -> Floats:
         with np.errstate(divide="ignore", invalid="ignore"):

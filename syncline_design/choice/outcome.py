@@ -23,6 +23,7 @@ FixKind = Literal[
     "platform",
     "timestamping",
     "facts",
+    "sample_spacing",
     "worst_case",
     "thu",
     "tvu",

@@ -15,7 +15,8 @@ from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice, Infeasible, TooLarge, Unfinished
 from syncline_design.choice.table import Limits, Objective, Problem, with_limits
 
-KINDS = ("accuracy", "sync", "cost", "mass", "power")
+KINDS = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
+FIELDS = {"accuracy": "accuracy_m", "sample_spacing": "spacing_m"}  # of Limits, else the kind
 SIMULATED = "monte_carlo"
 STEPS = 40
 CLOSE = 1e-4
@@ -45,7 +46,7 @@ def parts_of(problem: Problem) -> tuple[Part, ...]:
 def _is_active(limits: Limits, kind: str) -> bool:
     if kind == "sync":
         return math.isfinite(limits.sync)
-    return (limits.accuracy_m if kind == "accuracy" else getattr(limits, kind)) is not None
+    return getattr(limits, FIELDS.get(kind, kind)) is not None
 
 
 def lifted(problem: Problem, parts: Iterable[Part]) -> Problem:
@@ -58,7 +59,7 @@ def moved(problem: Problem, limits: Mapping[Part, Any]) -> Problem:
     changes: dict[str, Any] = {}
     for part, value in limits.items():
         if part.kind != SIMULATED:
-            changes["accuracy_m" if part.kind == "accuracy" else part.kind] = value
+            changes[FIELDS.get(part.kind, part.kind)] = value
     out = with_limits(problem, replace(problem.limits, **changes)) if changes else problem
     if problem.judge is None:
         return out
@@ -96,6 +97,8 @@ def least(problem: Problem, part: Part) -> Fraction | None:
         return _least_sync(problem, part)
     if part.kind == SIMULATED:
         return _least_simulated(problem, part)
+    if part.kind == "sample_spacing":
+        return _least_spacing(problem, part)
     objective: Objective = "error"
     if part.kind != "accuracy":
         objective = next(name for name in RESOURCES if name == part.kind)
@@ -125,6 +128,24 @@ def _least_sync(problem: Problem, part: Part) -> Fraction | None:
         middle = 0.5 * (works + fails)
         works, fails = (middle, fails) if holds(middle) else (works, middle)
     return Fraction(works)
+
+
+def _least_spacing(problem: Problem, part: Part) -> Fraction | None:
+    """The least of the spacings that there are which leaves a design."""
+    apart = {
+        option.spacing_m(table.speed_mps, table.distance_m)
+        for table, every in [(one, one.anywhere()) for one in problem.roles]
+        for option in every.first_of_each(every.sensor)
+    }
+    tried = sorted(apart)
+    first, last = 0, len(tried)
+    while first < last:
+        middle = (first + last) // 2
+        if is_feasible(moved(problem, {part: float(tried[middle])})):
+            last = middle
+        else:
+            first = middle + 1
+    return tried[first] if first < len(tried) else None
 
 
 def _least_simulated(problem: Problem, part: Part) -> Fraction | None:

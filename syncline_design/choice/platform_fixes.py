@@ -16,10 +16,10 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choice.acceptable import without_simulation
-from syncline_design.choice.options import Option, Options
+from syncline_design.choice.options import MARGIN, Option, Options
 from syncline_design.choice.outcome import Fix
 from syncline_design.choice.parts import CLOSE, is_feasible
-from syncline_design.choice.table import NOTHING, Pair, Problem, RoleTable, with_limits
+from syncline_design.choice.table import NOTHING, Limits, Pair, Problem, RoleTable, with_limits
 from syncline_design.choice.variations import (
     PLATFORM_FIGURES,
     Build,
@@ -98,7 +98,7 @@ class _Asked:
         """Whether the far end keeps every sum and still fails in simulation: then no value helps,
         since a slower or nearer vehicle errs no more."""
         last = self._problem(end)
-        if last.judge is None or end > self.before or self._ends_of_reach(self.before, end):
+        if last.judge is None or end > self.before or self._edges(self.before, end):
             return False
         return is_feasible(without_simulation(last)) and not is_feasible(last)
 
@@ -124,7 +124,7 @@ class _Asked:
             if not is_feasible(best):
                 continue
             if abs(other - one) <= CLOSE * max(one, other):
-                for value in (*self._ends_of_reach(one, other), other):
+                for value in (*self._edges(one, other), other):
                     if self._keeps_sums(value):
                         return one, value
                 continue
@@ -132,21 +132,39 @@ class _Asked:
             ranges += [(middle, other), (one, middle)]
         return None
 
-    def _moved(self, one: float, other: float) -> Moved | None:
-        """How the stage moves where the figure is its distance."""
-        if self.figure != "distance":
-            return None
-        return self.stage, min(one, other), max(one, other)
+    def _moved(self, one: float, other: float) -> Moved:
+        """Where and how fast the stage is between two values of the figure."""
+        least, most = min(one, other), max(one, other)
+        near = far = float(platform_figure(self.case, self.stage, "distance"))
+        slowest = float(platform_figure(self.case, self.stage, "v_max"))
+        if self.figure == "distance":
+            near, far = least, most
+        elif self.figure == "v_max":
+            slowest = least
+        return Moved(self.stage, near, far, slowest)
 
-    def _ends_of_reach(self, one: float, other: float) -> list[float]:
-        """Distances from one to another at which an option comes or goes, in that order."""
-        ends: set[float] = set()
-        for table in self._problem(one).roles if self.figure == "distance" else ():
+    def _edges(self, one: float, other: float) -> list[float]:
+        """Values from one to another at which an option comes or goes, in that order."""
+        found: set[float] = set()
+        problem = self._problem(one)
+        for table in problem.roles:
             if table.stage == self.stage:
-                pool = table.anywhere()
-                ends.update(np.concatenate([pool.near, pool.far]).tolist())
+                found |= self._edges_of(table, problem.limits.spacing_m)
         low, high = min(one, other), max(one, other)
-        return sorted((d for d in ends if low <= d <= high), reverse=other < one)
+        return sorted((d for d in found if low <= d <= high), reverse=other < one)
+
+    def _edges_of(self, table: RoleTable, spacing_m: float | None) -> set[float]:
+        """The same of one role: ends of reach; where samples get as far apart as they may."""
+        pool, found = table.anywhere(), []
+        speed, distance = float(table.speed_mps), float(table.distance_m)
+        if self.figure == "distance":
+            found += [pool.near, pool.far]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            if self.figure == "distance" and spacing_m is not None:
+                found.append(spacing_m * pool.sound / (2.0 * speed))
+            if self.figure == "v_max" and spacing_m is not None:
+                found.append(spacing_m / np.maximum(1.0 / pool.rate, 2.0 * distance / pool.sound))
+        return {value for one in found for value in one.tolist() if math.isfinite(value)}
 
     def _nearer(self, start: float, end: float) -> tuple[float, float]:
         """(last value that fails, first that holds); both fail where none is found.
@@ -206,7 +224,7 @@ class _Asked:
 
     def _edge(self, fails: float, works: float) -> float:
         """The value nearest to one that fails that holds, to 1e-4, or where an option comes in."""
-        for end in self._ends_of_reach(fails, works):
+        for end in self._edges(fails, works):
             if end != fails and self._holds(end):
                 works = end
                 break
@@ -236,20 +254,28 @@ def _shares(start: float, end: float) -> Iterator[float]:
             yield value
 
 
-Moved = tuple[int, float, float]  # a stage, and between which distances [m] its objects are
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """Where and how fast a stage is, at one of several values of a figure: between which distances
+    [m], and how fast at least [m/s]."""
+
+    stage: int
+    near: float
+    far: float
+    slowest: float
 
 
 def better_of(one: Problem, other: Problem, moved: Moved | None = None) -> Problem:
     """A problem that has a design wherever one of two, or any between them, has.
 
     For figures that move steadily from one to the other: each option takes the smaller error for
-    the total, the larger noise against its timestamps, the smaller tau and rate.  moved: where the
-    figure is the distance of a stage; its options are those that measure at any in between.
+    the total, the larger noise against its timestamps, the smaller tau and rate.  moved: the stage
+    whose figure it is; its options are those that work anywhere in between.
     """
     first, second = (_open(problem) for problem in (one, other))
-    limit = one.limits.sync
     roles = tuple(
-        _better_role(a, b, limit, moved) for a, b in zip(first.roles, second.roles, strict=True)
+        _better_role(a, b, one.limits, moved)
+        for a, b in zip(first.roles, second.roles, strict=True)
     )
     rate = min(one.sync_rate(), other.sync_rate())
     fixed = min(one.fixed_error(), other.fixed_error())
@@ -275,15 +301,19 @@ def _slower(one: Pair, other: Pair) -> Pair:
     return replace(one, rate_mps=float(rate), exact_rate_mps=rate)
 
 
-def _better_role(one: RoleTable, other: RoleTable, limit: float, moved: Moved | None) -> RoleTable:
-    """The better of each option; at every distance the same ones are in reach or beyond."""
-    near, far = (0.0, math.inf)
+def _better_role(
+    one: RoleTable, other: RoleTable, limits: Limits, moved: Moved | None
+) -> RoleTable:
+    """The better of each option; wherever a stage is, the same ones are here or beyond."""
     first, second = _by_name(one.pool()), _by_name(other.pool())
-    if moved is not None and moved[0] == one.stage:
-        _, near, far = moved
+    if moved is not None and moved.stage == one.stage:
         first, second = _by_name(one.anywhere()), _by_name(other.anywhere())
-    keeps = first.keep_own_tau_crit(limit) | second.keep_own_tau_crit(limit)
-    keeps &= first.reach(near, far)
+    keeps = first.keep_own_tau_crit(limits.sync) | second.keep_own_tau_crit(limits.sync)
+    if moved is not None and moved.stage == one.stage:
+        keeps &= first.reach(moved.near, moved.far)
+        if limits.spacing_m is not None:
+            apart = first.spacing(moved.slowest, moved.near)
+            keeps &= apart <= limits.spacing_m * (1.0 + MARGIN)
     beside = dict(zip(first.at.tolist(), second.at.tolist(), strict=True))
     better = replace(
         first,

@@ -18,9 +18,9 @@ from syncline_design.choice.candidates import (
     SensorEffects,
     candidates,
     motion_of,
-    resources_of,
 )
 from syncline_design.choice.options import RESOURCES
+from syncline_design.choice.prices import resources_of
 from syncline_design.choice.table import (
     NO_CLOCK,
     ClockOption,
@@ -56,7 +56,7 @@ def build_problem(
     limits = _limits(case)
     vehicles = list(dict.fromkeys(stage.vehicle_name for stage in spec.stages))
     tables = tuple(
-        _role_table(case, stage, role, limits.sync, vehicles, known, by_sensor)
+        _role_table(case, stage, role, limits, vehicles, known, by_sensor)
         for stage in case.stages
         for role in stage.roles
     )
@@ -128,22 +128,23 @@ def _limits(case: Case) -> Limits:
     budgets = {name: tightest[name][0] if name in tightest else None for name in RESOURCES}
     accuracy = float(tightest["accuracy"][0]) if "accuracy" in tightest else None
     sync = float(tightest["sync"][0]) if "sync" in tightest else 1.0
+    spacing = float(tightest["sample_spacing"][0]) if "sample_spacing" in tightest else None
     ids = tuple((kind, name) for kind, (_, name) in tightest.items() if kind != "monte_carlo")
-    return Limits(accuracy, sync, budgets["cost"], budgets["mass"], budgets["power"], ids)
+    return Limits(accuracy, sync, budgets["cost"], budgets["mass"], budgets["power"], ids, spacing)
 
 
 def _role_table(
     case: Case,
     stage: StageCase,
     role: RoleCase,
-    sync_limit: float,
+    limits: Limits,
     vehicles: list[str],
     known: Known,
     by_sensor: BySensor,
 ) -> RoleTable:
     usual = SensorEffects(known.extra_tau_s.get((stage.choice.name, role.role), 0.0))
     found = candidates(case, stage, role, usual, by_sensor)
-    return found.table(vehicles.index(stage.choice.vehicle_name), sync_limit)
+    return found.table(vehicles.index(stage.choice.vehicle_name), limits)
 
 
 def _pairs(tables: tuple[RoleTable, ...], motions: Sequence[Motion]) -> tuple[Pair, ...]:

@@ -200,8 +200,7 @@ def _platform_slack(
         same = same_design(alone, only, other)
         if same is not None:
             return broken(other, evaluate(other, same))
-        reached = all(len(table.pool()) for table in other.roles)
-        return ("sync",) if reached else ("feasible",)
+        return (_gone(other),)
 
     fails = _first(lambda at: not kinds_broken(at), _tried(value, GROWTHS))
     unit = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}[figure]
@@ -212,6 +211,16 @@ def _platform_slack(
         return what_if(asked.problem, figure, at)
 
     return _with_payload(row, asked, changed, fails_never=False)
+
+
+def _gone(problem: Problem) -> str:
+    """Why the one option of a role is no longer there: kind of what is broken."""
+    for table in problem.roles:
+        beyond = table.excluded.beyond
+        if len(beyond):
+            distance = float(table.distance_m)
+            return "sample_spacing" if beyond.reach(distance, distance).all() else "feasible"
+    return "sync"
 
 
 WhatIf = Callable[[Problem, PlatformFigure, float], Problem]

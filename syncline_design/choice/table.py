@@ -14,7 +14,14 @@ from typing import Literal, Protocol
 import numpy as np
 
 from syncline_design.choice.exclusions import Exclusions
-from syncline_design.choice.options import Options, Requires, ResourceName, Resources, exactly
+from syncline_design.choice.options import (
+    Bools,
+    Options,
+    Requires,
+    ResourceName,
+    Resources,
+    exactly,
+)
 from syncline_design.model.roles import RoleName
 
 NOTHING = Exclusions.of(())
@@ -24,7 +31,10 @@ SyncModel = Literal["syncline", "per_sensor"]
 
 @dataclass(frozen=True, slots=True)
 class RoleTable:
-    """Options of one role; no two of them have the same names."""
+    """Options of one role; no two of them have the same names.
+
+    distance_m, speed_mps: where and how fast its stage is, for what depends on it.
+    """
 
     stage: int
     stage_name: str
@@ -32,6 +42,8 @@ class RoleTable:
     vehicle: int
     options: Options
     excluded: Exclusions = NOTHING
+    distance_m: Fraction = Fraction(0)
+    speed_mps: Fraction = Fraction(0)
 
     def __post_init__(self) -> None:
         if not isinstance(self.options, Options):  # given one by one
@@ -46,6 +58,17 @@ class RoleTable:
     def anywhere(self) -> Options:
         """The options at this and at any other distance, poor ones included."""
         return self.pool().joined(self.excluded.beyond)
+
+    def settled(self, every: Options, limits: Limits) -> RoleTable:
+        """The table with those of these options that work where it is, under these limits."""
+        here, beyond = every.parted(self.works(every, limits.spacing_m))
+        return self.with_pool(here, limits.sync, beyond)
+
+    def works(self, options: Options, spacing_m: float | None) -> Bools:
+        """Which options are in reach here, and take samples close enough."""
+        distance = float(self.distance_m)
+        in_reach = options.reach(distance, distance)
+        return in_reach & options.keep_spacing(self.speed_mps, self.distance_m, spacing_m)
 
     def with_pool(self, pool: Options, limit: float, beyond: Options | None = None) -> RoleTable:
         """The table with these options, as far as they keep their own tau_crit times a limit.
@@ -139,6 +162,7 @@ class Limits:
     mass: Fraction | None = None
     power: Fraction | None = None
     ids: tuple[tuple[str, str], ...] = field(default=())  # (kind, requirement id)
+    spacing_m: float | None = None  # between two samples of a ranging sensor
 
     def budget(self, name: ResourceName) -> Fraction | None:
         """The budget of one resource, None when there is none."""
@@ -234,7 +258,10 @@ class Design:
 
 
 def with_limits(problem: Problem, limits: Limits) -> Problem:
-    """The same problem under other limits; a relaxed sync limit brings excluded options back."""
+    """The same problem under other limits; relaxed ones of sync and spacing bring options back."""
+    if limits.spacing_m != problem.limits.spacing_m:
+        roles = tuple(table.settled(table.anywhere(), limits) for table in problem.roles)
+        return replace(problem, roles=roles, limits=limits)
     if limits.sync == problem.limits.sync:
         return replace(problem, limits=limits)
     roles = tuple(table.with_pool(table.pool(), limits.sync) for table in problem.roles)

@@ -201,9 +201,7 @@ class Moving:
         motions = [motion_of(stage) for stage in self.case.stages]
         motion = motions[self.stage] = _with_figure(motions[self.stage], figure, Fraction(value))
         roles = tuple(
-            self.sources[r].moved(table, motion, problem.limits.sync)
-            if r in self.sources
-            else table
+            self.sources[r].moved(table, motion, problem.limits) if r in self.sources else table
             for r, table in enumerate(problem.roles)
         )
         return with_motions(replace(problem, roles=roles), motions)

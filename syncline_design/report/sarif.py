@@ -41,6 +41,8 @@ _RULES: Final[dict[str, str]] = {
     "clock": "The host's clock keeps its bound.",
     "speed": "The vehicle keeps the spec's v_max.",
     "rate": "The vehicle keeps the spec's omega_max.",
+    "sample_spacing": "Two samples of a ranging sensor are close enough.",
+    "feasible": "Every entry can work where it stands.",
     "infeasible": "Some design meets every requirement.",
     "indeterminate": "A verdict could be reached.",
     "spec": "The spec can be read.",

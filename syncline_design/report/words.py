@@ -35,6 +35,7 @@ KINDS: Final[dict[str, str]] = {
     "tvu": "vertical error, quantile (TVU)",
     "rmse": "root mean square error",
     "quantile": "error, quantile",
+    "sample_spacing": "ground between two samples",
     "feasible": "entries that cannot work where they stand",
 }
 AXES: Final[dict[str, str]] = {"horizontal": "horizontal", "vertical": "vertical", "3d": "3D"}

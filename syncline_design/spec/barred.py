@@ -11,21 +11,24 @@ from collections.abc import Iterable, Iterator
 from syncline_design.spec.case import Candidate, Case, StageCase
 from syncline_design.spec.catalog import ClockEntry, Product, SensorEntry, TimestampingEntry
 from syncline_design.spec.existence import (
-    ORDER,
+    SOUND_MPS,
     RuledOut,
     Surroundings,
     not_sold,
     not_told,
     out_of_place,
+    strongest,
     too_hot_or_cold,
 )
 from syncline_design.spec.facts import Medium
 from syncline_design.spec.gnss import deaf_sensor, is_submerged, untimed_clock, untimed_method
+from syncline_design.spec.spec import Spec
 
 
-def surroundings(stage: StageCase) -> Surroundings:
+def surroundings(stage: StageCase, spec: Spec) -> Surroundings:
     """What a stage of a spec asks of its sensors."""
     choice, distance = stage.choice, stage.platform.entry.distance
+    asked = (one.limit for one in spec.requirements if one.kind == "sample_spacing")
     return Surroundings(
         choice.name,
         distance,
@@ -35,6 +38,9 @@ def surroundings(stage: StageCase) -> Surroundings:
         choice.depth,
         choice.temperature,
         choice.reflectivity,
+        stage.platform.entry.v_max,
+        min(asked, default=None),
+        choice.sound_speed or SOUND_MPS,
     )
 
 
@@ -98,4 +104,5 @@ def _not_sold(case: Case, name: str, entry: Product) -> Iterator[RuledOut]:
 
 
 def _strongest(found: Iterable[RuledOut]) -> RuledOut | None:
-    return min(found, key=lambda one: ORDER.index(one.code), default=None)
+    listed = list(found)
+    return strongest(listed) if listed else None

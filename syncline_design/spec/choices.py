@@ -16,6 +16,7 @@ from syncline_design.spec.fields import (
     Money,
     NonNegativeLength,
     PositiveLength,
+    PositiveSpeed,
     Speed,
     Text,
     Vector,
@@ -197,6 +198,7 @@ class StageChoice(FileRecord):
     look: FieldOfView | None = None  # where the ranging sensor has to look
     temperature: TemperatureInterval | None = None
     reflectivity: Reflectivity | None = None  # of the object
+    sound_speed: PositiveSpeed | None = None  # in the water; None: 1500 m/s
     timing_from: Text | None = None  # stage that GNSS time comes from, by a cable
     note: str = ""
 

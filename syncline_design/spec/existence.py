@@ -7,12 +7,14 @@ named, so that somebody looks it up.  The rules know neither specs nor catalogs,
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.spec.catalog import Product, SensorEntry
+from syncline_design.spec.exact import fraction_of
 from syncline_design.spec.facts import FULL_TURN, FieldOfView, Medium
 
 Code = Literal[
@@ -20,6 +22,8 @@ Code = Literal[
     "unknown-fact",
 ]  # fmt: skip
 ORDER: tuple[Code, ...] = get_args(Code)  # the strongest reason first
+SOUND_MPS = 1500.0  # in sea water, unless a stage says otherwise
+_ACOUSTIC = re.compile(r"[us]s?bl|lbl|sonar|beam|mbes|sbes|echo|acoustic|adcp|dvl")
 _SLACK = 1e-12  # of sums and differences of angles
 
 
@@ -28,7 +32,8 @@ class Surroundings:
     """What a stage asks of its sensors; None: it asks nothing of that kind.
 
     nearest, farthest: distance to the object [m]; medium: of the path to it; reflectivity: of the
-    object, 0.8 for 80 %.
+    object, 0.8 for 80 %; speed: the vehicle's largest [m/s]; spacing: between two samples at that
+    speed, at most [m]; sound_speed: in the water [m/s].
     """
 
     stage: str
@@ -39,6 +44,9 @@ class Surroundings:
     depth: float | None = None
     temperature: Quantity | None = None
     reflectivity: float | None = None
+    speed: float | None = None
+    spacing: float | None = None
+    sound_speed: float = SOUND_MPS
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +68,19 @@ class NotTold:
     reason: str
 
 
+def strongest(found: Sequence[RuledOut]) -> RuledOut:
+    """The reason that is told of several."""
+    return min(found, key=lambda one: ORDER.index(one.code))
+
+
 def ruled_out(
     identity: str, sensor: SensorEntry, around: Surroundings, allow_discontinued: bool = False
 ) -> Iterator[RuledOut]:
-    """Every reason why a sensor cannot work on a stage, the strongest first."""
+    """Every reason why a sensor cannot work on a stage."""
     yield from out_of_reach(identity, sensor, around)
     yield from out_of_place(identity, sensor, around)
+    if sensor.modality == "ranging":
+        yield from too_sparse(identity, sensor, around)
     if not allow_discontinued:
         yield from not_sold(identity, sensor)
 
@@ -102,10 +117,47 @@ def not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterat
             if wanted is not None and (seen is None or getattr(seen, axis) is None):
                 asked = f"{around.stage} looks {wanted.text} in {axis}"
                 yield _unknown(identity, f"field_of_view.{axis}", asked)
+        if around.spacing is not None and sensor.rate is None:
+            asked = f"samples are to be {_length(around.spacing)} apart at most"
+            yield _unknown(identity, "rate", asked)
     if around.depth and sensor.depth_rating is None:
         yield _unknown(identity, "depth_rating", f"{around.stage} is at {_length(around.depth)}")
     if around.temperature is not None and sensor.temperature is None:
         yield _unknown(identity, "temperature", f"{around.stage} has {around.temperature.text}")
+
+
+def is_acoustic(kind: str) -> bool:
+    """Whether a sensor's type names one that ranges by sound: usbl, mbes, single_beam, sonar."""
+    return _ACOUSTIC.search(kind.casefold()) is not None
+
+
+def too_sparse(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:
+    """Samples at v_max are no farther apart than asked: v_max / rate.
+
+    Of sound the next ping waits for the echo: the rate is at most c / (2 d).
+    """
+    found = spacing_m(sensor, around)
+    if around.spacing is None or found is None or found <= around.spacing:
+        return
+    rate = getattr(sensor.rate, "text", "") or f"{_length(around.farthest)} for sound and back"
+    figure = f"rate: {rate}, {_length(found)} apart"
+    reason = (
+        f"{identity}: samples are {_length(found)} apart at {around.stage}'s v_max ({rate}), "
+        f"asked are {_length(around.spacing)}"
+    )
+    yield RuledOut("rate", reason, figure, f"sample_spacing: {_length(around.spacing)}")
+
+
+def spacing_m(sensor: SensorEntry, around: Surroundings) -> float | None:
+    """Ground between two samples at the stage's speed [m], as far as it is told; None: not told."""
+    waits = []
+    speed = around.speed or 0.0
+    if sensor.rate is not None:
+        waits.append(fraction_of(speed) / fraction_of(sensor.rate))
+    if is_acoustic(sensor.type):
+        echo = 2 * fraction_of(around.farthest) / fraction_of(around.sound_speed)
+        waits.append(fraction_of(speed) * echo)
+    return float(max(waits)) if waits else None
 
 
 def _unknown(identity: str, key: str, asked: str) -> NotTold:

@@ -33,6 +33,7 @@ LIMIT_DIMENSIONS: dict[str, Dimension] = {
     "tvu": Dimension.LENGTH,
     "rmse": Dimension.LENGTH,
     "quantile": Dimension.LENGTH,
+    "sample_spacing": Dimension.LENGTH,
 }
 STATED_KINDS: Final = ("worst_case", "thu", "tvu", "rmse", "quantile")  # of the error's figures
 JUDGED_KINDS: Final = ("monte_carlo", *STATED_KINDS)  # decided design by design, not by sums
@@ -124,7 +125,7 @@ class Requirement(FileRecord):
     id: Text
     kind: Literal[
         "accuracy", "sync", "cost", "mass", "power", "monte_carlo",
-        "worst_case", "thu", "tvu", "rmse", "quantile",
+        "worst_case", "thu", "tvu", "rmse", "quantile", "sample_spacing",
     ]  # fmt: skip
     limit: float
     quantile: float | None = None
@@ -145,7 +146,7 @@ class Requirement(FileRecord):
             return read_number(value, 0.0, above=True)
         if kind in STATED_KINDS and isinstance(value, Mapping):
             return read_distance_limit(value)
-        above = kind in ("accuracy", *JUDGED_KINDS)
+        above = kind in ("accuracy", "sample_spacing", *JUDGED_KINDS)
         return read_quantity(value, LIMIT_DIMENSIONS[kind], 0.0, above)
 
     @reads_field("quantile", "confidence", "p", mode="plain", json_schema_input_type=float)

@@ -129,6 +129,7 @@ class Spec(FileRecord):
             *_duplicates("stages", "name", [s.name for s in self.stages]),
             *_rate_errors(self),
             *_stage_errors(self),
+            *_spacing_errors(self),
         ]
         if errors:
             raise refusals(errors)
@@ -191,6 +192,18 @@ def _stage_errors(spec: Spec) -> list[Located]:
             if role is not None and role.is_empty:
                 errors.append(((*at, name), refusal("no sensor", "sensor or candidates")))
     return errors
+
+
+def _spacing_errors(spec: Spec) -> list[Located]:
+    """The spacing of samples is that of ranging sensors: there has to be one."""
+    if any(stage.ranging is not None for stage in spec.stages):
+        return []
+    error = refusal("no ranging sensor to take samples", "a stage with ranging", hint="delete it")
+    return [
+        (("requirements", index, "kind"), error)
+        for index, one in enumerate(spec.requirements)
+        if one.kind == "sample_spacing"
+    ]
 
 
 def _cable_errors(spec: Spec, stage: StageChoice, at: KeyPath) -> list[Located]:

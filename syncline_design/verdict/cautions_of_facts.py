@@ -22,7 +22,7 @@ def fact_cautions(case: Case, system: System) -> tuple[Caution, ...]:
     """Facts that a rule of this spec needs of the chosen payload and nobody gives, the weightiest
     first; then what holds for bright objects alone."""
     chosen = list(_chosen(case, system))
-    silent = [caution for one in chosen for caution in _silent(one)]
+    silent = [caution for one in chosen for caution in _silent(case, one)]
     silent += [caution for one in chosen for caution in _pathless(one)]
     silent.sort(key=lambda one: FIRST.index((one.key or "").partition(".")[0]))
     return (*silent, *_favoured(chosen))
@@ -37,9 +37,9 @@ def _chosen(case: Case, system: System) -> Iterator[Chosen]:
                 yield found, one.id, entry
 
 
-def _silent(one: Chosen) -> Iterator[Caution]:
+def _silent(case: Case, one: Chosen) -> Iterator[Caution]:
     stage, name, entry = one
-    for fact in not_told(name, entry, surroundings(stage)):
+    for fact in not_told(name, entry, surroundings(stage, case.spec)):
         yield Caution("unknown-fact", fact.reason, entry=fact.entry, key=fact.key)
 
 

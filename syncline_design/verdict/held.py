@@ -54,11 +54,12 @@ def results(
             result = decided(
                 id=one.id,
                 kind=one.kind,
-                status="pass" if one.passed else "fail",
+                status="indeterminate" if one.left_open else "pass" if one.passed else "fail",
                 value=one.value_float,
                 limit=float(one.limit),
                 unit=UNITS.get(one.kind, case.spec.currency),
-                note="" if one.value is not None else f"a catalog entry gives no {one.kind}",
+                note=one.note
+                or ("" if one.value is not None else f"a catalog entry gives no {one.kind}"),
             )
         yield placed(case, index, requirement, result, settings)
 

@@ -22,13 +22,13 @@ from typing import Any, Literal
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import NOTHING_KNOWN, Case, Known, RoleCase, StageCase
 from syncline_design.spec.selection import RoleSelection, Selection
-from syncline_design.verdict.recheck_facts import impossible
+from syncline_design.verdict.recheck_facts import impossible, sample_spacing
 
 DIGITS = 60
 IMPLIED_SYNC = "SYNC"
 IMPLIED_FACTS = "FACTS"  # fails where a chosen entry cannot work where it stands
-SUMMED = ("accuracy", "sync", "cost", "mass", "power")
-Kind = Literal["accuracy", "sync", "cost", "mass", "power", "feasible"]
+SUMMED = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
+Kind = Literal["accuracy", "sync", "cost", "mass", "power", "sample_spacing", "feasible"]
 BUDGETS: tuple[Literal["cost", "mass", "power"], ...] = ("cost", "mass", "power")
 
 
@@ -41,6 +41,7 @@ class Rechecked:
     """One requirement: its exact value and limit, and whether it is met.
 
     value None: a catalog entry does not say.  implied: no requirement of the spec says it.
+    left_open: what is told keeps the limit, but an entry does not tell all of it.
     """
 
     id: str
@@ -50,6 +51,7 @@ class Rechecked:
     passed: bool
     implied: bool = False
     note: str = ""
+    left_open: bool = False
 
     @property
     def value_float(self) -> float | None:
@@ -120,8 +122,9 @@ def _recheck(case: Case, selection: Selection, known: Known) -> Recheck:
     amounts = {name: _amount(case, selection, chosen, name) for name in BUDGETS}
     found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
     found |= {"accuracy": Fraction(total), "sync": Fraction(max(ratios))}
+    found["sample_spacing"], silent = sample_spacing(case, selection)
     return Recheck(
-        (*_facts(case, selection), *_requirements(case, found)),
+        (*_facts(case, selection), *_requirements(case, found, silent)),
         amounts["cost"],
         amounts["mass"],
         amounts["power"],
@@ -358,7 +361,10 @@ def _money(case: Case, amount: Any) -> Fraction:
     return exact * Fraction(getattr(case.spec.exchange_rates[currency], "exact", 0))
 
 
-def _requirements(case: Case, found: Mapping[str, Fraction | None]) -> Iterator[Rechecked]:
+def _requirements(
+    case: Case, found: Mapping[str, Fraction | None], silent: Sequence[str]
+) -> Iterator[Rechecked]:
+    """silent: sensors whose rate is not told."""
     written = [one for one in case.spec.requirements if one.kind in SUMMED]
     if not any(one.kind == "sync" for one in written):
         value = found["sync"]
@@ -369,7 +375,12 @@ def _requirements(case: Case, found: Mapping[str, Fraction | None]) -> Iterator[
         limit = _money(case, one.limit) if one.kind == "cost" else _exact(one.limit)
         value = found[one.kind]
         kind: Kind = one.kind  # type: ignore[assignment]  # others are left out above
-        yield Rechecked(one.id, kind, value, limit, _meets(one.kind, value, limit))
+        met = _meets(one.kind, value, limit)
+        if one.kind == "sample_spacing" and silent and (met or value is None):
+            note = f"{', '.join(silent)} gives no rate"
+            yield Rechecked(one.id, kind, None, limit, False, note=note, left_open=True)
+            continue
+        yield Rechecked(one.id, kind, value, limit, met)
 
 
 def _facts(case: Case, selection: Selection) -> Iterator[Rechecked]:
@@ -388,7 +399,7 @@ def _meets(kind: str, value: Fraction | None, limit: Fraction) -> bool:
     """Errors and ratios as floats rounded once, sums as they are; sync is strict."""
     if value is None:
         return False
-    if kind == "accuracy":
+    if kind in ("accuracy", "sample_spacing"):
         return float(value) <= float(limit)
     if kind == "sync":
         return float(value) < float(limit)

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator
+from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
@@ -28,10 +29,42 @@ RECEIVER = re.compile(
     r"|sdcm|kass|ppp|vrs|ntrip|omnistar|terrastar|satellite|global[^a-z0-9]+positioning)(?![a-z0-9])"
 )
 
+# Types of sensors that range by sound.
+SONAR = re.compile("usbl|ssbl|sbl|lbl|mbes|sbes|sonar|beam|echo|acoustic|adcp|dvl")
+
 
 def impossible(case: Case, selection: Selection) -> list[str]:
     """What of a selection cannot work where it stands, in words; empty where all can."""
     return [*_sensors_and_methods(case, selection), *_clocks(case, selection)]
+
+
+def sample_spacing(case: Case, selection: Selection) -> tuple[Fraction | None, list[str]]:
+    """Largest ground between two samples of a ranging sensor at v_max [m], as far as it is told,
+    and the sensors that do not tell how often they measure.
+
+    v_max / rate; who ranges by sound waits 2 d / c besides, whatever the rate: the slower counts.
+    """
+    stages = {stage.choice.name: stage for stage in case.stages}
+    found, silent = [], []
+    for one in selection.roles:
+        stage: Any = stages[one.stage]
+        if one.role != "ranging":
+            continue
+        sensor = stage.role("ranging").sensor(one.sensor)
+        speed, distance = (_exact(getattr(stage.platform.entry, k)) for k in ("v_max", "distance"))
+        if sensor.rate is None:
+            silent.append(one.sensor)
+        else:
+            found.append(speed / _exact(sensor.rate))
+        if SONAR.search(sensor.type.lower()):
+            sound = stage.choice.sound_speed
+            sound = Fraction(1500) if sound is None else _exact(sound)
+            found.append(speed * 2 * distance / sound)
+    return max(found, default=None), silent
+
+
+def _exact(value: Any) -> Fraction:
+    return Fraction(getattr(value, "exact", value))
 
 
 def _sensors_and_methods(case: Case, selection: Selection) -> Iterator[str]:
@@ -111,6 +144,9 @@ def _standing(case: Case, stage: Any, name: str, sensor: Any) -> Iterator[str]:
         yield from _path(stage, name, sensor)
         yield from _directions(choice, name, sensor)
     if case.spec.strict_facts:
+        asked = any(one.kind == "sample_spacing" for one in case.spec.requirements)
+        if asked and sensor.modality == "ranging" and sensor.rate is None:
+            yield f"{name} does not tell its rate"
         yield from (f"{name} does not tell its {key}" for key in _silent(stage, sensor))
 
 

@@ -35,6 +35,7 @@ UNITS = {
     **dict.fromkeys(JUDGED_KINDS, "m"),
     "sync": "1",
     "feasible": "1",
+    "sample_spacing": "m",
     "mass": "kg",
     "power": "W",
 }

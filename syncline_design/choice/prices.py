@@ -1,0 +1,39 @@
+"""What entries cost, weigh and draw together."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from syncline_design.choice.options import RESOURCES, ResourceName, Resources
+from syncline_design.model.quantity import Quantity
+from syncline_design.spec.case import Case
+from syncline_design.spec.catalog import (
+    ClockEntry,
+    InfrastructureEntry,
+    SensorEntry,
+    TimestampingEntry,
+)
+from syncline_design.spec.exact import fraction_of
+
+Priced = SensorEntry | TimestampingEntry | ClockEntry | InfrastructureEntry
+
+
+def resources_of(case: Case, *entries: Priced | None) -> Resources:
+    """Sums over entries; None where one of them does not say."""
+    sums: dict[str, Fraction | None] = {}
+    for name in RESOURCES:
+        amounts = [amount_of(case, name, entry) for entry in entries]
+        known = [amount for amount in amounts if amount is not None]
+        sums[name] = sum(known, Fraction(0)) if len(known) == len(amounts) else None
+    return Resources(**sums)
+
+
+def amount_of(case: Case, name: ResourceName, entry: Priced | None) -> Fraction | None:
+    """What an entry takes; None where it does not say, or in a currency without a rate (loading
+    refuses those of a spec's own).  Without an entry: nothing."""
+    if entry is None:
+        return Fraction(0)
+    amount = getattr(entry, name)
+    if name == "cost" and isinstance(amount, Quantity):
+        return case.spec.in_currency(amount) if case.spec.can_convert(amount) else None
+    return None if amount is None else fraction_of(amount)
