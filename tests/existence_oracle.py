@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 import random
 from pathlib import Path
+from typing import Any
 
 from existence_specs import Raw, written
-from plain_enumeration import Enumeration, Outcome, failed, read_catalog
+from plain_enumeration import Enumeration, Outcome, failed, number, read_catalog
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.front import front
@@ -149,3 +151,90 @@ def _recheck(case: Case, plain: Plain, rng: random.Random) -> list[str]:
         if bool(found) != wrong:
             out.append(f"recheck {found}, the oracle {wrong}: {roles} {clocks}")
     return out
+
+
+# ------------------------------------------------------------------ what would help
+
+UNITS = {"distance": ("m", 1.0), "v_max": ("m/s", 1.0), "omega_max": ("deg/s", 180.0 / math.pi)}
+NEAR = 0.015  # a fix is written in few figures, and found to 1e-4
+
+
+def fix_disagreements(spec: Raw, parts: Raw, folder: Path) -> list[str]:
+    """Fixes of a spec without a design: each one leaves one, and none that is nearer was missed."""
+    if _meets(spec, parts):
+        return []
+    verdict = check_loaded(load(written(folder, spec, parts)), QUICK).to_json()
+    fixes = (verdict.get("infeasibility") or {"fixes": []})["fixes"]
+    out = [
+        f"no design with {fix['text']}"
+        for fix in fixes
+        if fix["kind"] != "timestamping" and not _meets(_fixed(spec, fix), parts)
+    ]
+    if verdict["verdict"] == "infeasible":
+        out += _missed(spec, parts, fixes)
+    return out
+
+
+def _meets(spec: Raw, parts: Raw) -> bool:
+    plain = Plain(spec, parts)
+    return any(not failed(spec, one) for one in plain)
+
+
+def _with(spec: Raw, stage: int, **keys: Any) -> Raw:
+    stages = [dict(one) for one in spec["stages"]]
+    stages[stage] |= keys
+    return spec | {"stages": stages}
+
+
+def _at(spec: Raw, stage: int, figure: str, value: float) -> Raw:
+    unit, factor = UNITS[figure]
+    platform = spec["stages"][stage]["platform"] | {figure: f"{value * factor:.15f} {unit}"}
+    return _with(spec, stage, platform=platform)
+
+
+def _fixed(spec: Raw, fix: Raw) -> Raw:
+    names = [one["name"] for one in spec["stages"]]
+    stage = names.index(fix["stage"]) if fix["stage"] else 0
+    if fix["kind"] == "platform":
+        return _at(spec, stage, fix["figure"], fix["to"])
+    if fix["figure"] == "gnss":
+        return _with(spec, stage, gnss="yes")
+    if fix["figure"] == "timing_from":
+        return _with(spec, stage, timing_from=fix["text"].split()[1])
+    if fix["kind"] == "facts":
+        return spec | {fix["figure"]: fix["figure"] == "allow_discontinued"}
+    limit = fix["to"] if fix["kind"] == "sync" else f"{fix['to']:.15f} m"
+    rows = [one | ({"limit": limit} if one["kind"] == fix["kind"] else {})
+            for one in spec["requirements"]]  # fmt: skip
+    return spec | {"requirements": rows}
+
+
+def _missed(spec: Raw, parts: Raw, fixes: list[Raw]) -> list[str]:
+    """Distances of a coarse grid, and ends of reach, that help and are nearer than what is said."""
+    out = []
+    for stage, raw in enumerate(spec["stages"]):
+        before = number(raw["platform"]["distance"])
+        told = [f["to"] for f in fixes if f["figure"] == "distance" and f["stage"] == raw["name"]]
+        for sign in (-1, 1):
+            side = [to for to in told if (to - before) * sign > 0]
+            reached = abs(math.log(side[0] / before)) if side else math.inf
+            for value in _grid(parts, before, sign):
+                if abs(math.log(value / before)) >= reached - NEAR:
+                    break
+                if _meets(_at(spec, stage, "distance", value), parts):
+                    out.append(f"{raw['name']}: {value} m helps, said is {side}")
+                    break
+    return out
+
+
+def _grid(parts: Raw, before: float, sign: int) -> list[float]:
+    """Values from the nearest to the farthest that is searched."""
+    far = math.log(10.0 if sign > 0 else 1000.0) * 0.99
+    values = [before * math.exp(sign * far * k / 25) for k in range(1, 26)]
+    for one in parts["sensors"].values():
+        reach = one.get("reach", {})
+        ends = reach.get("max")
+        ends = list(ends.values()) if isinstance(ends, dict) else [ends]
+        values += [number(end) for end in (*ends, reach.get("min")) if end is not None]
+    sided = [v for v in values if 1e-6 < math.log(v / before) * sign < far]
+    return sorted(sided, key=lambda v: abs(math.log(v / before)))

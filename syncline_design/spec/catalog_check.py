@@ -269,7 +269,7 @@ def _sizes(every: Sequence[_Place]) -> Mapping[tuple[str, str, str], list[float]
     for one in every:
         if isinstance(one.entry, SensorEntry):
             for key in _COMPARED:
-                if size := _size(one.entry, key):
+                if size := size_of(one.entry, key):
                     found.setdefault((one.entry.modality, one.entry.type, key), []).append(size)
     return {family: sorted(sizes) for family, sizes in found.items()}
 
@@ -282,7 +282,7 @@ def _siblings(
     if not isinstance(entry, SensorEntry) or not entry.type:
         return
     for key in _COMPARED:
-        value = _size(entry, key)
+        value = size_of(entry, key)
         if not value or key in entry.unusual:
             continue
         family = sizes[entry.modality, entry.type, key]
@@ -302,7 +302,7 @@ def _siblings(
             yield one.finding("siblings", key, message, hint)
 
 
-def _size(entry: Product, key: str) -> float | None:
+def size_of(entry: Product, key: str) -> float | None:
     """One number to compare by: a sigma over its axes, the far end of a reach."""
     value = getattr(entry, key)
     if isinstance(value, Reach):

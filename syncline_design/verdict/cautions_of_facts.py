@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Container, Iterable, Iterator
+from itertools import islice
 
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import System
 from syncline_design.spec.barred import path_medium, surroundings
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.catalog import Product, SensorEntry
-from syncline_design.spec.existence import not_told
+from syncline_design.spec.existence import is_acoustic, not_told
+from syncline_design.spec.plausibility import implausible
 from syncline_design.verdict.design_data import UsedEntry
 from syncline_design.verdict.tree import Caution
 
 # The order in which a wrong guess costs: first what nothing works without.
 FIRST = ("reach", "medium", "field_of_view", "rate", "depth_rating", "temperature")
 Chosen = tuple[StageCase, str, SensorEntry]
+MOST_LOOKED_AT = 100  # candidates of a spec without a design
 
 
 def fact_cautions(case: Case, system: System) -> tuple[Caution, ...]:
@@ -25,7 +28,19 @@ def fact_cautions(case: Case, system: System) -> tuple[Caution, ...]:
     silent = [caution for one in chosen for caution in _silent(case, one)]
     silent += [caution for one in chosen for caution in _pathless(one)]
     silent.sort(key=lambda one: FIRST.index((one.key or "").partition(".")[0]))
-    return (*silent, *_favoured(chosen))
+    names = {name for _, name, _ in chosen}
+    doubtful = implausible_cautions(case, names)
+    return (*doubtful, *silent, *_favoured(chosen), *_travelling(case, chosen))
+
+
+def implausible_cautions(case: Case, names: Container[str] | None = None) -> list[Caution]:
+    """Figures of a spec that are hardly meant; names: of the sensors to look at (None: of all)."""
+    every = (one for stage in case.stages for role in stage.roles for one in role.sensors)
+    sensors = islice((one for one in every if names is None or one.id in names), MOST_LOOKED_AT)
+    return [
+        Caution("implausible", one.reason, entry=one.entry, key=one.key)
+        for one in implausible(case, sensors)
+    ]
 
 
 def _chosen(case: Case, system: System) -> Iterator[Chosen]:
@@ -71,6 +86,27 @@ def _favoured(chosen: list[Chosen]) -> Iterator[Caution]:
                 entry=name,
                 key="reach",
             )
+
+
+def _travelling(case: Case, chosen: list[Chosen]) -> Iterator[Caution]:
+    """What vehicle and object move while sound is on its way: (v + d omega) 2 d / c [m].
+
+    It is in no figure of the verdict: the maker takes it out, or somebody has to.
+    """
+    for stage, name, entry in chosen:
+        if entry.modality != "ranging" or not is_acoustic(entry.type):
+            continue
+        platform, sound = stage.platform.entry, surroundings(stage, case.spec).sound_speed
+        echo = 2.0 * platform.distance / sound
+        moved = (platform.v_max + platform.distance * platform.omega_max) * echo
+        shown = format_quantity(moved, Dimension.LENGTH)
+        waits = format_quantity(echo, Dimension.TIME)
+        where = f"{name}: {stage.choice.name} and its object move up to {shown} while sound is on "
+        where += f"its way ({waits})"
+        said = "; the entry says that the maker corrects for it, and no figure here has it"
+        if "travel_time" not in entry.corrects:
+            said = "; no figure here has it: look up whether the maker corrects for it"
+        yield Caution("travel-time", where + said, entry=name, key="corrects")
 
 
 def lifecycle_cautions(entries: Iterable[UsedEntry]) -> Iterator[Caution]:

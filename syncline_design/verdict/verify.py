@@ -30,7 +30,7 @@ from syncline_design.verdict.acceptance import (
     simulation_settings,
 )
 from syncline_design.verdict.cautions import cautions
-from syncline_design.verdict.cautions_of_facts import lifecycle_cautions
+from syncline_design.verdict.cautions_of_facts import implausible_cautions, lifecycle_cautions
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
 from syncline_design.verdict.design_data import (
     assumptions,
@@ -243,7 +243,7 @@ def _infeasible(case: Case, problem: Problem, settings: CheckSettings, build: Bu
             placed(case, i, one, _unmet(case, one, one.id in conflict, minimal), settings)
             for i, one in enumerate(case.spec.requirements)
         ),
-        warnings=(late,) if found.cut_short else (),
+        warnings=(*((late,) if found.cut_short else ()), *implausible_cautions(case)),
         infeasibility=found,
         choice=without_choice(problem),
     )

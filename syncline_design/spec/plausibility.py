@@ -1,0 +1,141 @@
+"""Figures of a spec that are allowed and hardly meant: a unit slipped, a digit too many.
+
+Nothing here is refused.  A figure is held against what it says it is: a platform against the entry
+that it changes, or against all platforms of the catalogs; a lever arm against the largest of the
+platform; a sensor's noise against shipped sensors of its type.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from statistics import median
+from typing import Final
+
+from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.roles import ROLES
+from syncline_design.spec.case import Candidate, Case, StageCase
+from syncline_design.spec.catalog import PlatformEntry, SensorEntry
+from syncline_design.spec.catalog_check import FACTOR, FEWEST_SIBLINGS, size_of
+from syncline_design.spec.facts import SIGMA_DIMENSIONS
+from syncline_design.spec.load import load_builtin
+
+LONG_ARM: Final = 3.0  # times the largest lever arm that the platform says it has
+FIGURES: Final = {
+    "v_max": Dimension.SPEED,
+    "omega_max": Dimension.ANGULAR_RATE,
+    "baseline": Dimension.LENGTH,
+}
+DEGREE: Final = math.pi / 180.0
+SHIPPED: Final = "builtin:"  # origin of the product's own entries, which are looked over as such
+
+
+@dataclass(frozen=True, slots=True)
+class Implausible:
+    """A figure that stands apart: of an entry (None: of the spec itself), under which key."""
+
+    entry: str | None
+    key: str
+    reason: str
+
+
+def implausible(case: Case, sensors: Iterable[Candidate[SensorEntry]]) -> Iterator[Implausible]:
+    """What of a spec, and of some sensors that it may use, is hardly meant."""
+    for stage in case.stages:
+        yield from _platform(case, stage)
+        yield from _arms(stage)
+    for one in {sensor.id: sensor for sensor in sensors}.values():
+        if not one.origin.startswith(SHIPPED):
+            yield from _noise(one.id, one.entry)
+
+
+def _platform(case: Case, stage: StageCase) -> Iterator[Implausible]:
+    """Figures of a platform that the spec gives, against those it changes, or all there are."""
+    choice, others = stage.choice.platform, case.catalog.platforms
+    base = None if choice.use is None else others.get(choice.use)
+    for key in FIGURES:
+        value = getattr(choice, key)
+        if not isinstance(value, Quantity) or not value > 0.0:
+            continue
+        reason = _changed(key, value, base) if base else _unheard(key, value, others.values())
+        if reason:
+            name = stage.platform.id
+            yield Implausible(name, key, f"{stage.choice.name}: {key} {value.text} {reason}")
+
+
+def _changed(key: str, value: Quantity, base: PlatformEntry) -> str:
+    """Why a figure is hardly meant in place of the catalog's; empty where it may be."""
+    was: float = getattr(base, key)
+    if not was > 0.0 or was / FACTOR <= value <= was * FACTOR:
+        return ""
+    ratio = max(value / was, was / value)
+    way = "times" if value > was else "times less than"
+    shown = getattr(was, "text", format_quantity(was, FIGURES[key]))
+    return f"is {ratio:.3g} {way} the {shown} of the platform that it changes{_slip(value, was)}"
+
+
+def _unheard(key: str, value: Quantity, others: Iterable[PlatformEntry]) -> str:
+    """The same of a platform given in place: beyond all that are in the catalogs.
+
+    Small figures are nothing unheard of: a tripod does not move.
+    """
+    most = max((float(getattr(one, key)) for one in others), default=math.inf)
+    slip = _slip(value, most) if value > most else ""
+    if value <= most * FACTOR and not slip:
+        return ""
+    shown = format_quantity(most, FIGURES[key])
+    return f"is {value / most:.3g} times the most of any platform in the catalogs, {shown}{slip}"
+
+
+def _slip(value: Quantity, usual: float) -> str:
+    """A hint where the same number in degrees would be usual."""
+    number, _, unit = value.text.strip().partition(" ")
+    if unit.strip() != "rad/s":
+        return ""
+    in_degrees = float(value) * DEGREE
+    return f"; did you mean {number} deg/s?" if in_degrees <= usual * FACTOR else ""
+
+
+def _arms(stage: StageCase) -> Iterator[Implausible]:
+    """Lever arms against the largest between sensors of the platform."""
+    baseline = stage.platform.entry.baseline
+    for name in ROLES:
+        role = stage.choice.role(name)
+        arm = None if role is None else role.lever_arm
+        if arm is None:
+            continue
+        length = math.hypot(*arm)
+        if length > LONG_ARM * baseline:
+            shown = format_quantity(length, Dimension.LENGTH)
+            most = getattr(baseline, "text", format_quantity(baseline, Dimension.LENGTH))
+            where = f"stages[{stage.index}].{name}.lever_arm"
+            yield Implausible(
+                None, where,
+                f"{stage.choice.name}.{name}: a lever arm of {shown}, and the platform's baseline "
+                f"(its largest) is {most}",
+            )  # fmt: skip
+
+
+def _noise(name: str, entry: SensorEntry) -> Iterator[Implausible]:
+    """A sensor's sigmas against those of shipped sensors of its type."""
+    siblings = [
+        one
+        for one in (load_builtin().sensors.values() if entry.type else ())
+        if one.modality == entry.modality and one.type == entry.type
+    ]
+    for key, dimension in SIGMA_DIMENSIONS.items():
+        value = size_of(entry, key)
+        others = [size for one in siblings if (size := size_of(one, key))]
+        if not value or key in entry.unusual or len(others) < FEWEST_SIBLINGS:
+            continue
+        middle = median(others)
+        if not middle / FACTOR <= value <= middle * FACTOR:
+            ratio = max(value / middle, middle / value)
+            way = "more" if value > middle else "less"
+            shown = [format_quantity(figure, dimension) for figure in (value, middle)]
+            yield Implausible(
+                name, key,
+                f"{name}: {key} {shown[0]} is {ratio:.3g} times {way} than usual: the median of "
+                f"{len(others)} sensors of type {entry.type} is {shown[1]}",
+            )  # fmt: skip
