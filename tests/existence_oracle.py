@@ -161,21 +161,21 @@ NEAR = 0.015  # a fix is written in few figures, and found to 1e-4
 
 def fix_disagreements(spec: Raw, parts: Raw, folder: Path) -> list[str]:
     """Fixes of a spec without a design: each one leaves one, and none that is nearer was missed."""
-    if _meets(spec, parts):
+    if has_design(spec, parts):
         return []
     verdict = check_loaded(load(written(folder, spec, parts)), QUICK).to_json()
     fixes = (verdict.get("infeasibility") or {"fixes": []})["fixes"]
     out = [
         f"no design with {fix['text']}"
         for fix in fixes
-        if fix["kind"] != "timestamping" and not _meets(_fixed(spec, fix), parts)
+        if fix["kind"] != "timestamping" and not has_design(_fixed(spec, fix), parts)
     ]
     if verdict["verdict"] == "infeasible":
         out += _missed(spec, parts, fixes)
     return out
 
 
-def _meets(spec: Raw, parts: Raw) -> bool:
+def has_design(spec: Raw, parts: Raw) -> bool:
     plain = Plain(spec, parts)
     return any(not failed(spec, one) for one in plain)
 
@@ -221,7 +221,7 @@ def _missed(spec: Raw, parts: Raw, fixes: list[Raw]) -> list[str]:
             for value in _grid(parts, before, sign):
                 if abs(math.log(value / before)) >= reached - NEAR:
                     break
-                if _meets(_at(spec, stage, "distance", value), parts):
+                if has_design(_at(spec, stage, "distance", value), parts):
                     out.append(f"{raw['name']}: {value} m helps, said is {side}")
                     break
     return out

@@ -111,8 +111,10 @@ def medians_of_ins() -> float:
 @pytest.mark.parametrize(("factor", "odd"), [(1.0, False), (4.9, False), (5.1, True), (0.19, True)])
 def test_noise_five_times_off_that_of_its_kind(factor: float, odd: bool, tmp_path: Path) -> None:
     sigma = f"{medians_of_ins() * factor:.6f} deg"
-    own = {"modality": "attitude", "type": "gnss/ins", "sigma_attitude": sigma, "primitives": ["pps"],
-           "cost": "1 EUR"}  # fmt: skip
+    own = {
+        "modality": "attitude", "type": "gnss/ins", "sigma_attitude": sigma,
+        "primitives": ["pps"], "cost": "1 EUR",
+    }  # fmt: skip
     found = asked(spec_of(WING, sensor=own), tmp_path)
     assert [(entry, key) for entry, key, _ in found] == (
         [("uav.attitude", "sigma_attitude")] if odd else []
