@@ -3,11 +3,12 @@
     python benchmarks/existence.py [--count 1000] [--seed 0] [--fixes 300]
 
 Specs have chains, clocks, shared hardware, cables and a catalog of their own in which reach,
-medium, GNSS, field of view, rate, depth, temperature and lifecycle are told or not.  Compared with
-an oracle that reads the same text: the verdict and its cost on all three roads, the front, every row
-of `excluded` with its strongest reason, the recheck on selections that may be impossible, for
-specs without a design every fix, and distances of a grid that would help and lie nearer than what
-is said.  Prints one line per disagreement and a summary; exit code 1 if there is any.
+medium, GNSS, field of view, rate, depth, temperature and lifecycle are told or not. Compared
+with an oracle that reads the same text: the verdict and its cost on all three roads, the front,
+every row of `excluded` with its strongest reason, the recheck on selections that may be
+impossible, for specs without a design every fix, and distances of a grid that would help and
+lie nearer than what is said. Prints one line per disagreement and a summary; exit code 1 if
+there is any.
 """
 
 from __future__ import annotations

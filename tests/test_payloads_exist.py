@@ -367,10 +367,15 @@ def test_samples_are_asked_of_a_ranging_sensor(tmp_path: Path) -> None:
 @pytest.mark.parametrize("corrects", [[], ["travel_time"]])
 def test_what_moves_while_sound_travels_is_said(corrects: list[str], tmp_path: Path) -> None:
     """(2 + 500 * 4 deg) m/s for 2 * 500 / 1500 s: 24.6044 m."""
-    verdict = said(
-        tmp_path, spec_of(["own"], {"medium": "water"}), own=SONAR | {"corrects": corrects}
-    )
+    own = SONAR | {"corrects": corrects}
+    verdict = said(tmp_path, spec_of(["own"], {"medium": "water"}), own=own)
     (told,) = [one for one in verdict["warnings"] if one["code"] == "travel-time"]
     assert (told["entry"], told["key"]) == ("own", "corrects")
     assert "24.6 m" in told["message"]
     assert ("look up" in told["message"]) == (not corrects)
+    assert "would fail" not in told["message"]
+    tight = json.loads(json.dumps(spec_of(["own"], {"medium": "water"})).replace("50 m", "26 m"))
+    (told,) = [
+        one for one in said(tmp_path, tight, own=own)["warnings"] if one["code"] == "travel-time"
+    ]
+    assert ("without that ACC-1 would fail" in told["message"]) == (not corrects)

@@ -48,7 +48,7 @@ def design_cautions(case: Case, verified: Verified, figures: ErrorFigures) -> tu
         *_clocks(case, verified),
         *_coverage(verified),
         *_untyped(case, verified),
-        *fact_cautions(case, verified.system),
+        *fact_cautions(case, verified),
     )
 
 

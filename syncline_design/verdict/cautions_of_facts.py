@@ -14,6 +14,7 @@ from syncline_design.spec.existence import is_acoustic, not_told
 from syncline_design.spec.plausibility import implausible
 from syncline_design.verdict.design_data import UsedEntry
 from syncline_design.verdict.tree import Caution
+from syncline_design.verdict.verified import Verified
 
 # The order in which a wrong guess costs: first what nothing works without.
 FIRST = ("reach", "medium", "field_of_view", "rate", "depth_rating", "temperature")
@@ -21,16 +22,16 @@ Chosen = tuple[StageCase, str, SensorEntry]
 MOST_LOOKED_AT = 100  # candidates of a spec without a design
 
 
-def fact_cautions(case: Case, system: System) -> tuple[Caution, ...]:
+def fact_cautions(case: Case, verified: Verified) -> tuple[Caution, ...]:
     """Facts that a rule of this spec needs of the chosen payload and nobody gives, the weightiest
     first; then what holds for bright objects alone."""
-    chosen = list(_chosen(case, system))
+    chosen = list(_chosen(case, verified.system))
     silent = [caution for one in chosen for caution in _silent(case, one)]
     silent += [caution for one in chosen for caution in _pathless(one)]
     silent.sort(key=lambda one: FIRST.index((one.key or "").partition(".")[0]))
     names = {name for _, name, _ in chosen}
     doubtful = implausible_cautions(case, names)
-    return (*doubtful, *silent, *_favoured(chosen), *_travelling(case, chosen))
+    return (*doubtful, *silent, *_favoured(chosen), *_travelling(case, verified, chosen))
 
 
 def implausible_cautions(case: Case, names: Container[str] | None = None) -> list[Caution]:
@@ -88,7 +89,7 @@ def _favoured(chosen: list[Chosen]) -> Iterator[Caution]:
             )
 
 
-def _travelling(case: Case, chosen: list[Chosen]) -> Iterator[Caution]:
+def _travelling(case: Case, verified: Verified, chosen: list[Chosen]) -> Iterator[Caution]:
     """What vehicle and object move while sound is on its way: (v + d omega) 2 d / c [m].
 
     It is in no figure of the verdict: the maker takes it out, or somebody has to.
@@ -99,14 +100,25 @@ def _travelling(case: Case, chosen: list[Chosen]) -> Iterator[Caution]:
         platform, sound = stage.platform.entry, surroundings(stage, case.spec).sound_speed
         echo = 2.0 * platform.distance / sound
         moved = (platform.v_max + platform.distance * platform.omega_max) * echo
-        shown = format_quantity(moved, Dimension.LENGTH)
-        waits = format_quantity(echo, Dimension.TIME)
-        where = f"{name}: {stage.choice.name} and its object move up to {shown} while sound is on "
-        where += f"its way ({waits})"
+        where = (
+            f"{name}: {stage.choice.name} and its object move up to "
+            f"{format_quantity(moved, Dimension.LENGTH)} while sound is on its way "
+            f"({format_quantity(echo, Dimension.TIME)})"
+        )
         said = "; the entry says that the maker corrects for it, and no figure here has it"
         if "travel_time" not in entry.corrects:
+            turned = ", ".join(_turned(case, verified, moved))
             said = "; no figure here has it: look up whether the maker corrects for it"
+            said += f", without that {turned} would fail" if turned else ""
         yield Caution("travel-time", where + said, entry=name, key="corrects")
+
+
+def _turned(case: Case, verified: Verified, more_m: float) -> Iterator[str]:
+    """Accuracy requirements that are kept, and would not be with so much more error."""
+    total = verified.figures.total(case.spec.sync_model)
+    for row in verified.requirements:
+        if row.kind == "accuracy" and row.status == "pass" and total + more_m > row.limit:
+            yield row.id
 
 
 def lifecycle_cautions(entries: Iterable[UsedEntry]) -> Iterator[Caution]:
