@@ -379,3 +379,13 @@ def test_what_moves_while_sound_travels_is_said(corrects: list[str], tmp_path: P
         one for one in said(tmp_path, tight, own=own)["warnings"] if one["code"] == "travel-time"
     ]
     assert ("without that ACC-1 would fail" in told["message"]) == (not corrects)
+
+
+def test_a_wider_spacing_is_found_beside_simulated_requirements(tmp_path: Path) -> None:
+    """What the limit kept out is judged as the spec would have it."""
+    spec = gap("0.2 m", ["own"], at("50 m", medium="air"))
+    spec["requirements"].append({"id": "W", "kind": "worst_case", "limit": "20 m"})
+    verdict = said(tmp_path, spec, own=LIDAR | {"rate": "5 Hz"})
+    assert verdict["verdict"] == "infeasible"
+    (fix,) = [one for one in verdict["infeasibility"]["fixes"] if one["requirement"] == "GAP-1"]
+    assert fix["to"] == pytest.approx(0.4, rel=1e-9)

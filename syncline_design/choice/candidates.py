@@ -345,9 +345,10 @@ def _limited(sensor: SensorEntry, around: Surroundings) -> tuple[float, float, f
     near, far = interval_of(sensor, around.reflectivity)
     if sensor.modality != "ranging":
         return near, far, math.inf, math.inf, True
-    apart = spacing_m(sensor, around)
     works = near <= around.nearest and around.farthest <= far
-    works &= around.spacing is None or apart is None or apart <= around.spacing
+    if works and around.spacing is not None:
+        apart = spacing_m(sensor, around)
+        works = apart is None or apart <= around.spacing
     sound = around.sound_speed if is_acoustic(sensor.type) else math.inf
     return near, far, sensor.rate or math.inf, sound, works
 

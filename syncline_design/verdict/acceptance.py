@@ -130,7 +130,7 @@ class Simulations:
 
 def _as_asked(table: RoleTable, option: Option) -> tuple[Fraction, Fraction]:
     """Error [m] and tau [s] that an option of the same names has in a table."""
-    for options in (table.options, table.excluded.poor):
+    for options in (table.options, table.excluded.poor, table.excluded.beyond):
         if (place := options.place_of(option.names)) is not None:
             return options[place].error(), options[place].tau()
     raise KeyError(option.names)
