@@ -24,6 +24,7 @@ from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_choice import Arranged, arranged, thinned
 from syncline_design.logs.runs import demand_one_run
 from syncline_design.logs.sources import NANOSECONDS, Clock, RowSource, opened
+from syncline_design.logs.surveys import Survey, has_places, is_survey, joined, survey_of
 from syncline_design.model.quantity import si_name
 from syncline_design.spec.fields import did_you_mean
 
@@ -72,15 +73,46 @@ def read_tables(
 ) -> list[LogTable]:
     """Read files that belong together; raises BadInput."""
     sources = [opened(one) if isinstance(one, Path) else one for one in given]
+    surveys = _surveys(sources, mapping, stages)
+    surveyed = {one.path for one in surveys}
+    sources = [one for one in sources if one.path not in surveyed]
     files = [_opened(source, mapping, stages) for source in sources]
-    files = _on_one_scale(_with_absent(files, mapping))
+    known = {name for one in surveys for name in one.header}
+    files = _on_one_scale(_with_absent(files, mapping, known))
     names, ahead_s = slip
     stamps = [
         f.seconds - ahead_s if ahead_s and any(n in f.found for n in names) else f.seconds
         for f in files
     ]
     rows = [arranged(f.source.path, s) for f, s in zip(files, stamps, strict=True)]
-    return [_table(f, chosen) for f, chosen in zip(files, thinned(rows), strict=True)]
+    tables = [_table(f, chosen) for f, chosen in zip(files, thinned(rows), strict=True)]
+    return _with_targets(tables, surveys)
+
+
+def _surveys(
+    sources: Sequence[RowSource], mapping: Mapping[str, str], stages: tuple[str, ...]
+) -> list[Survey]:
+    """Files that name targets and their places and no times; none where there is no other file."""
+    wanted = known_names(stages)
+    found = [(one, si_columns(one.header, mapping, wanted)) for one in sources]
+    surveys = [(one, names) for one, names in found if is_survey(names)]
+    if len(surveys) == len(found):
+        return []
+    return [survey_of(one, names) for one, names in surveys]
+
+
+def _with_targets(tables: list[LogTable], surveys: Sequence[Survey]) -> list[LogTable]:
+    """Targets of a survey for the files that name them and do not place them."""
+    for survey in surveys:
+        open_ = [t for t in tables if TARGET_ID in t.columns and not has_places(t.columns)]
+        if not open_:
+            note = f"{survey.path.name}: not used, as no file names targets without their places"
+            tables = [replace(tables[0], notes=(*tables[0].notes, note)), *tables[1:]]
+        for table in open_:
+            columns, notes = joined(table.columns, survey)
+            own = replace(table, columns=columns, notes=(*table.notes, *notes))
+            tables = [own if one is table else one for one in tables]
+    return tables
 
 
 def _opened(source: RowSource, mapping: Mapping[str, str], stages: tuple[str, ...]) -> _Open:
@@ -106,12 +138,12 @@ def _opened(source: RowSource, mapping: Mapping[str, str], stages: tuple[str, ..
     return _Open(source, found, seconds, day, (*notes, *said))
 
 
-def _with_absent(files: list[_Open], mapping: Mapping[str, str]) -> list[_Open]:
+def _with_absent(files: list[_Open], mapping: Mapping[str, str], surveyed: set[str]) -> list[_Open]:
     """Refuse, or say, where the spec maps columns that no file has.
 
     Another column must not silently stand in for the one that is meant.
     """
-    headers = {name for one in files for name in one.source.header}
+    headers = surveyed | {name for one in files for name in one.source.header}
     notes = []
     for canonical, theirs in mapping.items():
         if named_column(theirs, headers)[0] in headers:
