@@ -70,7 +70,7 @@ def _level(time_s: Array, late_s: Array) -> tuple[float, float]:
     half = late_s.size // 2
     rise = float(np.median(late_s[half:]) - np.median(late_s[:half]))
     run = float(np.median(time_s[half:]) - np.median(time_s[:half]))
-    if run > 0.0 and abs(rise) > _STEEP * width:
+    if run > 0.25 * float(time_s[-1] - time_s[0]) and abs(rise) > _STEEP * width:
         late_s = late_s - time_s * rise / run
     return float(np.percentile(late_s, LOW)), width
 

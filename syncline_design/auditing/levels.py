@@ -20,6 +20,7 @@ from syncline_design.machine.deadline import in_force
 
 Kind = Literal["drift", "bend", "step", "episode", "relock", "holdover"]
 _LONGEST: Final = 0.3  # of the log: what settles more slowly is drift
+_WILD: Final = 10.0  # of what is seen: sizes that nearly cancel one another
 _LEAST_BLOCKS: Final = 3  # of an episode
 MOST_SHAPES: Final = 6
 SURE: Final = 8.0  # sigma of a size that is believed
@@ -101,7 +102,8 @@ def shapes_of(blocks: Blocks, *, least_s: float = 0.0) -> tuple[Shape, ...]:
             break
         better = (*found, _refined(time_s[keep], low[keep], found, best))
         grown = polished(better, [True] * len(better), blocks, within=1.1)
-        if not _believed(grown[-1], blocks, least_s):
+        wild = any(abs(s.size_s) > _WILD * float(np.ptp(low)) for s in grown)
+        if wild or not _believed(grown[-1], blocks, least_s):
             break
         found = grown
     keep = ~_straddling(found, time_s, blocks.length_s)

@@ -20,6 +20,8 @@ _BITS: Final = tuple(
 _CALENDAR: Final = tuple(int(s * NS) for s in (60, 3600, 43_200, 86_400, 604_800))
 WRAPS: Final = tuple(sorted(w for w in {*_BITS, *_CALENDAR} if w > 100_000_000))
 WEEK_NS: Final = 604_800 * 10**9
+BACK_NS: Final = 100_000  # receipts of several threads may be written out of order by less
+MOST_SETS: Final = 20  # times that a clock is set in a log; more are another disorder
 LONGEST_SPIKE: Final = 5  # messages that go back and return
 MOST_SPIKES: Final = 100_000
 
@@ -45,6 +47,7 @@ def without_unset(series: Series) -> Repaired:
         for begin, end in isolated:
             if end - begin > 2:
                 zero[begin:end] = True
+    zero &= ~_passing(stamp, zero)
     count = int(zero.sum())
     if not count:
         return Repaired(series)
@@ -59,9 +62,54 @@ def without_unset(series: Series) -> Repaired:
     return Repaired(replace(series, good=series.good & ~zero), (fault,))
 
 
+def _passing(stamp: NDArray[np.int64], zero: Mask) -> Mask:
+    """Zeros of a counter that begins anew: the stamp after is the next small count."""
+    usual = float(np.median(np.abs(np.diff(stamp)))) if stamp.size > 1 else 0.0
+    out = np.zeros(stamp.size, bool)
+    for begin, end in _runs_of(zero):
+        if end - begin == 1 and end < stamp.size and 0 < stamp[end] < 5 * usual:
+            out[begin] = True
+    return out
+
+
 def _runs_of(mask: Mask) -> Iterator[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
     return ((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
+
+
+def with_receipts_forward(series: Series) -> Repaired:
+    """Receipts that go back: the recorder's clock was set back, for every message from there on."""
+    if series.receive is None or series.receive.size < 3:
+        return Repaired(series)
+    change = np.diff(series.receive)
+    falls = np.flatnonzero((change < -BACK_NS) & series.good[1:] & series.good[:-1])
+    if not falls.size or falls.size > MOST_SETS:
+        return Repaired(series)
+    usual = int(np.median(change))
+    moved = np.zeros(series.receive.size, np.int64)
+    faults = []
+    times = series.seconds
+    for fall in falls:
+        size = _set_back(series, int(fall), usual - int(change[fall]))
+        moved[fall + 1 :] += size
+        faults.append(StampFault(
+            "recorder_clock", {"seconds": size / NS, "kind": "step"}, float(times[fall]),
+            float(times[-1]),
+            f"receipts go back by {-int(change[fall]) / NS:.6g} s: the recorder's clock was set",
+        ))  # fmt: skip
+    return Repaired(replace(series, receive=series.receive + moved), tuple(faults))
+
+
+def _set_back(series: Series, fall: int, about: int) -> int:
+    """By how much [ns]: the medians of receipt minus stamp before and after, where they agree."""
+    assert series.receive is not None
+    late = series.receive - series.stamp
+    before = late[max(0, fall - 60) : fall + 1][series.good[max(0, fall - 60) : fall + 1]]
+    after = late[fall + 1 : fall + 61][series.good[fall + 1 : fall + 61]]
+    if before.size < 10 or after.size < 10:
+        return about
+    size = int(np.median(before) - np.median(after))
+    return size if abs(size - about) < 0.2 * about else about
 
 
 def unwrapped(series: Series) -> Repaired:
@@ -149,7 +197,7 @@ def without_duplicates(series: Series) -> Repaired:
     places = series.places()
     same = np.concatenate([[False], np.diff(series.stamp[places]) == 0])
     count = int(same.sum())
-    if not count:
+    if not count or count <= _by_chance(series.stamp[places]):
         return Repaired(series)
     good = series.good.copy()
     good[places[same]] = False
@@ -159,6 +207,17 @@ def without_duplicates(series: Series) -> Repaired:
         f"{count} messages carry the stamp of the message before",
     )  # fmt: skip
     return Repaired(replace(series, good=good), (fault,))
+
+
+def _by_chance(stamp: NDArray[np.int64]) -> float:
+    """How many stamps of an irregular sensor coincide at the resolution that they are kept in."""
+    change = np.diff(stamp)
+    mean = float(stamp[-1] - stamp[0]) / change.size
+    low, high = np.percentile(change, [25.0, 75.0])
+    if mean <= 0.0 or float(high - low) < 0.3 * mean:
+        return 0.0
+    step = max((s for s in (1, 10, 100, 1000, 10_000) if not np.any(stamp % s)), default=1)
+    return 3.0 + 5.0 * stamp.size * step / mean if step > 1 else 0.0
 
 
 def without_spikes(series: Series) -> Repaired:

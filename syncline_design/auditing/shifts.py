@@ -24,6 +24,7 @@ Side = Literal["stamp", "receipt", "unknown"]
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip
 _TRANSPORT_S: Final = 0.05
+_BLUR_S: Final = 0.2  # interquartile range of delays: from here on whole seconds are no mark
 _DRIFTING_S: Final = 0.03  # over the log: slower drifts do not blur whole seconds
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
@@ -64,6 +65,8 @@ def without_slips(series: Series, known_s: float | None) -> Shifts:
     late = seconds((series.receive - series.stamp)[places])
     middle = float(np.median(late))
     late = late - _slope(series.seconds[places], late)
+    if spread(late - np.round(late - middle)) > _BLUR_S:
+        return nothing  # delays that are as long as a slip
     turns = np.round(late - middle)
     if not turns.any():
         return nothing

@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing import arrival, grains, order
+from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import Cadence, cadence, level_scatter, missing
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.epochs import epoch_fault, in_one_unit
@@ -78,7 +79,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     series = moved.series
     pace = cadence(series)
     _last(series, pace, stream, known, grain, found)
-    return _summed(stream, raw, series, pace, found, (slips, moved), known, grain)
+    return _summed(stream, raw, series, pace, found, (slips, moved), known)
 
 
 def _receipts(stamps: Stamps) -> Nanoseconds | None:
@@ -94,6 +95,7 @@ def is_receipt(name: str | None) -> bool:
 def _ordered(raw: Series, found: list[StampFault]) -> tuple[Series, StampFault | None, float]:
     """Unset stamps left out, one unit, counters continuous."""
     series = _take(order.without_unset(raw), found)
+    series = _take(order.with_receipts_forward(series), found)
     unit = in_one_unit(series)
     if unit.fault is not None:
         found.append(unit.fault)
@@ -186,7 +188,12 @@ def _last(
         found += [arrived] if arrived is not None else []
     if known is not None:
         ahead = arrival.ahead(series, known, grain.size_s if grain else _coarse(series))
-        moves = names & {"drift", "step", "relock"}  # where these begin is not known to the last us
+        moves = names & {
+            "drift",
+            "step",
+            "relock",
+            "recorder_clock",
+        }  # where these begin is not known to the last us
         if ahead is not None and (not moves or ahead.from_s is None):
             found.append(_as_slip(ahead, series, known))
     explained = names & {"whole_second_slip", "counter_wrap", "step", "relock"}
@@ -213,34 +220,51 @@ def _as_slip(ahead: StampFault, series: Series, known: float) -> StampFault:
 
 def _summed(
     stream: Stream, raw: Series, series: Series, pace: Cadence, found: list[StampFault],
-    moved: tuple[Shifts, Shifts], known: float | None, grain: grains.Grain | None,
+    moved: tuple[Shifts, Shifts], known: float | None,
 ) -> Examined:  # fmt: skip
-    places = series.places()
-    drifts = any(f.fault == "drift" for f in found)
-    offset = _offset(raw)
-    residual = ResidualTime(None, None, None)
-    least = SmallestSeen(None, None)
-    trace: tuple[EnvelopePoint, ...] = ()
+    """Everything that was found, with what is left of the delays."""
+    told = series.receive is not None and series.good.sum() > 1
     constant = None
-    if series.receive is not None and places.size > 1:
-        restored = _restored(series, pace, found)
-        left = above_floor(series.seconds[places], restored, sloping=drifts)
-        recorded = _recorded(raw, series)
-        residual = ResidualTime(
-            float(left.max()), float(np.percentile(left, 95.0)), float(np.ptp(recorded))
-        )
-        trace = _trace(raw, series)
-        blocks = moved[1].blocks
-        if blocks is not None:
-            step, over = smallest(blocks)
-            length = float(blocks.time_s[-1] - blocks.time_s[0])
-            if np.isfinite(step) and length > 0.0:
-                least = SmallestSeen(step, 1e6 * over / length)
-        late = seconds((series.receive - series.stamp)[places])
-        constant = float(np.min(late)) + (known or 0.0) if known is not None else None
-    shifts = (*moved[0].shifts, *moved[1].shifts)
-    return Examined(stream, raw, series, tuple(found), shifts, pace, offset, residual, least, trace,
-                    constant)  # fmt: skip
+    if told and known is not None:
+        late = seconds((series.receive - series.stamp)[series.places()])  # type: ignore[operator]
+        constant = float(np.min(late)) + known
+    faults = tuple(found)
+    return Examined(
+        stream, raw, series, faults, (*moved[0].shifts, *moved[1].shifts), pace, _offset(raw),
+        residual_of(raw, series, faults), _smallest(moved[1].blocks), _trace(raw) if told else (),
+        constant,
+    )  # fmt: skip
+
+
+def residual_of(raw: Series, series: Series, faults: tuple[StampFault, ...]) -> ResidualTime:
+    """Receipt minus stamp above its envelope, of a series without its named faults."""
+    if series.receive is None or series.good.sum() < 2:
+        return ResidualTime(None, None, None)
+    drifts = any(f.fault == "drift" for f in faults)
+    restored = _restored(series, cadence(series), faults)
+    left = above_floor(series.seconds[series.places()], restored, sloping=drifts)
+    return ResidualTime(float(left.max()), float(np.percentile(left, 95.0)),
+                        float(np.ptp(_recorded(raw, series))))  # fmt: skip
+
+
+def without_clock_step(one: Examined, shift: Shift) -> Examined:
+    """The stream with its receipts put back by a step of the recorder's clock."""
+    series = one.series
+    assert series.receive is not None
+    after = series.seconds >= shift.at_s
+    receive = series.receive - np.where(after, round(shift.size_s * NS), 0)
+    put_back = replace(series, receive=receive)
+    return replace(one, series=put_back, residual=residual_of(one.raw, put_back, one.faults))
+
+
+def _smallest(blocks: Blocks | None) -> SmallestSeen:
+    if blocks is None:
+        return SmallestSeen(None, None)
+    step, over = smallest(blocks)
+    length = float(blocks.time_s[-1] - blocks.time_s[0])
+    if not np.isfinite(step) or length <= 0.0:
+        return SmallestSeen(None, None)
+    return SmallestSeen(step, 1e6 * over / length)
 
 
 def _offset(raw: Series) -> float | None:
@@ -250,7 +274,7 @@ def _offset(raw: Series) -> float | None:
     return float(seconds(np.max((raw.stamp - raw.receive)[raw.good])))
 
 
-def _restored(series: Series, pace: Cadence, found: list[StampFault]) -> Array:
+def _restored(series: Series, pace: Cadence, found: tuple[StampFault, ...]) -> Array:
     """Receipt minus stamp [s], stamps of a coarse clock put back to their sensor's rhythm."""
     assert series.receive is not None
     whole = (series.receive - series.stamp)[pace.places]
@@ -283,7 +307,7 @@ def _recorded(raw: Series, series: Series) -> Array:
     return seconds(whole - whole.min())
 
 
-def _trace(raw: Series, series: Series) -> tuple[EnvelopePoint, ...]:
+def _trace(raw: Series) -> tuple[EnvelopePoint, ...]:
     """Receipt minus stamp over time: least and largest of each stretch, without the median."""
     assert raw.receive is not None
     places = raw.places()

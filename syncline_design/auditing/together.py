@@ -14,7 +14,7 @@ import numpy as np
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series
 from syncline_design.auditing.shifts import Shift, common
-from syncline_design.auditing.stream import Examined
+from syncline_design.auditing.stream import Examined, without_clock_step
 
 _ALIKE: Final = 0.25  # of a size, among streams
 _SHARE: Final = 0.6  # of the streams that could show a shift
@@ -43,15 +43,23 @@ def _clock_steps(streams: list[Examined]) -> list[Examined]:
     pool = [(k, s) for k, one in enumerate(streams) for s in one.shifts if s.to_s is None]
     for group in _groups(pool):
         who = {k for k, _ in group}
+        if any(_is_said(streams[k], group[0][1].at_s) for k in who):
+            continue
         size = common([s for _, s in group])
         at = float(np.median([s.at_s for _, s in group]))
         able = [k for k, one in enumerate(streams) if _could_show(one, size, at)]
         sides = [s.side for _, s in group]
         if len(who) < 2 or len(who) < _SHARE * len(set(able) | who) or "stamp" in sides:
             continue
-        for k in who:
-            streams[k] = _with_clock_step(streams[k], at, size, len(who))
+        for k, shift in dict(group).items():
+            streams[k] = without_clock_step(_with_clock_step(streams[k], at, size, len(who)), shift)
     return streams
+
+
+def _is_said(one: Examined, at_s: float) -> bool:
+    """Whether its receipts were seen to go back there already."""
+    return any(f.fault == "recorder_clock" and f.from_s is not None
+               and abs(f.from_s - at_s) < 5.0 for f in one.faults)  # fmt: skip
 
 
 def _groups(pool: list[tuple[int, Shift]]) -> list[list[tuple[int, Shift]]]:
