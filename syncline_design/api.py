@@ -29,7 +29,9 @@ if TYPE_CHECKING:
     from syncline_design.comparison.clock_meaning import TimingAndSpec
     from syncline_design.comparison.difference import Difference
     from syncline_design.comparison.meaning import DiagnosisAndDesign
+    from syncline_design.diagnosis import Diagnosis
     from syncline_design.paper.reproduce import Reproduction
+    from syncline_design.planning.run import PlanRun
     from syncline_design.simulation import Simulation
     from syncline_design.studies import Progress, StudyResult
     from syncline_design.verdict.optimise import Optimisation
@@ -47,6 +49,7 @@ __all__ = [
     "diff",
     "load",
     "optimize",
+    "plan",
     "reproduce",
     "simulate",
     "study",
@@ -142,8 +145,11 @@ def diagnose(
 
     logs: a file or several; none: those that the spec names.
     """
+    from dataclasses import replace
+
     from syncline_design import diagnosis
     from syncline_design.comparison.meaning import meaning, with_design
+    from syncline_design.planning.next_drive import next_drive
     from syncline_design.verdict.optimise import as_measured
 
     seed = _seed(seed)
@@ -153,9 +159,36 @@ def diagnose(
     settings = diagnosis.DiagnosisSettings(seed, rate, most)
     with _limited(time_limit_s):
         case = _case(spec)
-        found = diagnosis.diagnose(as_measured(case, seed), files, settings)
+        pinned = as_measured(case, seed)
+        found = diagnosis.diagnose(pinned, files, settings)
         means = meaning(case, found.effects_entries(), seed)
-        return with_design(found, means)
+        return with_design(replace(found, plan=next_drive(pinned, found)), means)
+
+
+def plan(
+    spec: SpecOrPath, *, reach: str | None = None, separate: tuple[str, str] | None = None,
+    diagnosis: Diagnosis | None = None, minutes: float = 10.0,
+    flown: str | Path | Sequence[str | Path] = (), seed: int = 0, time_limit_s: float | None = None,
+) -> PlanRun:  # fmt: skip
+    """The test drive that tells what is asked: `result` is the plan as data, `path` its waypoints.
+
+    reach: "latency(position)=1 ms, lever_arm(position)=1 cm".  separate: two effects to tell apart.
+    diagnosis: what one could not tell apart.  flown: a log held against what is asked.
+    """
+    from syncline_design.planning import run, wanted
+    from syncline_design.verdict.optimise import as_measured
+
+    seed = _seed(seed)
+    least = arguments.amount("minutes", minutes, 0.0)
+    pairs: tuple[wanted.Pair, ...] = ()
+    if separate is not None:
+        first, second = (wanted.named(one, "separate") for one in separate)
+        pairs = (wanted.Pair(first, second),)
+    asked = wanted.Asked(() if reach is None else wanted.reach_of(reach), pairs)
+    files = tuple(_files(flown))
+    with _limited(time_limit_s):
+        case = as_measured(_case(spec), seed)
+        return run.plan(case, run.PlanRequest(asked, diagnosis, least, files, seed))
 
 
 def study(

@@ -26,6 +26,7 @@ FUNCTIONS = (
     "diff",
     "load",
     "optimize",
+    "plan",
     "reproduce",
     "simulate",
     "study",

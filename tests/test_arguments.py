@@ -20,7 +20,8 @@ LOG = ROOT / "examples" / "hidden_latency.csv"
 
 @pytest.mark.parametrize("seed", [-1, 1.5, "7", None, True, float("nan")])
 @pytest.mark.parametrize(
-    "name", ["check", "optimize", "simulate", "diagnose", "diff", "study", "timing", "audit"]
+    "name",
+    ["check", "optimize", "simulate", "diagnose", "diff", "study", "timing", "audit", "plan"],
 )
 def test_a_seed_is_a_whole_number(name: str, seed: Any) -> None:
     """They gave a verdict, with that seed in its provenance."""

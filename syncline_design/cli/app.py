@@ -13,7 +13,16 @@ import typer
 from typer.core import TyperGroup
 
 from syncline_design import __version__
-from syncline_design.cli import acceptance, clocks, design, evidence, library, logs, stamps
+from syncline_design.cli import (
+    acceptance,
+    clocks,
+    design,
+    drives,
+    evidence,
+    library,
+    logs,
+    stamps,
+)
 from syncline_design.cli.shared import NO_VERDICT
 from syncline_design.machine.processes import forget_working_folder
 from syncline_design.machine.streams import say, secure_streams
@@ -49,6 +58,7 @@ app.command("check")(design.check)
 app.command("optimize")(design.optimize)
 app.command("simulate")(evidence.simulate)
 app.command("diagnose")(evidence.diagnose)
+app.command("plan")(drives.plan)
 app.command("study")(design.study)
 app.command("diff")(design.diff)
 app.command("timing")(clocks.timing)

@@ -119,6 +119,7 @@ def diagnose(
         case = load(spec)
         found = diagnose_log(as_measured(case, seed), log or (), settings, progress)
         means = _meaning(case, found, seed, deadline)
+        found = _with_drive(as_measured(case, seed), found)
     whole = with_design(found, means)
     if write_spec is not None and means is not None:
         from syncline_design.spec.edit import with_effects_text
@@ -150,6 +151,19 @@ def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> Des
     except OutOfTime:
         say(f"syncline-design: {deadline.passed()}")
         return None
+
+
+def _with_drive(case: Case, found: Diagnosis) -> Diagnosis:
+    """The diagnosis with the drive that would tell what its log could not."""
+    from syncline_design.machine.deadline import in_force
+
+    if in_force().is_over or not any(one.aliases for one in found.findings):
+        return found
+    from dataclasses import replace
+
+    from syncline_design.planning.next_drive import next_drive
+
+    return replace(found, plan=next_drive(case, found))
 
 
 @contextmanager

@@ -61,6 +61,7 @@ AcceptOutput = Annotated[list[str] | None, output_option(formats.ACCEPT_FORMATS)
 LogOutput = Annotated[list[str] | None, output_option(formats.LOG_FORMATS)]
 AuditOutput = Annotated[list[str] | None, output_option(formats.AUDIT_FORMATS)]
 TimingOutput = Annotated[list[str] | None, output_option(formats.TIMING_FORMATS)]
+PlanOutput = Annotated[list[str] | None, output_option(formats.PLAN_FORMATS)]
 ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FORMATS)]
 
 
@@ -125,6 +126,7 @@ def refuse_unexpected(error: BaseException) -> NoReturn:
         "SimulationError": BAD_INPUT,
         "DiagnosisError": BAD_INPUT,
         "StudyError": BAD_INPUT,
+        "PlanError": BAD_INPUT,
     }
     names = [c.__name__ for c in type(error).__mro__]
     for name, code in codes.items():

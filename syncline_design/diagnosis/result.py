@@ -409,6 +409,24 @@ class Provenance(Record):
     catalogs_sha256: str | None
 
 
+@dataclass(frozen=True, slots=True)
+class NextDrive(Record):
+    """The test drive that tells a finding from one of its aliases, in short.
+
+    least_minutes: the least that does; minutes, legs: of the drive told here, which does where
+    `reached`.  targets: how many to survey.  command: prints the drive whole.
+    """
+
+    first: str
+    second: str
+    minutes: float
+    least_minutes: float | None
+    reached: bool
+    legs: tuple[str, ...]
+    targets: int
+    command: str
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis(Record):
     """The outcome.
@@ -416,6 +434,7 @@ class Diagnosis(Record):
     sound: whether the log contradicts neither itself nor the limits of the spec's platform.
     where: the regimes that disagreed most before anything was named.  steps: the gap after each
     addition.  unseen: what this log could not show.  smallest_seen: what it would have shown.
+    plan: the drive that would tell, where a finding has aliases.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
@@ -437,6 +456,7 @@ class Diagnosis(Record):
     provenance: Provenance
     informative: Informative = Informative(True)
     smallest_seen: tuple[Smallest, ...] = ()
+    plan: NextDrive | None = optional()
 
     @property
     def exit_code(self) -> int:

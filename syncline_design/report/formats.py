@@ -17,6 +17,8 @@ TIMING_FORMATS: Final = ("json", "html", "markdown")
 ACCEPT_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown")
 LOG_FORMATS: Final = ("json", "html", "markdown")
 AUDIT_FORMATS: Final = ("json", "html", "markdown")
+PLAN_FORMATS: Final = ("json", "html", "markdown", "csv", "kml", "qgc")
+GEODETIC_FORMATS: Final = ("kml", "qgc")  # of a plan: they need an origin on the globe
 CATALOG_FORMATS: Final = ("json",)
 
 # Pages and binary tables are for files; a bare format name does not send them to a terminal.
@@ -34,6 +36,7 @@ ResultName = Literal[
     "difference",
     "log",
     "optimisation",
+    "plan",
     "reproduction",
     "simulation",
     "study-result",

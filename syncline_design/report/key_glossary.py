@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 KEYS: dict[str, str] = {
+    "acceleration": "Largest acceleration that a test drive may ask of the vehicle.",
     "address": "Where the source can be read: a web address, or the number of the document.",
     "allow_discontinued": "yes: what is no longer sold, or not yet, may be chosen; it is said.",
+    "area": "North and east extent within which a test drive has to stay: [300 m, 200 m].",
     "at": "Condition under which a figure holds, such as 80 % reflectivity.",
     "attitude": "The attitude sensor: pinned or with candidates; of streams: which one tells it.",
     "azimuth": "Directions to the sides about the sensor's own axis: -60 deg .. 60 deg.",
@@ -54,6 +56,7 @@ KEYS: dict[str, str] = {
     "frame": "Axes of a log's local frame where it does not say: enu or ned.",
     "gnss": "yes or no; silent: yes for a first stage that is not at a depth, no for later ones.",
     "gps_week": "GPS week of logs whose stamps are seconds of the week.",
+    "height": "How far below the vehicle the objects of a test drive lie; 0 m: around it.",
     "high": "Upper end of a uniform error.",
     "holdover": "How long the clock runs on its own.",
     "horizon": "Mission over which drifts, grids and heave are charged and simulated.",
@@ -77,9 +80,12 @@ KEYS: dict[str, str] = {
     "mean": "Mean of a normal error.",
     "medium": "air, water or both: what the path to the object goes through.",
     "min": "Near end.",
+    "minimum_speed": "Slowest speed that a test drive may ask for; 0 where the vehicle can stop.",
+    "minimum_turn_radius": "Tightest turn that a test drive may ask for.",
     "modality": "What the sensor measures: position, attitude or ranging.",
     "a": "Limit at distance 0.",
     "b": "By how much the limit grows with distance: sqrt(a^2 + (b d)^2).",
+    "motion": "How it moves, for test drives: multirotor, fixed_wing, ground, surface, underwater.",
     "of": "Which error: horizontal, vertical or 3d; in a limit: its distance.",
     "p": "Share of the errors that has to keep the limit.",
     "axis": "Of an rmse: horizontal, vertical or 3d.",

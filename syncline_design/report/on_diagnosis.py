@@ -15,6 +15,7 @@ from syncline_design.diagnosis.result import (
     Finding,
     Gap,
     LogRead,
+    NextDrive,
     Plots,
     Regime,
     Remaining,
@@ -36,6 +37,7 @@ from syncline_design.report.document import (
     Node,
     Outcome,
     Text,
+    code,
     given,
     provenance,
     section,
@@ -79,6 +81,7 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
             *section("gap", "How much of the gap is closed", gap_nodes(found), "Gap"),
             *section("residuals", "Residuals", _residuals(found.plots)),
             *section("where", "Where they disagree", _where(found), "Where"),
+            *section("drive", "The drive that would tell", _drive(found.plan), "Drive"),
             *section("unseen", "What this log cannot show", _items(found.unseen), "Not shown"),
             *section("design", "What it means for the design", _design(found.design), "Design"),
             *section("log", "The log", _log(found), "Log"),
@@ -86,6 +89,20 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
         ),
         source=found.spec.file if found.spec is not None else "",
     )
+
+
+def _drive(plan: NextDrive | None) -> list[Node]:
+    """The test drive for a class, in short, and the command that prints it whole."""
+    if plan is None:
+        return []
+    length = numbers.typeset(f"{plan.minutes:.2g} min")
+    words = f"This log cannot tell {plan.first} from {plan.second}. A drive of {length} does:"
+    if not plan.reached:
+        least = numbers.typeset(f"{plan.least_minutes or plan.minutes:.2g} min")
+        words = f"This log cannot tell {plan.first} from {plan.second}. It takes {least} of:"
+    targets = f", over {plan.targets} surveyed targets" if plan.targets else ""
+    more = f"Whole, with waypoints{targets}: "
+    return [Text(words), Items(plan.legs), Text((more, code(plan.command)))]
 
 
 def _items(lines: Sequence[str]) -> list[Node]:

@@ -12,6 +12,7 @@ from syncline_design.diagnosis import result as diagnosis
 from syncline_design.logs import inspection
 from syncline_design.machine.records import schema_of
 from syncline_design.paper import reproduce
+from syncline_design.planning import result as planning
 from syncline_design.report import catalogs
 from syncline_design.report.formats import ResultName
 from syncline_design.report.json_out import json_text
@@ -31,6 +32,7 @@ RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "difference": (difference.Difference, difference.SCHEMA),
     "log": (inspection.LogInspection, inspection.SCHEMA),
     "optimisation": (optimise.Optimisation, optimise.SCHEMA),
+    "plan": (planning.Plan, planning.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),
     "study-result": (study.StudyData, study.SCHEMA),

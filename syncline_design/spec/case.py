@@ -30,6 +30,7 @@ from syncline_design.spec.catalog import (
     TimestampingEntry,
 )
 from syncline_design.spec.choices import (
+    PLATFORM_FIGURES,
     InlineTimestamping,
     PlatformChoice,
     Query,
@@ -187,7 +188,7 @@ def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candida
     choice: PlatformChoice = stage.platform
     own = {
         key: value
-        for key in ("name", "v_max", "omega_max", "distance", "baseline", "medium", "source")
+        for key in (*PLATFORM_FIGURES, "source")
         if (value := getattr(choice, key)) is not None
     }
     if choice.use is None:

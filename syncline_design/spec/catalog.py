@@ -23,6 +23,7 @@ from syncline_design.spec.facts import (
     unknown_figures,
 )
 from syncline_design.spec.fields import (
+    Acceleration,
     AngularRate,
     AtLeastOne,
     Count,
@@ -54,6 +55,7 @@ from syncline_design.spec.yaml_text import KeyPath
 
 Primitive = Literal["pps", "network", "tov", "trigger", "arrival"]
 Need = Literal["gnss"]  # what an entry cannot work without
+Motion = Literal["multirotor", "fixed_wing", "ground", "surface", "underwater"]
 Sigma = float | tuple[float, ...]
 
 SIGMAS_OF: dict[str, tuple[str, ...]] = {
@@ -87,6 +89,9 @@ Basis = Annotated[
         },
     ),
 ]
+
+
+DriveArea = Annotated[Sigma, axes(Dimension.LENGTH, ("north", "east"))]
 
 
 class Entry(FileRecord):
@@ -154,6 +159,12 @@ class PlatformEntry(Entry):
     distance: PositiveLength
     baseline: NonNegativeLength
     medium: Medium | None = None  # of the path to the object
+    motion: Motion | None = None  # what a test drive may ask of it, with the figures below
+    acceleration: Acceleration | None = None
+    minimum_turn_radius: NonNegativeLength | None = None
+    minimum_speed: Speed | None = None
+    area: DriveArea | None = None
+    height: NonNegativeLength | None = None
 
 
 class SensorEntry(Product):

@@ -7,10 +7,11 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, PlainValidator, model_validator
 
 from syncline_design.model.roles import RoleName
-from syncline_design.spec.catalog import ErrorEntry, Primitive, SensorEntry
+from syncline_design.spec.catalog import DriveArea, ErrorEntry, Motion, Primitive, SensorEntry
 from syncline_design.spec.effects_listed import EffectChoice as EffectChoice
 from syncline_design.spec.facts import FieldOfView, Medium, Reflectivity, TemperatureInterval
 from syncline_design.spec.fields import (
+    Acceleration,
     AngularRate,
     FileRecord,
     Money,
@@ -29,6 +30,12 @@ from syncline_design.spec.fields import (
 from syncline_design.spec.log_block import LogChoice as LogChoice
 from syncline_design.spec.log_block import split_column as split_column
 
+# What a spec may say of a platform, put over the catalog's.
+PLATFORM_FIGURES = (
+    "name", "v_max", "omega_max", "distance", "baseline", "medium", "motion", "acceleration",
+    "minimum_turn_radius", "minimum_speed", "area", "height",
+)  # fmt: skip
+
 
 class PlatformChoice(FileRecord):
     """A catalog id (`use`) with keys overridden, or all keys given."""
@@ -40,6 +47,12 @@ class PlatformChoice(FileRecord):
     distance: PositiveLength | None = None
     baseline: NonNegativeLength | None = None
     medium: Medium | None = None
+    motion: Motion | None = None
+    acceleration: Acceleration | None = None
+    minimum_turn_radius: NonNegativeLength | None = None
+    minimum_speed: Speed | None = None
+    area: DriveArea | None = None
+    height: NonNegativeLength | None = None
     source: str | None = None
     note: str = ""
 

@@ -1,0 +1,234 @@
+"""Legs put together to a whole drive, and what a log of it would tell after every leg."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.diagnosis.noise import NoiseLevel, Structure
+from syncline_design.diagnosis.result import Noise
+from syncline_design.diagnosis.scene import Scene, scene
+from syncline_design.effects.acting import acting_of
+from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import in_force
+from syncline_design.model.system import System
+from syncline_design.planning.information import (
+    Unknown,
+    drift_columns,
+    expected_noise,
+    fisher,
+    unknowns,
+    with_shift,
+)
+from syncline_design.planning.legs import Leg, library, transition
+from syncline_design.planning.path import STEP_S, Course, States, joined, travelled
+from syncline_design.planning.planned_log import (
+    Drive,
+    apart,
+    drive,
+    one_after_another,
+    planned_log,
+    turned,
+)
+from syncline_design.planning.search import Told, arranged
+from syncline_design.planning.vehicle import Vehicle
+
+COMPUTED_HZ = 10.0  # rows that are computed; more rows a second count as less noise each
+QUARTER = 0.5 * math.pi
+GAP_S = 1000.0  # between legs that are looked at as one log: no noise lasts so long
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """A system with its vehicles: what drives are made and judged in.
+
+    rate_hz: rows a second that the log has.  measured: noise that a diagnosis found.
+    """
+
+    system: System
+    vehicles: tuple[Vehicle, ...]
+    rate_hz: float
+    measured: Noise | None = None
+    surveyed: Array | None = None
+
+    @property
+    def computed_hz(self) -> float:
+        return min(self.rate_hz, COMPUTED_HZ)
+
+    def driven(self, courses: Sequence[Course]) -> Drive:
+        """A drive of courses, one a stage, all of one length."""
+        step = 1.0 / self.computed_hz
+        states = []
+        for vehicle, course in zip(self.vehicles, courses, strict=True):
+            whole = travelled(vehicle, course)
+            count = max(math.floor((len(course) - 1) * STEP_S / step + 1e-9), 1)
+            states.append(whole.at(step * np.arange(count + 1, dtype=np.float64)))
+        return drive(self.system, self.vehicles, apart(self.vehicles, states), self.surveyed)
+
+    def view(self, driven: Drive) -> Scene:
+        """The log of a drive beside the system."""
+        log = planned_log(self.system, driven)
+        return scene(self.system, log, acting_of(self.system))
+
+    def noise(self, view: Scene) -> tuple[Structure, NoiseLevel]:
+        """Its noise; where the log has more rows than are computed, each counts for several."""
+        structure, level = expected_noise(view, self.measured)
+        share = math.sqrt(self.computed_hz / self.rate_hz)
+        factor = tuple(share * f for f in level.factor)
+        return structure, NoiseLevel(factor, level.slow, level.time_constant_s, level.size)
+
+    def courses_of(self, stage: int, course: Course) -> list[Course]:
+        """One stage drives, the others hold."""
+        return [
+            course if k == stage else held(vehicle, len(course))
+            for k, vehicle in enumerate(self.vehicles)
+        ]
+
+    @cached_property
+    def legs(self) -> tuple[Leg, ...]:
+        """Every leg of every stage's vehicle."""
+        return tuple(leg for k, v in enumerate(self.vehicles) for leg in library(v, k))
+
+    @cached_property
+    def every(self) -> tuple[Unknown, ...]:
+        """All unknowns, as a drive of one turning leg shows them."""
+        turning = next((g for g in self.legs if g.name == "figure eight"), self.legs[0])
+        return unknowns(self.view(self.driven(self.courses_of(turning.stage, turning.course))))
+
+    def looked_at(self, legs: Sequence[Leg]) -> tuple[Told, ...]:
+        """What each of some legs alone would tell, at four headings; all looked at as one log."""
+        flown = []
+        for leg in legs:
+            in_force().check()
+            courses = self.courses_of(leg.stage, leg.course)
+            driven = self.driven(courses)
+            flown += [planned_log(self.system, turned(driven, QUARTER * h)) for h in range(4)]
+        whole, ends = one_after_another(flown, GAP_S)
+        view = scene(self.system, whole, acting_of(self.system))
+        noise, slopes = self.noise(view), with_shift(view, self.every)
+        drifts = drift_columns(view, self.every, slopes[:, :, :-1])
+        slopes[:, :, :-1] -= _since(whole.time_s, ends)[:, None, None] * drifts
+        drifting = np.flatnonzero(np.any(drifts != 0.0, axis=(0, 1)))
+        both = np.concatenate([slopes, drifts[:, :, drifting]], axis=2)
+        parts = [self._told(noise, both, slice(*pair), drifting) for pair in pairwise(ends)]
+        return tuple(self._summed(leg, parts[4 * k : 4 * k + 4]) for k, leg in enumerate(legs))
+
+    def _told(
+        self, noise: tuple[Structure, NoiseLevel], both: Array, rows: slice, drifting: Index
+    ) -> tuple[Array, Array, Array]:
+        """G00, G0d + Gd0 and Gdd of some rows."""
+        in_force().check()
+        count = len(self.every) + 1
+        cross, twice = np.zeros((count, count)), np.zeros((count, count))
+        if rows.stop - rows.start < 2:
+            return cross, cross, twice
+        found = fisher(noise[0].rows(rows), noise[1], both[rows])
+        cross[:, drifting] = found[:count, count:]
+        twice[np.ix_(drifting, drifting)] = found[count:, count:]
+        return found[:count, :count], cross + cross.T, twice
+
+    def _summed(self, leg: Leg, parts: Sequence[tuple[Array, Array, Array]]) -> Told:
+        vehicle = self.vehicles[leg.stage]
+        path = travelled(vehicle, leg.course)
+        between = transition(vehicle, math.pi).duration_s
+        moved = path.position_m[-1, :2] - path.position_m[0, :2]
+        now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
+        return Told(
+            leg,
+            now,
+            once,
+            twice,
+            (float(moved[0]), float(moved[1])),
+            float(path.euler_rad[-1, 2]),
+            leg.duration_s + between,
+            _box(path),
+        )
+
+
+def _box(path: States) -> tuple[float, float, float, float]:
+    (south, north), (west, east) = (
+        (float(own.min() - own[0]), float(own.max() - own[0])) for own in path.position_m.T[:2]
+    )
+    return south, north, west, east
+
+
+def _since(time_s: Array, ends: Sequence[int]) -> Array:
+    """How long after the very first row each run began, by row."""
+    found = np.zeros_like(time_s)
+    for begun, end in pairwise(ends):
+        if end > begun:
+            found[begun:end] = time_s[begun] - time_s[0]
+    return found
+
+
+def held(vehicle: Vehicle, steps: int) -> Course:
+    """What a vehicle does while another one drives: hover, or wide circles at its slowest."""
+    speed = np.full(steps, vehicle.join_mps)
+    zero = np.zeros(steps)
+    return Course(speed, zero, zero, np.full(steps, 0.5 * vehicle.turn_radps(vehicle.join_mps)))
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """One leg in a whole drive: from when to when, and the heading it begins at [rad]."""
+
+    leg: Leg
+    from_s: float
+    to_s: float
+    heading_rad: float
+
+
+def whole_drive(world: World, sequence: Sequence[Told]) -> tuple[tuple[Stretch, ...], list[Course]]:
+    """The legs one after the other with the turns between them: stretches and courses by stage."""
+    parts: list[list[Course]] = [[] for _ in world.vehicles]
+    heading, found, steps = 0.0, [], 0
+    for placed in arranged(sequence):
+        leg = placed.told.leg
+        begun = steps
+        angle = _wrapped(QUARTER * placed.heading - heading)
+        turn = transition(world.vehicles[leg.stage], angle)
+        for course in (turn, leg.course):
+            for own, one in zip(parts, world.courses_of(leg.stage, course), strict=True):
+                own.append(one)
+            steps += len(course)
+        heading = QUARTER * placed.heading + placed.told.turned_rad
+        found.append(Stretch(leg, begun * STEP_S, steps * STEP_S, QUARTER * placed.heading))
+    return tuple(found), [joined(own) for own in parts]
+
+
+def _wrapped(angle: float) -> float:
+    return math.remainder(angle, 2.0 * math.pi)
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """A whole drive with the information of all unknowns after each of its legs."""
+
+    stretches: tuple[Stretch, ...]
+    driven: Drive
+    view: Scene
+    after: tuple[Array, ...]
+    slopes: Array
+    noise: tuple[Structure, NoiseLevel]
+
+
+def outcome(world: World, sequence: Sequence[Told]) -> Outcome:
+    """The whole drive judged: information after every leg, from all rows up to its end."""
+    stretches, courses = whole_drive(world, sequence)
+    driven = world.driven(courses)
+    view = world.view(driven)
+    slopes = with_shift(view, world.every)
+    structure, level = world.noise(view)
+    after = []
+    for one in stretches:
+        in_force().check()
+        rows = slice(0, int(np.searchsorted(view.log.time_s, one.to_s)))
+        after.append(fisher(structure.rows(rows), level, slopes[rows]))
+    return Outcome(stretches, driven, view, tuple(after), slopes, (structure, level))

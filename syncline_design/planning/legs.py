@@ -1,0 +1,245 @@
+"""The legs that a drive can be made of: what the vehicle does, in commands and in words.
+
+Every leg begins and ends straight ahead at the vehicle's joining speed, so that any can follow any.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.effects.record import Array
+from syncline_design.planning.path import GRAVITY_MPS2, STEP_S, Course
+from syncline_design.planning.vehicle import Vehicle
+
+LINE_S = 20.0
+SWEEP_S = 12.0
+FULL_RAD = 2.0 * math.pi
+MOST_LEG_S = 300.0
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One leg of one stage's vehicle; words: what to do, for who drives."""
+
+    name: str
+    stage: int
+    words: str
+    course: Course
+
+    @property
+    def duration_s(self) -> float:
+        return self.course.duration_s
+
+
+def ramps(vehicle: Vehicle, steps: list[tuple[float, float]], join_mps: float) -> Array:
+    """Speed over time: from the joining speed through (speed, hold [s]) and back to it."""
+    slope = 0.6 * vehicle.acceleration_mps2
+    at, parts = join_mps, []
+    for speed, hold_s in [*steps, (join_mps, 0.0)]:
+        count = max(math.ceil(abs(speed - at) / slope / STEP_S), 1)
+        parts.append(at + (speed - at) * np.arange(1, count + 1) / count)
+        parts.append(np.full(round(hold_s / STEP_S), speed))
+        at = speed
+    return np.concatenate(parts)
+
+
+def _course(ahead: Array, right: Array | None = None, down: Array | None = None,
+            turn: Array | None = None) -> Course:  # fmt: skip
+    zero = np.zeros_like(ahead)
+    return Course(ahead, *(zero if v is None else v for v in (right, down, turn)))
+
+
+def turning(vehicle: Vehicle, speed: float, angles: list[float]) -> Course:
+    """Turns by some angles [rad] one after the other, at one speed held from ramp to ramp."""
+    rate = vehicle.turn_radps(speed)
+    counts = [max(round(abs(a) / rate / STEP_S), 1) for a in angles]
+    ahead = ramps(vehicle, [(speed, STEP_S * (sum(counts) + 40))], vehicle.join_mps)
+    turn = np.zeros_like(ahead)
+    at = (len(ahead) - sum(counts)) // 2
+    for angle, count in zip(angles, counts, strict=True):
+        turn[at : at + count] = angle / (count * STEP_S)
+        at += count
+    return _course(ahead, turn=turn)
+
+
+def transition(vehicle: Vehicle, angle_rad: float) -> Course:
+    """The turn between two legs, at the joining speed."""
+    speed = vehicle.join_mps
+    rate = vehicle.turn_radps(speed) if speed > 0.0 else vehicle.turn_radps(0.0)
+    count = max(round(abs(angle_rad) / rate / STEP_S), 1) if angle_rad else 0
+    rest = round(2.0 * vehicle.usual.rounding_s / STEP_S)
+    turn = np.concatenate([np.zeros(rest), np.full(count, angle_rad / max(count * STEP_S, STEP_S)),
+                           np.zeros(rest)])  # fmt: skip
+    return _course(np.full(turn.shape, speed), turn=turn)
+
+
+def _wave(duration_s: float, cycles: int) -> Array:
+    """A sine that fades in and out over its first and last cycle."""
+    time_s = STEP_S * np.arange(round(duration_s / STEP_S))
+    edge = duration_s / cycles
+    fade = np.clip(np.minimum(time_s, duration_s - time_s) / edge, 0.0, 1.0)
+    return np.asarray(fade * np.sin(FULL_RAD * cycles * time_s / duration_s))
+
+
+def _mps(speed: float) -> str:
+    return f"{speed:.3g} m/s"
+
+
+def _straight(v: Vehicle) -> tuple[str, Course]:
+    ahead = ramps(v, [(v.fast_mps, LINE_S)], v.join_mps)
+    return f"straight ahead at {_mps(v.fast_mps)} for {LINE_S:.0f} s", _course(ahead)
+
+
+def _slow(v: Vehicle) -> tuple[str, Course]:
+    speed = max(v.slowest_mps, 0.3 * v.v_max_mps)
+    ahead = ramps(v, [(speed, LINE_S)], v.join_mps)
+    return f"straight ahead at {_mps(speed)} for {LINE_S:.0f} s", _course(ahead)
+
+
+def _reciprocal(v: Vehicle) -> tuple[str, Course]:
+    line = ramps(v, [(v.fast_mps, LINE_S / 2)], v.join_mps)
+    turn = transition(v, math.pi)
+    ahead = np.concatenate([line, turn.ahead, line])
+    zero = np.zeros_like(line)
+    words = f"a line at {_mps(v.fast_mps)}, turn about, the same line back"
+    return words, _course(ahead, turn=np.concatenate([zero, turn.turn, zero]))
+
+
+def _stop_and_go(v: Vehicle) -> tuple[str, Course] | None:
+    least = v.slowest_mps
+    reach = min(v.fast_mps, least + 0.6 * v.acceleration_mps2 * 5.0)
+    if reach <= least * 1.1:
+        return None
+    ahead = ramps(v, [(reach, 1.0), (least, 1.0)] * 3, v.join_mps)
+    slow = "a stop" if least == 0.0 else _mps(least)
+    return f"three times from {slow} up to {_mps(reach)} and back, straight ahead", _course(ahead)
+
+
+def _slow_and_fast(v: Vehicle) -> tuple[str, Course] | None:
+    low = max(v.slowest_mps, 0.25 * v.v_max_mps)
+    if low > 0.9 * v.fast_mps:
+        return None
+    line = [ramps(v, [(s, LINE_S / 2)], v.join_mps) for s in (low, v.fast_mps)]
+    turn = transition(v, math.pi)
+    zeros = [np.zeros_like(one) for one in line]
+    ahead = np.concatenate([line[0], turn.ahead, line[1]])
+    words = f"a line at {_mps(low)}, turn about, the same line at {_mps(v.fast_mps)}"
+    return words, _course(ahead, turn=np.concatenate([zeros[0], turn.turn, zeros[1]]))
+
+
+def _circle(v: Vehicle, sign: float) -> tuple[str, Course]:
+    speed = _turning_speed(v)
+    side = "right" if sign > 0 else "left"
+    return f"a full circle to the {side} at {_mps(speed)}", turning(v, speed, [sign * FULL_RAD])
+
+
+def _turning_speed(v: Vehicle) -> float:
+    """A speed at which the vehicle turns well: where acceleration and omega_max both bind."""
+    best = 0.8 * v.acceleration_mps2 / (TURNS_WELL * v.omega_max_radps)
+    low = max(v.slowest_mps, 0.3 * v.v_max_mps)
+    return float(np.clip(best, low, v.fast_mps))
+
+
+TURNS_WELL = 0.5
+
+
+def _eight(v: Vehicle) -> tuple[str, Course]:
+    speed = _turning_speed(v)
+    words = f"a figure eight at {_mps(speed)}, first to the right"
+    return words, turning(v, speed, [FULL_RAD, -FULL_RAD])
+
+
+def _reverse(v: Vehicle) -> tuple[str, Course] | None:
+    if not v.usual.reverses or v.slowest_mps > 0.0:
+        return None
+    speed = min(0.4 * v.v_max_mps, 0.6 * v.acceleration_mps2 * 4.0)
+    ahead = ramps(v, [(speed, 2.0), (-speed, 2.0)] * 2, v.join_mps)
+    return f"twice ahead and back astern at {_mps(speed)}, the heading kept", _course(ahead)
+
+
+def _spin(v: Vehicle) -> tuple[str, Course] | None:
+    if not v.usual.hovers:
+        return None
+    return "hover and turn once to the right, once to the left", turning(
+        v, 0.0, [FULL_RAD, -FULL_RAD]
+    )
+
+
+def _sway(v: Vehicle, sideways: bool) -> tuple[str, Course] | None:
+    """Roll or pitch of a multirotor: to and fro, leaning by what its acceleration takes."""
+    if not v.usual.hovers:
+        return None
+    cycles, lean = 6, min(v.tilt_rad, math.atan(0.8 * v.acceleration_mps2 / GRAVITY_MPS2))
+    omega = FULL_RAD * cycles / SWEEP_S
+    swing = min(GRAVITY_MPS2 * math.tan(lean) / omega, 0.4 * v.v_max_mps) * _wave(SWEEP_S, cycles)
+    zero = np.zeros_like(swing)
+    axis, name = ("roll", "sideways") if sideways else ("pitch", "to and fro")
+    words = f"{axis} sweeps: sway {name} every {SWEEP_S / cycles:.0f} s, leaning to " \
+            f"{math.degrees(lean):.0f} deg"  # fmt: skip
+    return words, _course(zero, right=swing) if sideways else _course(swing)
+
+
+def _rock(v: Vehicle) -> tuple[str, Course] | None:
+    """Turns to and fro: an aeroplane rolls, others yaw."""
+    speed = v.join_mps if v.motion == "fixed_wing" else _turning_speed(v)
+    rate, cycles = v.turn_radps(speed), 4
+    period = max(3.0, 4.0 * v.usual.rounding_s, SWEEP_S / cycles)
+    swing = rate * _wave(period * cycles, cycles)
+    ahead = ramps(v, [(speed, period * cycles + 2.0)], v.join_mps)
+    turn = np.zeros_like(ahead)
+    at = (len(ahead) - len(swing)) // 2
+    turn[at : at + len(swing)] = swing
+    what = "roll sweeps: rock the wings" if v.motion == "fixed_wing" else "a slalom"
+    words = f"{what} at {_mps(speed)}, {cycles} times to either side, {period:.0f} s each"
+    return words, _course(ahead, turn=turn)
+
+
+def _heights(v: Vehicle) -> tuple[str, Course] | None:
+    if not v.usual.climbs:
+        return None
+    rate = min(0.15 * v.v_max_mps, 0.6 * v.acceleration_mps2 * 2.0, 0.04 * v.distance_m)
+    ahead = ramps(v, [(max(v.join_mps, 0.3 * v.fast_mps), LINE_S)], v.join_mps)
+    down = rate * _wave(len(ahead) * STEP_S, 2)[: len(ahead)]
+    down = np.pad(down, (0, len(ahead) - len(down)))
+    step = rate * len(ahead) * STEP_S / 2 / math.pi
+    return f"height steps: {step:.2g} m down and up again, twice, flying on", _course(
+        ahead, down=down
+    )
+
+
+Maker = Callable[[Vehicle], "tuple[str, Course] | None"]
+MAKERS: dict[str, Maker] = {
+    "straight line": _straight,
+    "slow line": _slow,
+    "reciprocal lines": _reciprocal,
+    "slow and fast": _slow_and_fast,
+    "stop and go": _stop_and_go,
+    "right circle": lambda v: _circle(v, 1.0),
+    "left circle": lambda v: _circle(v, -1.0),
+    "figure eight": _eight,
+    "ahead and astern": _reverse,
+    "hover and spin": _spin,
+    "roll sweeps": lambda v: _sway(v, True),
+    "pitch sweeps": lambda v: _sway(v, False),
+    "slalom": _rock,
+    "height steps": _heights,
+}
+
+
+def library(vehicle: Vehicle, stage: int) -> tuple[Leg, ...]:
+    """Every leg that the vehicle can do, in a time that is worth it, within its area."""
+    return tuple(_made(vehicle, stage))
+
+
+def _made(vehicle: Vehicle, stage: int) -> Iterator[Leg]:
+    for name, make in MAKERS.items():
+        made = make(vehicle)
+        if made is None:
+            continue
+        words, course = made
+        if course.duration_s <= MOST_LEG_S:
+            yield Leg(name, stage, words[0].upper() + words[1:], course)

@@ -1,0 +1,73 @@
+"""The short plan at the end of a diagnosis whose log left a finding with aliases."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator
+from typing import Final
+
+from syncline_design.diagnosis.result import Diagnosis, Finding, NextDrive, Rival
+from syncline_design.effects import registry
+from syncline_design.machine.deadline import NoVerdict, within_s
+from syncline_design.planning.run import PlanRequest, PlanRun, plan
+from syncline_design.planning.wanted import Asked, Named, Pair, PlanError
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import BadInput
+
+LIMIT_S: Final = 20.0  # of the command's time; without a plan by then, the diagnosis stands alone
+MOST_TRIED: Final = 3
+
+
+def next_drive(case: Case, found: Diagnosis) -> NextDrive | None:
+    """The drive that tells the strongest finding from what this log left in its place.
+
+    case: pinned.  None where no finding is a class, where no drive tells, and where none could be
+    planned in time: a diagnosis never fails for want of a plan.
+    """
+    several = len(case.stages) > 1
+    pairs = list(_pairs(found, several))[:MOST_TRIED]
+    try:
+        with within_s(LIMIT_S):
+            for first, second in pairs:
+                run = plan(case, PlanRequest(Asked((), (Pair(first, second),))))
+                if run.result.least_minutes is not None:
+                    return _short(case, run, first, second)
+    except (BadInput, PlanError, NoVerdict):
+        return None
+    return None
+
+
+def _pairs(found: Diagnosis, several: bool) -> Iterator[tuple[Named, Named]]:
+    """Causes that matter with their aliases, the commonest first, as far as a drive can help."""
+    for one in found.findings:
+        if one.kind == "noise" or not one.material or not _moves(one.effect):
+            continue
+        for rival in sorted(one.aliases, key=lambda r: registry()[r.effect].rarity):
+            if _moves(rival.effect):
+                yield _named(one, several), _named(rival, several)
+
+
+def _moves(effect: str) -> bool:
+    known = registry().get(effect)
+    return known is not None and known.sensitivity is not None
+
+
+def _named(one: Finding | Rival, several: bool) -> Named:
+    return Named(one.effect, one.sensor, one.stage if several else None)
+
+
+def _short(case: Case, run: PlanRun, first: Named, second: Named) -> NextDrive:
+    result = run.result
+    command = ["syncline-design", "plan", str(case.path), "--separate", first.text, second.text]
+    if not result.reached and result.least_minutes is not None:
+        command += ["--minutes", f"{result.least_minutes * 1.05 + 0.1:.1f}"]
+    return NextDrive(
+        first=first.text,
+        second=second.text,
+        minutes=result.duration_s / 60.0,
+        least_minutes=result.least_minutes,
+        reached=result.reached,
+        legs=tuple(f"{leg.name}: {leg.words}" for leg in result.legs),
+        targets=len(result.targets),
+        command=shlex.join(command),
+    )

@@ -1,0 +1,146 @@
+"""What a plan says: typed, and written as JSON (schema syncline-design/plan/v1)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Final
+
+from syncline_design.diagnosis.result import SpecRead
+from syncline_design.machine.records import Named, Record, Unbounded, optional
+
+SCHEMA: Final = "syncline-design/plan/v1"
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedLeg(Record):
+    """One leg: from when to when [s], what to do, who drives, and the heading it begins with."""
+
+    name: str
+    from_s: float
+    to_s: float
+    words: str
+    stage: str
+    heading_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class After(Record):
+    """What is known after a leg, in SI units by `effect(sensor).parameter`.
+
+    sigma: standard uncertainty of what is asked, with the named pair (else all of --reach) and the
+    noise free; null where the log says nothing of it.  sigma_all: with every applicable effect
+    free, within the priors.  correlation: of the named pair, the largest canonical one.
+    """
+
+    leg: str
+    sigma: Mapping[str, Unbounded]
+    sigma_all: Mapping[str, Unbounded]
+    correlation: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Separated(Record):
+    """A pair of effects: correlation, noncentrality reached and asked.
+
+    noncentrality: twice the log likelihood by which the true effect, of the size stated, beats its
+    rival refitted, on average; sizes: of the first effect's parameters, SI.
+    """
+
+    first: str
+    second: str
+    correlation: float
+    noncentrality: float
+    wanted: float
+    separated: bool
+    sizes: Mapping[str, float]
+
+
+@dataclass(frozen=True, slots=True)
+class StandardPlan(Record):
+    """A line plan of the field beside the designed one.
+
+    legs, minutes: what it takes to reach what is asked, null where it never does.  sigma: in the
+    time of the designed drive.
+    """
+
+    name: str
+    legs: int | None
+    sigma: Mapping[str, Unbounded]
+    correlation: float | None
+    minutes: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedTarget(Record):
+    """A target to survey: its number and place in the local frame [m]."""
+
+    id: int
+    north_m: float
+    east_m: float
+    down_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Flown(Record):
+    """A log held against what was asked: its duration, and what it tells."""
+
+    files: tuple[str, ...]
+    duration_s: float
+    rows: int
+    sigma: Mapping[str, Unbounded]
+    correlation: float | None
+    reached: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PlanProvenance(Record):
+    """What the plan depends on."""
+
+    version: str
+    seed: int
+    spec_sha256: str
+    catalogs_sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Plan(Record):
+    """A drive and what it tells.
+
+    reached: within the minutes.  least_minutes: the least that reaches all that is asked, null
+    where no drive does.  tolerance: what is asked, SI.  inseparable: pairs that no drive of this
+    platform tells apart.  confused: effects any of which, left free, would widen what is asked too
+    far, though another drive tells them apart.  unseen: what the drive says next to nothing of.
+    priors: standard deviations before the drive, SI.  assumed: figures of the platform that the
+    spec does not state.
+    """
+
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    reached: bool
+    spec: SpecRead
+    minutes: float
+    duration_s: float
+    least_minutes: float | None
+    legs: tuple[PlannedLeg, ...]
+    after: tuple[After, ...]
+    tolerance: Mapping[str, float]
+    pairs: tuple[Separated, ...]
+    inseparable: tuple[str, ...]
+    confused: tuple[str, ...]
+    unseen: tuple[str, ...]
+    columns: tuple[str, ...]
+    rate_hz: float
+    noise: str
+    priors: Mapping[str, float]
+    standard: tuple[StandardPlan, ...]
+    targets: tuple[PlannedTarget, ...]
+    surveyed: bool
+    assumed: tuple[str, ...]
+    origin_deg_m: tuple[float, float, float] | None
+    provenance: PlanProvenance
+    flown: Flown | None = optional()
+
+    @property
+    def exit_code(self) -> int:
+        """0 reached, 1 not in these minutes."""
+        return 0 if self.reached else 1

@@ -1,0 +1,360 @@
+"""Which legs, in which order: greedy, then by exchange, on the information of every leg alone.
+
+Information adds up over legs (their slow noise is taken as each leg's own), and what drifts grows
+with the time at which a leg begins: I(t) = G00 + t (G0d + Gd0) + t^2 Gdd.  What the search finds is
+judged afterwards on the whole drive (`drives`).
+Source: Fedorov, Theory of Optimal Experiments (1972), for exchange.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import Deadline
+from syncline_design.planning.information import (
+    Unknown,
+    canonical_correlation,
+    covariance_of,
+    noncentrality,
+    schur,
+    sigmas,
+)
+from syncline_design.planning.legs import Leg
+from syncline_design.planning.wanted import Goal, PairGoal
+
+NONCENTRALITY: Final = 60.0  # at which a rival fits worse by more than 15 nat nine times in ten
+SAME: Final = 0.99  # correlation above which two effects stay one class
+MOST_LEGS: Final = 240
+MARGIN: Final = 0.95  # of what is asked that the search aims at, for the joints between legs
+LEAST_GAIN: Final = 1e-4
+AREA_SHARE: Final = 0.9  # of the area, for the legs
+SWEEPS: Final = 3
+MOST_EXCHANGED: Final = 12
+INSEPARABLE: Final = 20.0  # times wider: what no drive of the library tells apart
+WIDENED: Final = 3.0  # times that one other effect may widen a sigma
+VAGUE: Final = 30.0  # times the prior: of what a search has not seen yet
+CONFUSED: Final = 0.05  # weight of what other effects take of what is wanted
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """What one leg tells at each of the four headings: G00, G0d + Gd0, Gdd, (4, p + 1, p + 1) each,
+    the last row and column what the noise shifts.
+
+    reach_m: displacement of the leg flown northwards, and its net turn [rad]; lasts_s: with the
+    turn to its heading.  box_m: south, north, west and east end of the leg driven northwards.
+    """
+
+    leg: Leg
+    now: Array
+    once: Array
+    twice: Array
+    moved_m: tuple[float, float]
+    turned_rad: float
+    lasts_s: float
+    box_m: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+    def at(self, heading: int, start_s: float) -> Array:
+        """Information of the leg when it begins so late."""
+        found: Array = (
+            self.now[heading] + start_s * self.once[heading] + start_s**2 * self.twice[heading]
+        )
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A leg in its place: which of the four headings, and when it begins."""
+
+    told: Told
+    heading: int
+    start_s: float
+
+
+def arranged(sequence: Sequence[Told]) -> tuple[Placed, ...]:
+    """Every leg at the heading that ends nearest to the start, the way back first."""
+    place, start, found = np.zeros(2), 0.0, []
+    before = 0
+    for told in sequence:
+        ends = [place + _turned(told.moved_m, h) for h in range(4)]
+        costs = [
+            float(np.hypot(*end)) + 1e-6 * ((h - before - 2) % 4) for h, end in enumerate(ends)
+        ]
+        heading = int(np.argmin(np.round(costs, 5)))
+        found.append(Placed(told, heading, start))
+        place, before = ends[heading], heading
+        start += told.lasts_s
+    return tuple(found)
+
+
+def _turned(moved: tuple[float, float], heading: int) -> Array:
+    cos, sin = ((1, 0), (0, 1), (-1, 0), (0, -1))[heading]
+    return np.array([moved[0] * cos - moved[1] * sin, moved[0] * sin + moved[1] * cos])
+
+
+def extent_m(sequence: Sequence[Told]) -> tuple[float, float]:
+    """North to south and east to west [m] that the legs take, without the turns between them."""
+    place, low, high = np.zeros(2), np.zeros(2), np.zeros(2)
+    for one in arranged(sequence):
+        south, north, west, east = one.told.box_m
+        for corner in ((south, west), (south, east), (north, west), (north, east)):
+            at = place + _turned(corner, one.heading)
+            low, high = np.minimum(low, at), np.maximum(high, at)
+        place = place + _turned(one.told.moved_m, one.heading)
+    return float(high[0] - low[0]), float(high[1] - low[1])
+
+
+def lasting_s(sequence: Sequence[Told]) -> float:
+    return sum(told.lasts_s for told in sequence)
+
+
+def together(sequence: Sequence[Told]) -> Array:
+    """Information of all legs."""
+    total: Array = np.sum([p.told.at(p.heading, p.start_s) for p in arranged(sequence)], axis=0)
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class Others:
+    """All effects besides those asked for, one by one: where their parameters stand (f, 3), -1
+    where there are fewer, and by how much each may widen the sigmas of what is wanted (f, w).
+
+    What even the whole library of legs cannot tell from what is wanted is not among them.
+    """
+
+    index: NDArray[np.int64]
+    limit: Array
+
+    def widened(self, information: Array, wanted: Sequence[int], vague: Array) -> Array:
+        """Sigmas (f, w) of what is wanted with each other effect free."""
+        count, width = self.index.shape[0], len(wanted)
+        size = width + self.index.shape[1]
+        every = np.concatenate([np.tile(wanted, (count, 1)), self.index], axis=1)
+        known = every >= 0
+        both = known[:, :, None] & known[:, None, :]
+        parts = np.where(both, information[every[:, :, None], every[:, None, :]], 0.0)
+        diagonal = np.einsum("fii->fi", parts)
+        diagonal += np.where(known, vague[every] ** -2.0, 1.0)
+        scale = np.sqrt(diagonal)
+        inverse = np.linalg.inv(parts / scale[:, :, None] / scale[:, None, :])
+        variance = np.einsum("fii->fi", inverse) / scale**2
+        assert variance.shape == (count, size)
+        return np.asarray(np.sqrt(np.maximum(variance[:, :width], 0.0)))
+
+
+def others_of(every: Sequence[Unknown], goal: Goal, library: Array, prior: Array) -> Others:
+    """The other effects that some drive tells from what is wanted; library: all legs together."""
+    asked = {every[k].candidate.label for k in goal.wanted}
+    places: dict[tuple[str, str, int], list[int]] = {}
+    for k, one in enumerate(every):
+        if one.candidate.label not in asked:
+            places.setdefault(one.candidate.label, []).append(k)
+    if not places:
+        return Others(np.zeros((0, 1), dtype=np.int64), np.zeros((0, len(goal.wanted))))
+    width = max(len(found) for found in places.values())
+    index = np.array([[*found, *[-1] * (width - len(found))] for found in places.values()])
+    found = Others(index, np.zeros((0, 0)))
+    wanted = list(goal.wanted)
+    covariance, _ = covariance_of(library[np.ix_(wanted, wanted)], VAGUE * prior[wanted])
+    inflation = found.widened(library, wanted, VAGUE * prior) / np.sqrt(np.diag(covariance))
+    limit = np.where(inflation < INSEPARABLE, np.maximum(WIDENED, 1.5 * inflation), np.inf)
+    kept = np.any(np.isfinite(limit), axis=1)
+    return Others(index[kept], limit[kept])
+
+
+@dataclass(frozen=True, slots=True)
+class Judge:
+    """How far a plan is from what is asked: a ratio for every wish, reached at 1 and below.
+
+    prior: of the unknowns, so that what is not seen at all yet still counts less or more.
+    """
+
+    goal: Goal
+    prior: Array
+    others: Others
+
+    def ratios(self, information: Array, exact: bool = False) -> Array:
+        """Sigma over tolerance; root of the noncentrality asked over that reached."""
+        index = list(self.goal.wanted)
+        sigma = sigmas(information, index, None if exact else VAGUE * self.prior[index])
+        asked = np.isfinite(self.goal.tolerance)
+        own = sigma[asked] / self.goal.tolerance[asked]
+        return np.array([*own, *(pair_ratio(information, p) for p in self.goal.pairs)])
+
+    def _shares(self, information: Array) -> Array:
+        """By how much each other effect widens what is wanted, over what it may, (f, w)."""
+        index = list(self.goal.wanted)
+        vague = VAGUE * self.prior
+        covariance, _ = covariance_of(information[np.ix_(index, index)], vague[index])
+        widened = self.others.widened(information, index, vague)
+        share = widened / np.sqrt(np.diag(covariance)) / self.others.limit
+        asked = np.isfinite(self.goal.tolerance)
+        within = np.where(np.isinf(self.others.limit), 0.0, widened)
+        held = within / np.where(asked, 2.0 * self.goal.tolerance, 1.0)
+        return np.asarray(np.where(asked, np.minimum(share, held), share))
+
+    def confusions(self, information: Array) -> Array:
+        """The largest share of any one other effect, by what is wanted."""
+        if not len(self.others.index):
+            return np.zeros(0)
+        return np.asarray(np.max(self._shares(information), axis=0))
+
+    def confusing(self, information: Array) -> list[int]:
+        """First places of the effects that widen something more than they may."""
+        if not len(self.others.index):
+            return []
+        beyond = np.any(self._shares(information) > 1.0, axis=1)
+        return [int(k) for k in self.others.index[beyond, 0]]
+
+    def loss(self, information: Array) -> float:
+        """Sum of the logarithms of what is not reached, the worst twice; 0 where all is reached.
+
+        What any one other effect, left free, takes of it counts like what is asked.
+        """
+        every = np.concatenate([self.ratios(information), self.confusions(information)])
+        logs = np.log(np.maximum(every / MARGIN, 1.0))
+        return float(np.sum(logs) + np.max(logs)) if logs.size else 0.0
+
+    def value(self, information: Array) -> tuple[float, float]:
+        """What is not reached, and the same with what all other effects together take of it."""
+        index = list(self.goal.wanted)
+        loss = self.loss(information)
+        alone = sigmas(information, index, VAGUE * self.prior[index])
+        whole = sigmas(information, range(len(self.prior)), self.prior)[index]
+        taken = float(np.mean(np.log(np.maximum(whole / alone, 1.0))))
+        return loss, loss + CONFUSED * taken
+
+
+def pair_ratio(information: Array, pair: PairGoal) -> float:
+    """1 or less where the better of two effects beats its rival, however that is refitted."""
+    found = noncentrality_of(information, pair)
+    ratio = math.sqrt(NONCENTRALITY / max(found, 1e-9))
+    correlation = canonical_correlation(information, pair.first, pair.second)
+    blocked = 0.0 if pair.known else (correlation / SAME) ** 8
+    return max(ratio, blocked if correlation > SAME else 0.0)
+
+
+def noncentrality_of(information: Array, pair: PairGoal) -> float:
+    """Of the effect named first where its size is known, else of the weaker of the two."""
+    if pair.known:
+        return float(pair.sizes @ schur(information, pair.first, pair.second) @ pair.sizes)
+    return min(
+        noncentrality(information, pair.first, pair.second, pair.sizes),
+        noncentrality(information, pair.second, pair.first, pair.second_sizes),
+    )
+
+
+@dataclass(slots=True)
+class Search:
+    """A search over legs for a judge; where the time is over it stops with what it has."""
+
+    legs: tuple[Told, ...]
+    judge: Judge
+    deadline: Deadline
+    area_m: tuple[float, float] | None = None
+
+    def fits(self, sequence: Sequence[Told]) -> bool:
+        """Whether the legs stay within the area, with room for the turns between them."""
+        if self.area_m is None:
+            return True
+        return all(
+            own <= AREA_SHARE * most
+            for own, most in zip(extent_m(sequence), self.area_m, strict=True)
+        )
+
+    def value(self, sequence: Sequence[Told]) -> tuple[float, float]:
+        return self.judge.value(together(sequence))
+
+    def reaches(self, sequence: Sequence[Told]) -> bool:
+        return bool(sequence) and self.judge.loss(together(sequence)) <= 0.0
+
+    def grown(self, begun: Sequence[Told], most_s: float) -> list[Told]:
+        """Legs added one by one, each the best for its time, until all is reached."""
+        plan = list(begun)
+        loss, value = self.value(plan) if plan else (math.inf, 0.0)
+        while loss > 0.0 and len(plan) < MOST_LEGS and not self.deadline.is_over:
+            found = self._next(plan, value, most_s - lasting_s(plan))
+            if found is None:
+                break
+            gained = value - found[2]
+            plan, loss, value = [*plan, found[0]], found[1], found[2]
+            if len(plan) > 1 and gained < LEAST_GAIN:
+                break
+        return plan
+
+    def _next(
+        self, plan: list[Told], value: float, left_s: float
+    ) -> tuple[Told, float, float] | None:
+        best: tuple[float, Told, float, float] | None = None
+        for told in self.legs:
+            if told.lasts_s > left_s or not self.fits([*plan, told]):
+                continue
+            loss, after = self.value([*plan, told])
+            worth = (value - after) / told.lasts_s
+            if best is None or worth > best[0]:
+                best = (worth, told, loss, after)
+        return None if best is None else best[1:]
+
+    def shortened(self, plan: list[Told]) -> list[Told]:
+        """Legs left out or exchanged for shorter ones while everything stays reached."""
+        for _ in range(SWEEPS):
+            trials = [*self._without(plan), *self._exchanged(plan)]
+            shorter = [t for t in trials if t and self._price(t) < self._price(plan) - 1e-6]
+            shorter = [t for t in shorter if self.fits(t)]
+            shorter.sort(key=self._price)
+            found = next((t for t in shorter if self.reaches(t)), None)
+            if found is None:
+                break
+            plan = found
+        return plan
+
+    def _price(self, plan: list[Told]) -> float:
+        """Time [s]."""
+        return lasting_s(plan)
+
+    def _without(self, plan: list[Told]) -> list[list[Told]]:
+        return [plan[:k] + plan[k + 1 :] for k in range(len(plan))]
+
+    def _exchanged(self, plan: list[Told]) -> list[list[Told]]:
+        if self.deadline.is_over:
+            return []
+        return [
+            [*plan[:k], told, *plan[k + 1 :]]
+            for k in range(min(len(plan), MOST_EXCHANGED))
+            for told in self.legs
+            if told is not plan[k]
+        ]
+
+    def bettered(self, plan: list[Told], most_s: float) -> list[Told]:
+        """Exchange of single legs while it brings a plan of at most this time nearer."""
+        value = self.value(plan)[1]
+        for _ in range(SWEEPS):
+            trials = [t for t in self._exchanged(plan) if lasting_s(t) <= most_s and self.fits(t)]
+            values = [self.value(t)[1] for t in trials]
+            if not values or min(values) >= value - LEAST_GAIN:
+                break
+            value, plan = min(values), trials[int(np.argmin(values))]
+        return plan
+
+
+def best_legs(search: Search, most_s: float, whole_s: float) -> tuple[list[Told], list[Told]]:
+    """The plan for at most so much time, and the one that reaches all, however long it takes."""
+    whole = search.grown([], whole_s)
+    if search.reaches(whole):
+        whole = search.shortened(whole)
+        whole = search.bettered(whole, lasting_s(whole) + 1e-6)
+        if lasting_s(whole) <= most_s:
+            return whole, whole
+    plan = search.grown([], most_s)
+    if not plan:  # not one leg fits: the shortest shows what it would take
+        return [min(search.legs, key=lambda told: told.lasts_s)], whole
+    if not search.reaches(plan):
+        plan = search.bettered(plan, most_s)
+    return plan, whole

@@ -1,0 +1,183 @@
+"""What a vehicle can do on a drive: from the spec's platform, or by what its kind usually can.
+
+Stated figures of the platform count.  What is not stated is taken from the kind of `motion` (the
+table of docs/plan.md), and is said with the plan as assumed.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final, Literal, NamedTuple
+
+from syncline_design.spec.case import Case, StageCase
+from syncline_design.spec.load import BadInput
+from syncline_design.spec.yaml_text import Flaw
+
+Motion = Literal["multirotor", "fixed_wing", "ground", "surface", "underwater", "level"]
+SHARE: Final = 0.9  # of v_max that a plan asks for: drivers and autopilots need room
+TURN_SHARE: Final = 0.75  # of omega_max, so that roll and pitch fit beside a turn
+SEA_TILT: Final = 3.0  # the horizon's tilt is so many standard deviations of the sea's motion
+SEA_RATE_SHARE: Final = 0.12  # of omega_max that the sea's own turn rate is at most (rms)
+MOST_TILT_RAD: Final = math.radians(30.0)
+BELOW: Final = ("mbes", "sonar", "usbl", "echo", "imaging_sonar", "multibeam")
+HEIGHT_SHARE: Final = 0.6  # of the range d that the targets lie below
+
+
+class Usual(NamedTuple):
+    """What a kind usually can: acceleration [m/s2], turn radius [m] (None: v_max over omega_max),
+    slowest speed over v_max, time over which commands are rounded [s]."""
+
+    acceleration_mps2: float
+    turn_radius_m: float | None
+    slowest: float
+    rounding_s: float
+    hovers: bool = False
+    reverses: bool = False
+    climbs: bool = False
+
+
+USUAL: Final[dict[Motion, Usual]] = {
+    "multirotor": Usual(2.5, 0.0, 0.0, 0.35, hovers=True, reverses=True, climbs=True),
+    "fixed_wing": Usual(4.0, None, 0.6, 0.6, climbs=True),
+    "ground": Usual(2.0, 6.0, 0.0, 0.5, reverses=True),
+    "surface": Usual(0.3, None, 0.0, 1.5, reverses=True),
+    "underwater": Usual(0.15, None, 0.3, 1.5, climbs=True),
+    "level": Usual(1.0, None, 0.0, 0.6),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """Limits of one stage's vehicle, and where the objects of its ranging sensor are.
+
+    area_m: north and east extent within which a drive has to stay; None: anywhere.
+    depth_m: how far below the reference point targets lie on average; 0: around it.
+    assumed: figures that the spec does not state, in words.
+    """
+
+    stage: str
+    motion: Motion
+    v_max_mps: float
+    omega_max_radps: float
+    acceleration_mps2: float
+    turn_radius_m: float
+    slowest_mps: float
+    tilt_rad: float
+    distance_m: float
+    depth_m: float
+    area_m: tuple[float, float] | None = None
+    assumed: tuple[str, ...] = ()
+
+    @property
+    def usual(self) -> Usual:
+        return USUAL[self.motion]
+
+    @property
+    def fast_mps(self) -> float:
+        """The speed of a fast leg."""
+        return max(SHARE * self.v_max_mps, self.slowest_mps)
+
+    @property
+    def join_mps(self) -> float:
+        """The speed at which one leg ends and the next begins."""
+        if self.usual.hovers:
+            return 0.0
+        return max(self.slowest_mps, self.fast_mps / 3.0)
+
+    def turn_radps(self, speed_mps: float) -> float:
+        """Largest turn rate at a speed: omega_max, a lateral acceleration, a radius."""
+        limit = TURN_SHARE * self.omega_max_radps
+        if speed_mps > 0.0:
+            limit = min(limit, 0.8 * self.acceleration_mps2 / speed_mps)
+        if self.turn_radius_m > 0.0:
+            limit = min(limit, speed_mps / self.turn_radius_m)
+        return limit
+
+
+def vehicles(case: Case, ranging_types: tuple[str, ...]) -> tuple[Vehicle, ...]:
+    """The vehicle of every stage; BadInput for one that cannot turn or move."""
+    return tuple(
+        _vehicle(case, stage, kind) for stage, kind in zip(case.stages, ranging_types, strict=False)
+    )
+
+
+def _vehicle(case: Case, stage: StageCase, ranging_type: str) -> Vehicle:
+    entry = stage.platform.entry
+    v_max, omega = float(entry.v_max), float(entry.omega_max)
+    _demand_motion(case, stage, v_max, omega)
+    motion: Motion = entry.motion or "level"
+    usual, assumed = USUAL[motion], []
+    if entry.motion is None:
+        assumed.append("motion: level (it keeps level, heads where it goes, neither hovers nor "
+                       "reverses; `motion:` of the platform says more)")  # fmt: skip
+    accelerates = _stated(entry.acceleration, _usual_acceleration(usual, v_max))
+    if entry.acceleration is None:
+        assumed.append(f"acceleration: {accelerates:.3g} m/s^2")
+    radius = usual.turn_radius_m if usual.turn_radius_m is not None else v_max / omega
+    if entry.minimum_turn_radius is None and radius > 0.0:
+        assumed.append(f"minimum_turn_radius: {radius:.3g} m")
+    slowest = _stated(entry.minimum_speed, usual.slowest * v_max)
+    if entry.minimum_speed is None and slowest > 0.0:
+        assumed.append(f"minimum_speed: {slowest:.3g} m/s")
+    tilt = min(float(case.spec.horizon.tilt), MOST_TILT_RAD)
+    return Vehicle(
+        stage.choice.name,
+        motion,
+        v_max,
+        omega,
+        accelerates,
+        _stated(entry.minimum_turn_radius, radius),
+        min(slowest, SHARE * v_max),
+        tilt,
+        float(entry.distance),
+        _depth_m(entry.height, float(entry.distance), motion, ranging_type),
+        _area(entry.area),
+        tuple(assumed),
+    )
+
+
+def _usual_acceleration(usual: Usual, v_max: float) -> float:
+    """The kind's, and at most the one that reaches v_max in 2 s: slow vehicles are gentle."""
+    return min(usual.acceleration_mps2, 0.5 * v_max)
+
+
+def _stated(figure: float | None, otherwise: float) -> float:
+    return otherwise if figure is None else float(figure)
+
+
+def _area(stated: float | tuple[float, ...] | None) -> tuple[float, float] | None:
+    if stated is None:
+        return None
+    north, east = stated if isinstance(stated, tuple) else (stated, stated)
+    return float(north), float(east)
+
+
+def _depth_m(
+    height: float | None, distance: float, motion: Motion, ranging_type: str
+) -> float:  # fmt: skip
+    """How far below the vehicle its objects lie: the stated height, or a share of d.
+
+    Around the vehicle where it is on the ground or afloat and looks through air.
+    """
+    if height is not None:
+        return min(float(height), 0.95 * distance)
+    afloat = motion in ("ground", "surface")
+    looks_down = any(word in ranging_type for word in BELOW)
+    return 0.0 if afloat and not looks_down else HEIGHT_SHARE * distance
+
+
+def _demand_motion(case: Case, stage: StageCase, v_max: float, omega: float) -> None:
+    for key, value, cannot in (("omega_max", omega, "turn"), ("v_max", v_max, "move")):
+        if value <= 0.0:
+            path = ("stages", stage.index, "platform")
+            flaw = Flaw(
+                str(case.path),
+                *case.position(path),
+                f"stages.{stage.index}.platform.{key}",
+                f"the platform of stage {stage.choice.name!r} cannot {cannot} ({key} is 0), and "
+                f"what tells effects apart is how it {cannot}s",
+                f"{key} above 0",
+                hint="state what the vehicle of the test drive can do",
+            )
+            raise BadInput((flaw,))

@@ -1,0 +1,245 @@
+"""What a plan is asked for: effects to know within a tolerance, pairs of effects to tell apart.
+
+Effects are spelt `latency(position)`; of a chain, `latency(auv.attitude)` names the stage.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from syncline_design.effects import registry
+from syncline_design.effects.record import Array
+from syncline_design.model.quantity import UnitError, parse_quantity, suffix_unit
+from syncline_design.model.system import System
+from syncline_design.planning.information import Unknown
+from syncline_design.spec.fields import did_you_mean
+
+_NAME: Final = re.compile(
+    r"\s*(?P<effect>\w+)\s*\(\s*(?:(?P<stage>[^().]+)\.)?(?P<sensor>\w+)\s*\)\s*"
+)
+_EXAMPLE: Final = 'such as "latency(position)=1 ms, lever_arm(position)=1 cm"'
+MATERIAL: Final = 0.2  # of the RMS that the noise makes: what an effect has to make to matter
+TOLERANCE: Final = 0.1  # of the same: how well an effect is to be known where nothing is said
+USUAL: Final = (
+    "latency(position)", "latency(attitude)", "lever_arm(position)", "boresight(ranging)",
+    "range_bias(ranging)",
+)  # fmt: skip
+
+
+class PlanError(ValueError):
+    """A plan that cannot be made as asked; the text says what was expected and found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """One effect of one sensor, as it was written."""
+
+    effect: str
+    sensor: str
+    stage: str | None = None
+
+    @property
+    def text(self) -> str:
+        where = self.sensor if self.stage is None else f"{self.stage}.{self.sensor}"
+        return f"{self.effect}({where})"
+
+
+@dataclass(frozen=True, slots=True)
+class Pair:
+    """Two effects to tell apart; sizes: of the first's parameters by its key, where known."""
+
+    first: Named
+    second: Named
+    sizes: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What is asked: tolerances by effect (None: what matters to this system), and pairs."""
+
+    reach: tuple[tuple[Named, float | None], ...] = ()
+    pairs: tuple[Pair, ...] = ()
+
+
+def named(text: str, option: str) -> Named:
+    """`latency(position)` read."""
+    found = _NAME.fullmatch(text)
+    if found is None:
+        raise PlanError(f"{option} {text.strip()!r}: expected effect(sensor), "
+                        "such as latency(position)")  # fmt: skip
+    _demand_known(found["effect"], found["sensor"], option)
+    return Named(found["effect"], found["sensor"], found["stage"])
+
+
+def _demand_known(name: str, sensor: str, option: str) -> None:
+    known = registry()
+    if name not in known:
+        hint = did_you_mean(name, known)
+        more = f"; {hint}" if hint else f"; one of {', '.join(sorted(known))}"
+        raise PlanError(f"{option}: there is no effect {name!r}{more}")
+    effect = known[name]
+    if sensor not in effect.sensors:
+        raise PlanError(f"{option}: {name} does not act on {sensor!r}, expected one of "
+                        f"{', '.join(effect.sensors)}")  # fmt: skip
+    if effect.sensitivity is None:
+        why = (
+            "is a matter of the columns, which one log shows whatever was driven"
+            if effect.kind == "discrete"
+            else "only scatters: a longer log shows it, no particular drive does"
+        )
+        raise PlanError(f"{option}: {name}({sensor}) {why}; expected an effect that moves the mean")
+
+
+def reach_of(text: str) -> tuple[tuple[Named, float | None], ...]:
+    """`latency(position)=1 ms, lever_arm(position)=1 cm` read; each tolerance in its unit."""
+    found: list[tuple[Named, float | None]] = []
+    for part in text.split(","):
+        name, mark, amount = part.partition("=")
+        if not mark or not amount.strip():
+            raise PlanError(
+                f"--reach {part.strip()!r}: expected effect(sensor)=TOLERANCE, {_EXAMPLE}"
+            )
+        one = named(name, "--reach")
+        if one.text in [known.text for known, _ in found]:
+            raise PlanError(f"--reach: {one.text} is given twice")
+        found.append((one, _tolerance(one, amount.strip())))
+    return tuple(found)
+
+
+def _tolerance(one: Named, amount: str) -> float:
+    effect = registry()[one.effect]
+    kinds = {p.name: suffix_unit(p.name)[1] for p in effect.slopes()}
+    problem = None
+    for name, kind in kinds.items():
+        try:
+            value = float(parse_quantity(_numbered(amount), kind, tolerance=False))
+        except UnitError as error:
+            problem = f"--reach {one.text}={amount}: {name} is no such quantity: {error}"
+            continue
+        if not (0.0 < value < math.inf):
+            raise PlanError(f"--reach {one.text}={amount}: expected a tolerance above 0")
+        return value
+    raise PlanError(problem or f"--reach {one.text}: nothing to reach")
+
+
+def _numbered(amount: str) -> object:
+    """A bare number as one: scales and rates have no unit."""
+    try:
+        return float(amount)
+    except ValueError:
+        return amount
+
+
+@dataclass(frozen=True, slots=True)
+class PairGoal:
+    """A pair by the places of its parameters among the unknowns; sizes of the first's, SI.
+
+    known: whether the sizes are found ones; otherwise every direction of the effect counts.
+    """
+
+    first: tuple[int, ...]
+    second: tuple[int, ...]
+    names: tuple[str, str]
+    sizes: Array
+    second_sizes: Array
+    known: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Goal:
+    """What a plan is judged by, on the whole list of unknowns.
+
+    wanted: places of the parameters whose sigma is told, with the others of them free; tolerance:
+    theirs, infinite where none is asked; keys: their names.
+    """
+
+    wanted: tuple[int, ...]
+    tolerance: Array
+    pairs: tuple[PairGoal, ...]
+
+
+def keys_of(system: System, every: Sequence[Unknown]) -> tuple[str, ...]:
+    """`latency(position).latency_s`, with the stage where a chain has the sensor before it."""
+    return tuple(f"{text_of(system, one)}.{one.parameter.name}" for one in every)
+
+
+def text_of(system: System, one: Unknown) -> str:
+    """The effect of an unknown as it is spelt."""
+    c = one.candidate
+    stage = None
+    if len(system.stages) > 1 and c.stage != default_stage(system, c.sensor):
+        stage = system.stages[c.stage].name
+    return Named(c.effect.name, c.sensor, stage).text
+
+
+def default_stage(system: System, sensor: str) -> int:
+    """The stage that is meant where none is named: the first that has the sensor."""
+    if sensor == "target":
+        return len(system.stages) - 1
+    return next((k for k, s in enumerate(system.stages) if getattr(s, sensor) is not None), 0)
+
+
+def places(system: System, every: Sequence[Unknown], one: Named, option: str) -> tuple[int, ...]:
+    """Where the parameters of an effect stand among the unknowns; PlanError where it cannot act."""
+    stage = default_stage(system, one.sensor)
+    if one.stage is not None:
+        names = [s.name for s in system.stages]
+        if one.stage not in names:
+            raise PlanError(f"{option}: there is no stage {one.stage!r}, expected one of "
+                            f"{', '.join(names)}")  # fmt: skip
+        stage = names.index(one.stage)
+    found = tuple(
+        k
+        for k, u in enumerate(every)
+        if (u.candidate.effect.name, u.candidate.sensor, u.candidate.stage)
+        == (one.effect, one.sensor, stage)
+    )
+    if not found:
+        known = sorted({text_of(system, u) for u in every})
+        raise PlanError(f"{option}: {one.text} does not apply to stage "
+                        f"{system.stages[stage].name!r} of this system; what does: "
+                        f"{', '.join(known)}")  # fmt: skip
+    return found
+
+
+def goal_of(
+    system: System, every: Sequence[Unknown], asked: Asked, noise_m: float, per_unit: Array
+) -> Goal:
+    """What is asked in terms of the unknowns; sizes that matter where nothing else is said."""
+    matters = noise_m / np.maximum(per_unit, 1e-300)
+    tolerance = np.full(len(every), np.inf)
+    wanted: list[int] = []
+    for one, stated in asked.reach:
+        found = places(system, every, one, "--reach")
+        tolerance[list(found)] = TOLERANCE * matters[list(found)] if stated is None else stated
+        wanted += found
+    pairs = tuple(_pair(system, every, one, MATERIAL * matters) for one in asked.pairs)
+    for pair in pairs[:1]:
+        wanted += [*pair.first, *pair.second]
+    order = tuple(sorted(set(wanted)))
+    return Goal(order, tolerance[list(order)], pairs)
+
+
+def _pair(system: System, every: Sequence[Unknown], pair: Pair, matters: Array) -> PairGoal:
+    first = places(system, every, pair.first, "--separate")
+    second = places(system, every, pair.second, "--separate")
+    if first == second:
+        raise PlanError(f"--separate: {pair.first.text} and {pair.second.text} are one effect")
+    found = np.array([pair.sizes.get(every[k].parameter.name, 0.0) for k in first])
+    known = bool(np.any(found))
+    sizes = found if known else matters[list(first)]
+    names = (pair.first.text, pair.second.text)
+    return PairGoal(first, second, names, sizes, matters[list(second)], known)
+
+
+def usual(system: System, every: Sequence[Unknown]) -> Asked:
+    """What a commissioning drive is for where nothing is asked."""
+    known = {text_of(system, u) for u in every}
+    chosen = [name for name in USUAL if name in known]
+    return Asked(tuple((named(name, "--reach"), None) for name in chosen))

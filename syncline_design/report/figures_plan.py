@@ -1,0 +1,77 @@
+"""Figures of a plan: its path from above, and what is known after each leg."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from syncline_design.planning.result import Plan
+from syncline_design.planning.run import PlanRun
+from syncline_design.report import axes as scales
+from syncline_design.report import numbers
+from syncline_design.report.figures import WIDTH
+from syncline_design.report.palette import MUTED, SERIES
+from syncline_design.report.svg import InlineFigure, add_axes, draw
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+MOST_POINTS = 2000
+
+
+def path(run: PlanRun) -> InlineFigure:
+    """East to the right, north up; every leg in its colour, numbered where it begins."""
+    north, east, _ = run.path.position_m.T
+    leg, step = np.array(run.leg), max(1, len(run.leg) // MOST_POINTS)
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        for k in range(len(run.result.legs)):
+            own = np.flatnonzero(leg == k)
+            if own.size:
+                rows = np.unique(np.r_[own[::step], own[-1], min(own[-1] + 1, len(leg) - 1)])
+                axes.plot(east[rows], north[rows], color=SERIES[k % len(SERIES)], linewidth=1.4)
+                axes.text(east[own[0]], north[own[0]], f" {k + 1}", fontsize=9)
+        axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
+                  "x", color=MUTED, markersize=4)  # fmt: skip
+        axes.plot(east[:1], north[:1], "o", color=SERIES[0], markersize=4.5)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.set_xlabel("east, m")
+        axes.set_ylabel("north, m")
+        scales.grid(axes)
+
+    wide, high = float(np.ptp(east)), float(np.ptp(north))
+    spoken = (
+        f"{len(run.result.legs)} legs over {numbers.length(wide, 3)} east to west and "
+        f"{numbers.length(high, 3)} north to south, {len(run.result.targets)} targets"
+    )
+    return draw("fig-path", "Path from above", spoken, (WIDTH, 340.0), build)
+
+
+def after(found: Plan) -> InlineFigure:
+    """Sigma over tolerance after every leg, logarithmic; reached below the line at 1."""
+    keys = [k for k in found.after[-1].sigma if k in found.tolerance]
+    legs = list(range(1, len(found.after) + 1))
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        for k, key in enumerate(keys):
+            axes.plot(legs, _ratios(found, key), marker="o", markersize=3.5,
+                      color=SERIES[k % len(SERIES)], label=key)  # fmt: skip
+        axes.axhline(1.0, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
+        axes.set_yscale("log")
+        axes.set_xticks(legs)
+        axes.set_xlabel("leg")
+        axes.set_ylabel("sigma / asked")
+        axes.legend(loc="upper right", fontsize=8)
+        scales.grid(axes, "y")
+
+    last = "; ".join(f"{key} {_ratios(found, key)[-1]:.2g}" for key in keys)
+    return draw("fig-after", "Sigma over what is asked", f"after the last leg {last}",
+                (WIDTH, 260.0), build)  # fmt: skip
+
+
+def _ratios(found: Plan, key: str) -> Sequence[float]:
+    return [one.sigma[key] / found.tolerance[key] for one in found.after]

@@ -1,0 +1,276 @@
+"""What `plan` says: the drive leg by leg, what it tells, what it leaves open, what it saves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Final
+
+from syncline_design.machine.records import with_texts
+from syncline_design.model.quantity import si_name, suffix_unit
+from syncline_design.model.unit_table import Dimension
+from syncline_design.planning.result import Flown, Plan, Separated
+from syncline_design.planning.run import PlanRun
+from syncline_design.report import figures_plan as drawings
+from syncline_design.report import numbers
+from syncline_design.report.document import (
+    Chart,
+    Document,
+    Facts,
+    Items,
+    Node,
+    Outcome,
+    Text,
+    provenance,
+    section,
+    show,
+)
+from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.text import visible
+
+UNITS: Final = {
+    Dimension.TIME: "s", Dimension.LENGTH: "m", Dimension.ANGLE: "rad",
+    Dimension.ANGULAR_RATE: "rad/s", Dimension.SPEED: "m/s",
+}  # fmt: skip
+Row = tuple[Cell | str, ...]
+MOST_TARGETS: Final = 12  # told outside the page
+
+
+def on_plan(run: PlanRun) -> Document:
+    """A plan as a document."""
+    found: Plan = with_texts(run.result, visible)
+    return Document(
+        family="Test drive",
+        outcome=_outcome(found),
+        name=found.spec.name,
+        sentences=tuple(_sentences(found)),
+        facts=tuple(_facts(found)),
+        sections=(
+            *section("legs", "Legs", _legs(found)),
+            *section("path", "Path", _path(run), reach="page"),
+            *section("after", "What is known after each leg", _after(found), "After"),
+            *section("pairs", "Told apart", _pairs(found), "Pairs"),
+            *section("standard", "The field's standard line plans", _standard(found), "Standard"),
+            *section("flown", "What was flown", _flown(found.flown), "Flown"),
+            *section("open", "What stays unseen", _open(found), "Unseen"),
+            *section("log", "What the log needs", _log(found), "Log"),
+            *section("targets", "Targets", _targets(found)),
+            *section("rests", "What it rests on", _rests(found), "Rests on"),
+            *provenance(_provenance(found)),
+        ),
+        source=found.spec.file,
+        title=f"Test drive: {found.spec.name}",
+    )
+
+
+def _outcome(found: Plan) -> Outcome:
+    legs = f"{len(found.legs)} leg{'s' if len(found.legs) != 1 else ''}"
+    length = _minutes(found.duration_s / 60.0)
+    if found.reached:
+        return Outcome("good", "\u2713", f"Reached by {legs} in {length}")
+    if found.least_minutes is None:
+        return Outcome("bad", "\u2717", "Not reachable: no drive of this platform tells it")
+    return Outcome("bad", "\u2717", f"Not reachable in {found.minutes:g} min")
+
+
+def _sentences(found: Plan) -> Iterator[str]:
+    if not found.reached and found.least_minutes is not None:
+        least = _minutes(_upwards(found.least_minutes))
+        yield f"The least that is enough: {least}. Below is the best for {found.minutes:g} min."
+    for words in found.inseparable:
+        yield f"No drive of this platform tells {words} apart."
+    if found.reached and not found.confused:
+        yield (
+            "All that is asked is reached, and none of the other effects that a drive can tell "
+            "apart would take it, left free one at a time."
+        )
+    if found.confused:
+        yield f"Left free one at a time, these would take it: {', '.join(found.confused)}."
+
+
+def _minutes(minutes: float) -> str:
+    """`2.8 min`, `130 min`, `12 h`."""
+    if minutes >= 600.0:
+        return numbers.typeset(f"{minutes / 60.0:.0f} h")
+    return numbers.typeset(f"{minutes:.0f} min" if minutes >= 10.0 else f"{minutes:.2g} min")
+
+
+def _upwards(minutes: float) -> float:
+    """Minutes to two figures, never too few."""
+    scale = 10.0 ** (math.floor(math.log10(max(minutes, 1e-9))) - 1)
+    return math.ceil(minutes / scale - 1e-9) * scale
+
+
+def _facts(found: Plan) -> Iterator[tuple[str, str]]:
+    last = found.after[-1]
+    for key, value in last.sigma.items():
+        asked = found.tolerance.get(key)
+        words = figure(key, value)
+        yield key, words if asked is None else f"{words} (asked: {figure(key, asked)})"
+    if last.correlation is not None:
+        yield "Correlation of the pair", numbers.number(last.correlation, 2)
+
+
+def figure(key: str, value: float | None) -> str:
+    """A figure of a parameter in its unit; what no row depends on is not seen."""
+    if value is None or not math.isfinite(value):
+        return "not seen"
+    name = key.rpartition(".")[2]
+    return numbers.si_quantity(value, UNITS.get(suffix_unit(si_name(name))[1], ""), 3)
+
+
+def _legs(found: Plan) -> list[Node]:
+    several = len({leg.stage for leg in found.legs}) > 1
+    rows = [
+        (leg.name, f"{_clock(leg.from_s)} to {_clock(leg.to_s)}", f"{leg.heading_deg:03.0f}\u00b0",
+         *([leg.stage] if several else []), leg.words)
+        for leg in found.legs
+    ]  # fmt: skip
+    heads = ("Leg", "From, to", "Heading", *(["Stage"] if several else []), "What to do")
+    words = "Each leg begins with the turn to its heading, at the speed at which the last ended."
+    return [*show(table("Legs", heads, rows), silent=True), Text(words, quiet=True)]
+
+
+def _clock(seconds: float) -> str:
+    whole = round(seconds)
+    return f"{whole // 60}:{whole % 60:02d}"
+
+
+def _path(run: PlanRun) -> list[Node]:
+    caption = "The path from above, leg by leg, with the targets to survey (crosses)."
+    return [Chart("path", partial(drawings.path, run), caption)]
+
+
+def _after(found: Plan) -> list[Node]:
+    keys = list(found.after[-1].sigma)
+
+    def row(name: str, values: Mapping[str, float], correlation: float | None = None) -> Row:
+        shown = [Cell(figure(k, values[k]) if k in values else "", _sort(values.get(k)))
+                 for k in keys]  # fmt: skip
+        last = "" if correlation is None else numbers.number(correlation, 2)
+        return (name, *shown, Cell(last))
+
+    rows = [row(one.leg, one.sigma, one.correlation) for one in found.after]
+    rows += [row("asked", found.tolerance)] if found.tolerance else []
+    rows.append(row("all effects free", found.after[-1].sigma_all))
+    heads = ("After leg", *(f"{k} #" for k in keys), "Correlation #")
+    note = (
+        "Standard uncertainties with what is asked and the noise free; the last row with every "
+        "effect free that this system can have, within its prior. What has a double (the latencies "
+        "of all sensors together, the two lever arms) stays at its prior there, whatever is driven."
+    )
+    nodes = show(table("After each leg", heads, rows, note), silent=True)
+    if not found.tolerance or len(found.after) < 2:
+        return nodes
+    caption = "Standard uncertainty over what is asked, after each leg."
+    return [*nodes, Chart("after", partial(drawings.after, found), caption)]
+
+
+def _sort(value: float | None) -> float:
+    return math.inf if value is None else value
+
+
+def _pairs(found: Plan) -> list[Node]:
+    return [Items(tuple(_pair_text(one) for one in found.pairs))] if found.pairs else []
+
+
+def _pair_text(one: Separated) -> str:
+    """`latency(position) of 2 ms from lever_arm(position): told apart; correlation ...`."""
+    sizes = ", ".join(figure(name, size) for name, size in one.sizes.items())
+    said = "told apart" if one.separated else "not told apart"
+    return (
+        f"{one.first} of {sizes} from {one.second}: {said}; correlation "
+        f"{numbers.number(one.correlation, 2)}, noncentrality "
+        f"{numbers.number(one.noncentrality, 3)} of {numbers.number(one.wanted, 3)}"
+    )
+
+
+def _standard(found: Plan) -> list[Node]:
+    if not found.standard:
+        return []
+    keys = list(found.after[-1].sigma)
+    rows = [_standard_row("this drive", found, found.after[-1].sigma, found.after[-1].correlation,
+                          found.duration_s / 60.0 if found.reached else None, keys)]  # fmt: skip
+    rows += [
+        _standard_row(one.name, found, one.sigma, one.correlation, one.minutes, keys)
+        for one in found.standard
+    ]
+    heads = ("Plan", "Until reached #", *(f"{k} #" for k in keys), "Correlation #")
+    note = "Standard uncertainties in the time of this drive; line plans are taken line by line."
+    return show(table("Beside the standard line plans", heads, rows, note), silent=True)
+
+
+def _standard_row(
+    name: str, found: Plan, sigma: Mapping[str, float], correlation: float | None,
+    minutes: float | None, keys: list[str],
+) -> tuple[Cell | str, ...]:  # fmt: skip
+    reached = Cell("never" if minutes is None else _minutes(minutes),
+                   _sort(minutes))  # fmt: skip
+    return (
+        name,
+        reached,
+        *(Cell(figure(k, sigma[k]), _sort(sigma[k])) for k in keys),
+        Cell("" if correlation is None else numbers.number(correlation, 2)),
+    )
+
+
+def _flown(flown: Flown | None) -> list[Node]:
+    if flown is None:
+        return []
+    lines = [f"{key}: {figure(key, value)}" for key, value in flown.sigma.items()]
+    if flown.correlation is not None:
+        lines.append(f"correlation {numbers.number(flown.correlation, 2)}")
+    said = "reaches what is asked" if flown.reached else "does not reach what is asked"
+    files = ", ".join(flown.files)
+    words = f"{files}: {numbers.count(flown.rows)} rows, {numbers.time(flown.duration_s)}; {said}."
+    return [Text(words), Items(tuple(lines))]
+
+
+def _open(found: Plan) -> list[Node]:
+    nodes: list[Node] = []
+    if found.inseparable:
+        nodes.append(Items(tuple(f"{one}: no drive tells them apart" for one in found.inseparable)))
+    if found.unseen:
+        words = "With every effect free, this drive leaves these as uncertain as before: "
+        nodes.append(Text(words + ", ".join(found.unseen) + "."))
+    return nodes
+
+
+def _log(found: Plan) -> list[Node]:
+    rate = numbers.typeset(f"{found.rate_hz:.4g} Hz")
+    return [
+        Facts((("Columns", ", ".join(found.columns)), ("Rows", f"{rate}, from first to last leg"))),
+    ]
+
+
+def _targets(found: Plan) -> list[Node]:
+    if not found.targets:
+        return []
+    words = (
+        f"{len(found.targets)} targets to survey beforehand, aimed at in turn; places in the local "
+        "frame of the drive, whose origin is below its start."
+    )
+    rows: list[tuple[Cell | str, ...]] = [
+        (str(t.id), *(Cell(f"{v:.1f}", v) for v in (t.north_m, t.east_m, t.down_m)))
+        for t in found.targets
+    ]
+    heads = ("Target", "North, m #", "East, m #", "Down, m #")
+    whole: Table = table("Targets", heads, rows)
+    few: Table = table("Targets", heads, rows[:MOST_TARGETS])
+    more = len(rows) - MOST_TARGETS
+    left = Text(f"{more} more in --output json, html or csv.", quiet=True, reach="text")
+    nodes = [Text(words), *show(whole, silent=True, reach="page")]
+    return [*nodes, *show(few, silent=True, reach="text"), *([left] if more > 0 else [])]
+
+
+def _rests(found: Plan) -> list[Node]:
+    lines = [f"Noise {found.noise}."]
+    if found.assumed:
+        lines.append("Not stated by the spec, so taken as usual: " + "; ".join(found.assumed) + ".")
+    return [Items(tuple(lines))]
+
+
+def _provenance(found: Plan) -> list[tuple[str, str]]:
+    known = found.provenance.to_json().items()
+    return [("Spec file", found.spec.file), *((k.replace("_", " "), str(v)) for k, v in known)]

@@ -1,0 +1,208 @@
+"""The outputs of `plan` in every format: documents, and the path as waypoints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any, Final
+from xml.etree import ElementTree as Xml
+
+import numpy as np
+
+from syncline_design.planning.run import PlanRun
+from syncline_design.report.csv_out import plain_csv
+from syncline_design.report.json_out import json_text
+from syncline_design.report.on_plan import on_plan
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
+from syncline_design.report.text import visible
+
+COLUMNS: Final = (
+    "time_s", "north_m", "east_m", "down_m", "roll_deg", "pitch_deg", "yaw_deg",
+    "target_north_m", "target_east_m", "target_down_m", "leg",
+)  # fmt: skip
+KML: Final = "http://www.opengis.net/kml/2.2"
+WAYPOINT, CHANGE_SPEED, TAKEOFF = 16, 178, 22  # MAV_CMD of MAVLink's common set
+RELATIVE, MISSION = 3, 2  # MAV_FRAME: relative to home; of a command without a place
+GENERIC, FIXED_WING, QUADROTOR, ROVER, BOAT, SUBMARINE = 0, 1, 2, 10, 11, 12  # MAV_TYPE
+VEHICLES: Final = {
+    "multirotor": QUADROTOR, "fixed_wing": FIXED_WING, "ground": ROVER, "surface": BOAT,
+    "underwater": SUBMARINE,
+}  # fmt: skip
+ARDUPILOT = 3  # MAV_AUTOPILOT
+APART_M, APART_S = 0.05, 5.0  # by how much a straight line may miss the path, and for how long
+LINE_ROWS: Final = 5  # rows from point to point of a drawn line
+
+
+def render_plan(name: str, run: PlanRun) -> str:
+    """The text of one format."""
+    match name:
+        case "json":
+            return json_text(run.result.to_json())
+        case "markdown":
+            return markdown(on_plan(run))
+        case "csv":
+            return waypoints_csv(run)
+        case "kml":
+            return kml(run)
+        case "qgc":
+            return qgc(run)
+        case _:
+            return html(on_plan(run))
+
+
+def waypoints_csv(run: PlanRun) -> str:
+    """The path row by row: pose of the reference point, the target aimed at, the leg."""
+    path, legs = run.path, run.result.legs
+    angles = np.degrees(np.column_stack([path.euler_rad[:, :2], _wrapped(path.euler_rad[:, 2])]))
+    rows = (
+        [
+            round(float(t), 4),
+            *(round(float(v), 4) for v in place),
+            *(round(float(v), 5) for v in turn),
+            *(None if math.isnan(v) else round(float(v), 4) for v in target),
+            legs[leg].name,
+        ]
+        for t, place, turn, target, leg in zip(
+            path.time_s, path.position_m, angles, run.target_m, run.leg, strict=True
+        )
+    )
+    return plain_csv(COLUMNS, rows)
+
+
+def _wrapped(angle: Any) -> Any:
+    return np.angle(np.exp(1j * angle))
+
+
+def geodetic(run: PlanRun, places_m: Any) -> Any:
+    """Latitude, longitude [deg] and height above the ellipsoid [m] of local places (n, 3)."""
+    import pymap3d
+
+    assert run.result.origin_deg_m is not None
+    found = pymap3d.ned2geodetic(*np.asarray(places_m, dtype=float).T, *run.result.origin_deg_m)
+    return np.column_stack([np.atleast_1d(v) for v in found])
+
+
+def kml(run: PlanRun) -> str:
+    """The path, its legs and the targets as KML 2.2 (OGC 07-147r2).
+
+    Heights are above the WGS 84 ellipsoid, as the origin's is; a viewer draws them above the geoid.
+    """
+    Xml.register_namespace("", KML)
+    root = Xml.Element(f"{{{KML}}}kml")
+    document = _child(root, "Document")
+    _child(document, "name", visible(run.result.spec.name))
+    _child(document, "description", "Heights are above the WGS 84 ellipsoid.")
+    for leg, rows in _legs(run):
+        planned = run.result.legs[leg]
+        mark = _child(document, "Placemark")
+        _child(mark, "name", visible(planned.name))
+        _child(mark, "description", visible(planned.words))
+        line = _child(mark, "LineString")
+        _child(line, "altitudeMode", "absolute")
+        _child(line, "coordinates", _coordinates(geodetic(run, run.path.position_m[rows])))
+    for target in run.result.targets:
+        mark = _child(document, "Placemark")
+        _child(mark, "name", f"target {target.id}")
+        point = _child(mark, "Point")
+        _child(point, "altitudeMode", "absolute")
+        place = [[target.north_m, target.east_m, target.down_m]]
+        _child(point, "coordinates", _coordinates(geodetic(run, place)))
+    Xml.indent(root)
+    return '<?xml version="1.0" encoding="UTF-8"?>\n' + Xml.tostring(root, "unicode") + "\n"
+
+
+def _child(parent: Xml.Element, name: str, text: str | None = None) -> Xml.Element:
+    child = Xml.SubElement(parent, f"{{{KML}}}{name}")
+    child.text = text
+    return child
+
+
+def _coordinates(places: Any) -> str:
+    return " ".join(f"{lon:.9f},{lat:.9f},{height:.3f}" for lat, lon, height in places)
+
+
+def _legs(run: PlanRun) -> Iterator[tuple[int, Any]]:
+    """Every leg with rows of its path, its end the next one's begin."""
+    leg = np.array(run.leg)
+    for k in range(len(run.result.legs)):
+        own = np.flatnonzero(leg == k)
+        if own.size:
+            last = min(own[-1] + 1, len(leg) - 1)
+            yield k, np.unique(np.r_[own[::LINE_ROWS], own[-1], last])
+
+
+def qgc(run: PlanRun) -> str:
+    """A mission for QGroundControl: speeds and places, heights relative to the origin (home).
+
+    Structure: the plan file format of QGroundControl's developer guide, version 1.
+    """
+    items = list(_items(run))
+    home = list(run.result.origin_deg_m or (0.0, 0.0, 0.0))
+    fast = float(np.max(np.linalg.norm(run.path.velocity_mps, axis=1)))
+    mission = {
+        "cruiseSpeed": round(fast, 2),
+        "firmwareType": ARDUPILOT,
+        "globalPlanAltitudeMode": 1,
+        "hoverSpeed": round(fast, 2),
+        "items": [{**item, "doJumpId": k} for k, item in enumerate(items, start=1)],
+        "plannedHomePosition": home,
+        "vehicleType": VEHICLES.get(run.motion, GENERIC),
+        "version": 2,
+    }
+    return json_text(
+        {
+            "fileType": "Plan",
+            "geoFence": {"circles": [], "polygons": [], "version": 2},
+            "groundStation": "QGroundControl",
+            "mission": mission,
+            "rallyPoints": {"points": [], "version": 2},
+            "version": 1,
+        }
+    )
+
+
+def _items(run: PlanRun) -> Iterator[dict[str, Any]]:
+    """A take-off for what flies, then the speed to each place and the place itself."""
+    path = run.path
+    places, height = geodetic(run, path.position_m), -path.position_m[:, 2]
+    yaw = np.degrees(path.euler_rad[:, 2]) % 360.0
+    if run.motion in ("multirotor", "fixed_wing"):
+        yield _item(TAKEOFF, [0, 0, 0, None, *_place(places[0], height[0])])
+    said = -1.0
+    kept = corners(path.time_s, path.position_m)
+    for before, k in zip([0, *kept], kept, strict=False):
+        step = path.position_m[k] - path.position_m[before]
+        lasts = float(path.time_s[k] - path.time_s[before])
+        speed = round(float(np.linalg.norm(step)) / lasts, 2) if lasts > 0.0 else 0.0
+        moving = speed > 0.05
+        if moving and abs(speed - said) > 0.02 * max(speed, said):
+            yield _item(CHANGE_SPEED, [1, speed, -1, 0, 0, 0, 0], MISSION)
+            said = speed
+        hold = 0.0 if moving else round(lasts, 1)
+        yield _item(WAYPOINT, [hold, 0, 0, round(float(yaw[k]), 1), *_place(places[k], height[k])])
+
+
+def _place(place: Any, height_m: float) -> list[float]:
+    return [round(float(place[0]), 9), round(float(place[1]), 9), round(float(height_m), 3)]
+
+
+def _item(command: int, params: list[Any], frame: int = RELATIVE) -> dict[str, Any]:
+    return {
+        "autoContinue": True, "command": command, "frame": frame, "params": params,
+        "type": "SimpleItem",
+    }  # fmt: skip
+
+
+def corners(time_s: Any, places_m: Any) -> list[int]:
+    """Rows of a path between which straight lines at constant speed miss it by APART_M at most."""
+    kept, begun = [0], 0
+    for k in range(2, len(time_s)):
+        share = (time_s[begun + 1 : k] - time_s[begun]) / (time_s[k] - time_s[begun])
+        line = places_m[begun] + share[:, None] * (places_m[k] - places_m[begun])
+        off = float(np.max(np.linalg.norm(places_m[begun + 1 : k] - line, axis=1)))
+        scale = max(APART_M, 0.02 * float(np.linalg.norm(places_m[k] - places_m[begun])))
+        if off > scale or time_s[k] - time_s[begun] > APART_S:
+            begun = k - 1
+            kept.append(begun)
+    return [*kept, len(time_s) - 1]

@@ -1,0 +1,326 @@
+"""The test drive: what it tells by an independent simulator, what it asks for, its outputs."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import jsonschema
+import numpy as np
+import pymap3d
+import pytest
+from typer.testing import CliRunner
+
+import syncline_design as sd
+from syncline_design.cli.app import app
+from syncline_design.machine.records import read_as
+from syncline_design.planning.result import Plan
+from syncline_design.planning.run import PlanRun
+from syncline_design.report.plans import render_plan
+from syncline_design.report.result_schemas import result_schema
+from tests.world.bound import cramer_rao
+from tests.world.hidden import hidden
+from tests.world.motions import Sensors
+from tests.world.noise import Noise
+from tests.world.planned import driven
+from tests.world.scenarios import Scenario
+from tests.world.worldlog import make_log
+
+DEGREE = math.pi / 180.0
+ORIGIN = (47.3, 8.55, 460.0)
+LIMITS = (9.0, 50.0 * DEGREE, 40.0)  # v_max, omega_max, distance
+ACCELERATION = 2.0
+STAMPED = "timestamping: {error: {distribution: uniform, low: -10 ns, high: 10 ns}}"
+SPEC = f"""\
+syncline: 1
+name: copter
+requirements: [{{id: ACC-1, kind: accuracy, limit: 1 m}}]
+stages:
+  - name: vehicle
+    platform: {{v_max: 9 m/s, omega_max: 50 deg/s, distance: 40 m, baseline: 0.5 m,
+      motion: multirotor, acceleration: 2 m/s^2, area: [250 m, 250 m]}}
+    position: {{sensor: {{modality: position, type: gnss,
+      sigma_position: [0.012 m, 0.012 m, 0.02 m], primitives: [pps]}}, primitive: pps, {STAMPED},
+      lever_arm: [0.25 m, -0.1 m, -0.4 m]}}
+    attitude: {{sensor: {{modality: attitude, type: ins,
+      sigma_attitude: [0.03 deg, 0.03 deg, 0.06 deg], primitives: [pps]}}, primitive: pps,
+      {STAMPED}}}
+    ranging: {{sensor: {{modality: ranging, type: lidar, sigma_range: 0.02 m,
+      sigma_bearing: [0.02 deg, 0.02 deg], primitives: [pps]}}, primitive: pps, {STAMPED},
+      lever_arm: [0.15 m, 0.05 m, 0.2 m]}}
+log: {{origin: [47.3 deg, 8.55 deg, 460 m]}}
+"""
+REACH = "latency(position)=1 ms, lever_arm(position)=1 cm"
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("plan") / "copter.yaml"
+    path.write_text(SPEC, encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def run(spec: Path) -> PlanRun:
+    return sd.plan(spec, reach=REACH)
+
+
+@pytest.fixture(scope="module")
+def pair(spec: Path) -> PlanRun:
+    return sd.plan(spec, separate=("latency(position)", "lever_arm(position)"))
+
+
+def world(run: PlanRun, seed: int = 5) -> Scenario:
+    """The plan in the world, from what is written as waypoints, once a tenth of a second."""
+    states, aims = run.driven.states[0], run.driven.aims
+    assert aims is not None
+    return driven("copter", seed, states.time_s, states.position_m, states.euler_rad,
+                  aims.targets_m, aims.aimed, Sensors(), LIMITS)  # fmt: skip
+
+
+def test_sigma_is_the_cramer_rao_bound_of_an_independent_simulator(run: PlanRun) -> None:
+    """Finite differences of the world's own readings and its own filter of the noise."""
+    effects = (
+        hidden("latency", "position", latency_s=0.0),
+        hidden("lever_arm", "position", x_m=0.0, y_m=0.0, z_m=0.0),
+    )
+    bound = cramer_rao(world(run), effects, Noise())
+    sigma = run.result.after[-1].sigma
+    for (index, name), expected in bound.items():
+        key = f"{effects[index].effect}(position).{name}"
+        assert sigma[key] == pytest.approx(expected, rel=0.03), key
+
+
+def test_correlation_is_that_of_the_independent_covariance(pair: PlanRun) -> None:
+    """One parameter against three: the multiple correlation, by the world's information matrix."""
+    from tests.world.bound import information
+
+    effects = (
+        hidden("latency", "position", latency_s=0.0),
+        hidden("lever_arm", "position", x_m=0.0, y_m=0.0, z_m=0.0),
+    )
+    keys = [(0, "latency_s"), (1, "x_m"), (1, "y_m"), (1, "z_m")]
+    covariance = np.linalg.inv(information(world(pair), effects, Noise(), keys))
+    cross = covariance[0, 1:]
+    explained = cross @ np.linalg.solve(covariance[1:, 1:], cross) / covariance[0, 0]
+    found = pair.result.after[-1].correlation
+    assert found == pytest.approx(math.sqrt(explained), abs=0.02)
+    assert pair.result.pairs[0].separated
+
+
+def test_what_is_asked_is_reached_leg_by_leg(run: PlanRun) -> None:
+    plan = run.result
+    assert plan.reached
+    assert plan.exit_code == 0
+    assert plan.duration_s <= 60.0 * plan.minutes
+    last = plan.after[-1]
+    for key, asked in plan.tolerance.items():
+        assert last.sigma[key] <= asked
+        assert last.sigma_all[key] >= last.sigma[key]
+        assert last.sigma_all[key] <= plan.priors[key] * (1 + 1e-9)
+        course = [one.sigma[key] for one in plan.after]
+        assert course == sorted(course, reverse=True)
+    assert [one.leg for one in plan.after] == [leg.name for leg in plan.legs]
+    assert plan.legs[0].from_s == 0.0
+    for before, after in pairwise(plan.legs):
+        assert before.to_s == after.from_s
+
+
+def rows_of(run: PlanRun) -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(render_plan("csv", run))))
+
+
+def test_the_waypoints_keep_to_the_platform(run: PlanRun, pair: PlanRun) -> None:
+    """Speeds, accelerations, turn rates and tilt by differences of the rows that are written."""
+    for one in (run, pair):
+        rows = rows_of(one)
+        time_s = np.array([float(r["time_s"]) for r in rows])
+        place = np.array([[float(r[f"{a}_m"]) for a in ("north", "east", "down")] for r in rows])
+        turn = np.unwrap(np.radians([[float(r[f"{a}_deg"]) for a in ("roll", "pitch", "yaw")]
+                                     for r in rows]), axis=0)  # fmt: skip
+        assert np.max(np.diff(time_s)) <= 0.5
+        step = np.diff(time_s)[:, None]
+        velocity = np.diff(place, axis=0) / step
+        assert np.max(np.linalg.norm(velocity, axis=1)) <= LIMITS[0]
+        gain = np.diff(velocity, axis=0) / step[1:]
+        assert np.max(np.linalg.norm(gain, axis=1)) <= 1.1 * ACCELERATION
+        assert np.max(np.linalg.norm(np.diff(turn, axis=0) / step, axis=1)) <= LIMITS[1]
+        assert np.ptp(place[:, 0]) <= 250.0
+        assert np.ptp(place[:, 1]) <= 250.0
+        level = np.linalg.norm(gain[:, :2], axis=1)
+        lean = np.max(np.abs(turn[:, :2]), axis=1)[1:-1]
+        assert np.all(lean <= np.arctan(level / 9.80665) + 0.02)
+
+
+def test_every_row_aims_at_a_listed_target_in_reach(run: PlanRun) -> None:
+    listed = {(round(t.north_m, 3), round(t.east_m, 3), round(t.down_m, 3))
+              for t in run.result.targets}  # fmt: skip
+    for row in rows_of(run):
+        target = [float(row[f"target_{axis}_m"]) for axis in ("north", "east", "down")]
+        place = [float(row[f"{axis}_m"]) for axis in ("north", "east", "down")]
+        assert tuple(round(v, 3) for v in target) in listed
+        assert math.dist(target, place) <= LIMITS[2]
+        assert row["leg"] in {leg.name for leg in run.result.legs}
+
+
+def test_kml_holds_the_path_where_it_is_on_the_globe(run: PlanRun) -> None:
+    root = ElementTree.fromstring(render_plan("kml", run))
+    space = {"k": "http://www.opengis.net/kml/2.2"}
+    assert root.tag == "{http://www.opengis.net/kml/2.2}kml"
+    lines = root.findall("k:Document/k:Placemark/k:LineString", space)
+    assert len(lines) == len(run.result.legs)
+    modes = {m.text for m in root.iter("{http://www.opengis.net/kml/2.2}altitudeMode")}
+    assert modes == {"absolute"}
+    path = run.path.position_m
+    for line in lines:
+        text = line.findtext("k:coordinates", namespaces=space)
+        assert text
+        for part in text.split():
+            lon, lat, height = map(float, part.split(","))
+            local = pymap3d.geodetic2ned(lat, lon, height, *ORIGIN)
+            assert np.min(np.linalg.norm(path - np.array(local), axis=1)) < 0.01
+    points = root.findall("k:Document/k:Placemark/k:Point", space)
+    assert len(points) == len(run.result.targets)
+
+
+def test_the_mission_is_a_plan_file_of_qgroundcontrol(run: PlanRun) -> None:
+    """Keys and kinds by the plan file format of QGroundControl's developer guide."""
+    plan = json.loads(render_plan("qgc", run))
+    assert (plan["fileType"], plan["version"]) == ("Plan", 1)
+    assert set(plan) == {"fileType", "geoFence", "groundStation", "mission", "rallyPoints",
+                         "version"}  # fmt: skip
+    mission = plan["mission"]
+    assert mission["version"] == 2
+    assert mission["vehicleType"] == 2  # MAV_TYPE_QUADROTOR
+    assert mission["plannedHomePosition"] == pytest.approx(ORIGIN)
+    assert [i["doJumpId"] for i in mission["items"]] == list(range(1, len(mission["items"]) + 1))
+    places = []
+    for item in mission["items"]:
+        assert item["type"] == "SimpleItem"
+        assert len(item["params"]) == 7
+        if item["command"] == 16:  # NAV_WAYPOINT
+            assert item["frame"] == 3  # relative to home
+            lat, lon, height = item["params"][4:]
+            places.append(pymap3d.geodetic2ned(lat, lon, ORIGIN[2] + height, *ORIGIN))
+    path = run.path.position_m
+    for place in places:
+        assert np.min(np.linalg.norm(path - np.array(place), axis=1)) < 0.05
+    legs = np.array(places)  # straight lines between the items stay near the path
+    for a, b in pairwise(legs):
+        assert np.min(np.linalg.norm(path - 0.5 * (a + b), axis=1)) < 2.0
+
+
+def test_json_fits_its_schema_and_reads_back(run: PlanRun, pair: PlanRun) -> None:
+    for one in (run, pair):
+        text = render_plan("json", one)
+        data = json.loads(text)
+        jsonschema.validate(data, result_schema("plan"))
+        assert data["schema"] == "syncline-design/plan/v1"
+        assert read_as(Plan, text) == one.result
+        assert {"legs", "after", "unseen", "columns", "rate_hz", "priors"} <= set(data)
+    assert run.result.after[-1].correlation is None
+    assert run.result.columns[0] == "time_s"
+    assert run.result.rate_hz == 10.0
+
+
+def test_constant_speed_never_tells_a_latency_from_a_lever_arm(pair: PlanRun) -> None:
+    """-V latency and R l x are one vector at constant speed and course-fixed heading."""
+    known = {one.name: one for one in pair.result.standard}
+    for name in ("straight lines", "figure eights"):
+        assert known[name].minutes is None
+        correlation = known[name].correlation
+        assert correlation is not None
+        assert correlation > 0.99
+    assert pair.result.after[-1].correlation < known["patch-test lines"].correlation  # type: ignore[operator]
+
+
+def test_a_drive_that_is_driven_names_what_was_hidden(pair: PlanRun, spec: Path) -> None:
+    """The world drives the plan with 30 ms hidden; the class is told, the value as predicted."""
+    log = make_log(world(pair, seed=11), (hidden("latency", "position", latency_s=0.03),), Noise())
+    path = log.to_csv(spec.parent / "driven.csv")
+    answer = sd.diagnose(spec, path)
+    named = {(f.effect, f.sensor): f for f in answer.findings if f.kind == "cause"}
+    assert set(named) == {("latency", "position")}
+    found = named["latency", "position"]
+    assert ("lever_arm", "position") not in {(a.effect, a.sensor) for a in found.aliases}
+    sigma = pair.result.after[-1].sigma["latency(position).latency_s"]
+    assert abs(float(found.parameters["latency_s"].value) - 0.03) < 4.0 * sigma
+    flown = sd.plan(spec, separate=("latency(position)", "lever_arm(position)"), flown=path)
+    held = flown.result.flown
+    assert held is not None
+    for key, value in held.sigma.items():
+        assert value == pytest.approx(pair.result.after[-1].sigma[key], rel=0.05)
+
+
+def call(*words: object) -> Any:
+    return CliRunner().invoke(app, ["plan", *map(str, words)])
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--reach", "latancy(position)=1 ms"], "there is no effect 'latancy'"),
+        (["--reach", "latency(target)=1 ms"], "does not act on 'target'"),
+        (["--reach", "latency(position)=1 cm"], "latency_s is no such quantity"),
+        (["--reach", "latency(position)=0 ms"], "expected a tolerance above 0"),
+        (["--reach", "latency(position)"], "expected effect(sensor)=TOLERANCE"),
+        (["--reach", "timestamp_jitter(position)=1 ms"], "only scatters"),
+        (["--reach", "turnaround_delay(ranging)=1 ms"], "does not apply to stage 'vehicle'"),
+        (["--reach", "latency(boat.position)=1 ms"], "there is no stage 'boat'"),
+        (["--separate", "latency(position)", "latency(position)"], "are one effect"),
+        (["--separate", "latency", "lever_arm(position)"], "expected effect(sensor)"),
+        (["--minutes", "0"], "expected more than 0 minutes"),
+        (["--diagnosis", "SPEC"], "expected a diagnosis"),
+    ],
+    ids=lambda words: str(words)[:40],
+)
+def test_what_cannot_be_planned_is_refused_with_the_reason(
+    words: list[str], said: str, spec: Path
+) -> None:
+    done = call(spec, *(str(spec) if word == "SPEC" else word for word in words))
+    assert done.exit_code == 2, done.output
+    assert said in done.stderr.replace("\n", " ")
+    assert done.stdout == ""
+
+
+def test_too_few_minutes_end_with_the_least_that_is_enough(spec: Path) -> None:
+    done = call(spec, "--reach", REACH, "--minutes", 0.3, "-o", "json:-")
+    assert done.exit_code == 1
+    data = json.loads(done.stdout)
+    assert not data["reached"]
+    least = data["least_minutes"]
+    assert least > 0.3
+    assert call(spec, "--reach", REACH, "--minutes", 1.01 * least, "-q").exit_code == 0
+
+
+def test_a_platform_that_cannot_turn_is_refused(spec: Path, tmp_path: Path) -> None:
+    still = tmp_path / "still.yaml"
+    still.write_text(SPEC.replace("omega_max: 50 deg/s", "omega_max: 0 deg/s"), encoding="utf-8")
+    done = call(still)
+    assert done.exit_code == 2
+    assert "cannot turn" in done.stderr
+    assert f"{still}:6:" in done.stderr
+
+
+def test_places_on_the_globe_need_an_origin(tmp_path: Path) -> None:
+    local = tmp_path / "local.yaml"
+    local.write_text(SPEC.partition("log:")[0], encoding="utf-8")
+    done = call(local, "-o", f"kml:{tmp_path / 'x.kml'}")
+    assert done.exit_code == 2
+    assert "log: {origin: [47.3 deg, 8.55 deg, 460 m]}" in done.stderr
+    assert not (tmp_path / "x.kml").exists()
+
+
+def test_doubles_are_said_to_be_doubles(spec: Path) -> None:
+    """Only R (l_L - l_G) is in the error at equal stamps: no drive tells the two lever arms."""
+    done = call(spec, "--separate", "lever_arm(position)", "lever_arm(ranging)")
+    assert done.exit_code == 1
+    assert "No drive of this platform tells lever_arm(position) and lever_arm(ranging)" in " ".join(
+        done.stdout.split()
+    )
