@@ -7,7 +7,7 @@ the platform in the spec.  Rules in docs/diagnosis.md.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from syncline_design.diagnosis.agreement import WORDS, disagreement, windows_of
 from syncline_design.diagnosis.result import Check, Severity
 from syncline_design.diagnosis.scatter import scatter, unforetold
 from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import LogTrack, StageLog
@@ -33,12 +34,16 @@ NAMES = {"speed": ("speed", "v_max"), "turn_rate": ("turn rate", "omega_max"),
          "range": ("range", "distance")}  # fmt: skip
 
 
-def log_checks(view: Scene) -> tuple[Check, ...]:
-    """Everything that is wrong, contradictions first."""
+def log_checks(view: Scene, named: Sequence[Acting] = ()) -> tuple[Check, ...]:
+    """Everything that is wrong, contradictions first.
+
+    named: what was found.  Positions that a filter smooths move less than the vehicle, and its
+    velocities are right.
+    """
     found: list[Check] = []
     for index, (stage, logged) in enumerate(zip(view.system.stages, view.log.stages, strict=True)):
         found += _limits(view, stage, logged)
-        found += _columns(view, index, stage, logged)
+        found += _columns(view, index, stage, logged, _displaced(view, index, named))
     return tuple(sorted(found, key=lambda c: c.severity != "contradiction"))
 
 
@@ -85,10 +90,22 @@ def _limit(
     yield Check(code, stage, severity, message, value, limit, unit, share)
 
 
-def _columns(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterator[Check]:
+def _displaced(view: Scene, index: int, named: Sequence[Acting]) -> Array:
+    """What the spec's effects and the named ones add to the logged place [m], NED."""
+    total = np.zeros((1, 3))
+    for one in (*view.known, *named):
+        if (one.stage, one.sensor) == (index, "position"):
+            departed = one.effect.depart(view.rows[index], one.values, one.sensor, None)
+            total = total + departed.position_m
+    return total
+
+
+def _columns(
+    view: Scene, index: int, stage: Stage, logged: StageLog, displaced_m: Array
+) -> Iterator[Check]:
     """Velocity columns against the positions' motion, rates against the attitudes' turns."""
     rows = view.rows[index]
-    place = rows.position_m
+    place = rows.position_m - displaced_m
     if view.log.kind == "position" and bool(np.all(np.isfinite(view.log.truth_m))):
         place = view.log.truth_m  # the velocity is that of the better system
     sigma_m = _place_sigma_m(view, index)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.trajectory import SplinePieces, pieces
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
-from syncline_design.logs.log import LogTrack, Rows
+from syncline_design.logs.log import GAP_FACTOR, LogTrack, Rows
 
 MEMORY_S = 60.0  # of the past that is looked at
 AHEAD = 12  # rows after a stamp that the spline up to it feels
@@ -51,6 +51,14 @@ class LoggedPast:
             self.rate_radps,
             self.from_positions,
         )
+
+    def stretch_starts_s(self) -> Array:
+        """Stamps at which the logged motion begins, first and after every gap."""
+        time_s = np.unique(self.velocity.time_s)
+        step = np.diff(time_s)
+        far = step > GAP_FACTOR * float(np.median(step)) if step.size else step > 0.0
+        starts: Array = time_s[np.concatenate([[True], far])]
+        return starts
 
     def __call__(self, time_constant_s: float) -> tuple[Array, Array]:
         """Lag of the place [m], NED, (n, 3), and of R_nb (n, 3, 3).

@@ -128,7 +128,7 @@ def diagnose_measured(
     promise = None if case is None else promise_of(case)
     untouched = untouched_error(inputs, data) if faults else None
     weighed_up = _weighed_up(data, search, result, faults, promise, untouched)
-    checks = log_checks(view)
+    checks = log_checks(view, result.model.acting)
     sound = all(c.severity != "contradiction" for c in checks)
     verdict = outcome(weighed_up.findings, sound and not weighed_up.remaining.material)
     shown = smallest_seen(search, result)

@@ -17,6 +17,7 @@ import numpy as np
 from syncline_design.diagnosis.past import LoggedPast
 from syncline_design.diagnosis.recent import Recent
 from syncline_design.diagnosis.trajectory import LoggedMotion, pieces, smooth_slope
+from syncline_design.diagnosis.unsettled import without_unlogged_past
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
@@ -46,7 +47,8 @@ class Scene:
 
     def error(self, acting: Sequence[Acting] = ()) -> Array:
         """Corrected georeferencing error [m], NED, (n, 3); NaN where the truth is not known."""
-        return _corrected_error(self, self._departures(acting))
+        error = _corrected_error(self, self._departures(acting))
+        return without_unlogged_past(self, error, (*self.known, *acting))
 
     def _departures(self, acting: Sequence[Acting]) -> list[Departures]:
         ranged = self.log.kind != "position"

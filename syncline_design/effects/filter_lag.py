@@ -89,4 +89,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     breaks="latency",
+    memory="time_constant_s",
 )

@@ -280,6 +280,7 @@ class Effect:
     noise of its sensor or its "down" part alone, the "size" of its own scatter, the "tails".
     undoing: a discrete one's.
     bounded_by_k: charged with k times its standard deviation, k the coverage factor.
+    memory: the parameter that is the time constant of what it remembers, "" of one without memory.
     breaks: which assumption on a built system it breaks; `noise`: that the sensor is as its figure.
     sentence: for people, a format string over {sensor} and the parameters.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
@@ -307,6 +308,7 @@ class Effect:
     opens: Opening = ""
     undoing: Undoing | None = None
     bounded_by_k: bool = False
+    memory: str = ""
     breaks: Promise = "noise"
     brief: tuple[str, ...] = ()
 
