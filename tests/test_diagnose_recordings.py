@@ -181,3 +181,33 @@ def test_two_trajectories_are_compared_pose_by_pose(tmp_path: Path) -> None:
     assert abs(value - LATE_S) < 5.0 * sigma + 1e-3
     turned, spread = latency(result, "attitude")
     assert abs(turned - LATE_S) < 5.0 * spread + 1e-3
+
+
+def test_ranges_in_a_table_stand_beside_a_bag(tmp_path: Path) -> None:
+    """Position and attitude of a bag, ranges to surveyed targets in a table of the package's."""
+    rows = (TRUTH.stamp_ns - 86_400 * 10**9 * (TRUTH.stamp_ns[0] // (86_400 * 10**9))) / 1e9
+    targets = np.array([[30.0, 10.0, 0.0], [-20.0, -25.0, 0.0]])[np.arange(len(TRUTH)) % 2]
+    body = TRUTH.turn.inv().apply(targets - TRUTH.place)
+    length = np.linalg.norm(body, axis=1)
+    moments = [
+        np.datetime64(int(ns), "ns").astype("datetime64[us]").item().isoformat() + "Z"
+        for ns in TRUTH.stamp_ns
+    ]
+    head = "time,range_m,azimuth_rad,elevation_rad,target_north_m,target_east_m,target_down_m"
+    lines = [head] + [
+        f"{m},{r:.9f},{np.arctan2(b[1], b[0]):.12f},{-np.arcsin(b[2] / r):.12f},{t[0]},{t[1]},{t[2]}"
+        for m, r, b, t in zip(moments, length, body, targets, strict=True)
+    ]
+    table_path = tmp_path / "ranges.csv"
+    table_path.write_text("\n".join(lines) + "\n", "utf-8")
+    choice = LogChoice.model_validate({"origin": ["47.3 deg", "8.55 deg", "460 m"]})
+    sources = row_sources(
+        [table_path, write_ros1(tmp_path / "a.bag", TRUTH)], choice, ["uav"], poses=False
+    )
+    log = read_log(sources, ["uav"], origin=choice.origin)
+    assert log.kind == "georeference"
+    assert len(log) > 0.98 * len(TRUTH)
+    stage = log.stages[0]
+    assert stage.antenna_m is not None
+    at = np.searchsorted(rows, log.time_s + 1e-6) - 1
+    assert np.abs(stage.antenna_m - TRUTH.place[at]).max() < 1e-3

@@ -148,7 +148,7 @@ def test_an_unknown_name_in_the_spec_is_told_with_its_neighbour(tmp_path: Path) 
 def test_one_file_says_what_is_missing_for_a_diagnosis(tmp_path: Path) -> None:
     proposal = as_json(tum(tmp_path / "only.txt", MADE))["proposal"]
     assert proposal["kind"] is None
-    assert "nothing to hold" in proposal["lacking"][0]
+    assert "nothing to hold the positions against" in proposal["lacking"][0]
 
 
 def test_rates_do_not_depend_on_gaps_packets_and_strays() -> None:

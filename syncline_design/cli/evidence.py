@@ -72,7 +72,9 @@ def diagnose(
     spec: SpecArgument,
     log: Annotated[
         list[Path] | None,
-        typer.Argument(help="Measured logs (CSV, Parquet); default: the spec's `log: files:`."),
+        typer.Argument(
+            help="Measured logs, of any kind that is read; default: the spec's `log: files:`."
+        ),
     ] = None,
     output: DiagnoseOutput = None,
     seed: SeedOption = 0,

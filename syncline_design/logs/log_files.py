@@ -5,10 +5,22 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from syncline_design.logs.columns import RANGING, TIME, known_names, si_columns
+from syncline_design.logs.columns import (
+    ATTITUDE,
+    GEODETIC,
+    POSITION,
+    RANGING,
+    RATE,
+    REFERENCE,
+    TARGET,
+    TIME,
+    VELOCITY,
+    known_names,
+    si_columns,
+)
 from syncline_design.logs.readers import open_recording, reader_of
 from syncline_design.logs.readers.reader import head_of
-from syncline_design.logs.roles import offers_of
+from syncline_design.logs.roles import Role, offers_of
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
 from syncline_design.logs.stream_sources import sources_of
 from syncline_design.spec.load import BadInput
@@ -30,7 +42,28 @@ def row_sources(
     read = {one.path for one in tables}
     recordings = [open_recording(path) for path in paths if path not in read]
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
-    return [*tables, *sources_of(offers_of(recordings), choice, prefix, poses)]
+    held = _held(tables, choice.columns, stages)
+    return [*tables, *sources_of(offers_of(recordings), choice, prefix, poses, held)]
+
+
+def _held(
+    tables: Sequence[RowSource], mapping: Mapping[str, str], stages: Sequence[str]
+) -> frozenset[Role]:
+    """The parts that tables beside the recordings play."""
+    names: set[str] = set()
+    for table in tables:
+        names |= set(si_columns(table.header, mapping, known_names(stages)))
+    last, first = (f"{s}_" if len(stages) > 1 else "" for s in (stages[-1], stages[0]))
+    told: dict[Role, bool] = {
+        "ranging": last + RANGING[0] in names,
+        "target": TARGET[0] in names or f"target_{GEODETIC[0]}" in names,
+        "reference": REFERENCE[0] in names or f"reference_{GEODETIC[0]}" in names,
+        "position": first + POSITION[0] in names or first + GEODETIC[0] in names,
+        "attitude": first + ATTITUDE[2] in names,
+        "velocity": first + VELOCITY[0] in names,
+        "rate": first + RATE[0] in names,
+    }
+    return frozenset(role for role, there in told.items() if there)
 
 
 def _table(path: Path, mapping: Mapping[str, str], stages: Sequence[str]) -> RowSource | None:

@@ -71,26 +71,27 @@ class StreamSource:
 
 
 def sources_of(
-    offers: Sequence[Offer], choice: LogChoice, prefix: str, poses: bool
-) -> list[StreamSource]:
+    offers: Sequence[Offer], choice: LogChoice, prefix: str, poses: bool,
+    held: frozenset[Role] = frozenset(),
+) -> list[StreamSource]:  # fmt: skip
     """The streams that a diagnosis needs of some recordings, canonical and on one timeline.
 
     prefix: of the first stage's columns.  poses: whether the system has an attitude sensor, so that
-    of two trajectories both places and attitudes are compared.
+    of two trajectories both places and attitudes are compared.  held: parts that other files play.
     """
-    parts = parts_of(offers, choice)
-    _demand_parts(offers, parts)
+    parts = _left(parts_of(offers, choice), held)
+    _demand_parts(offers, {*parts, *held})
     pair = poses and is_pose_pair(parts)
     if pair:
         parts = _of_the_tested(parts)
-    held = {id(part.offer): part.offer for part in parts.values()}
-    values = {key: values_of(offer, choice) for key, offer in held.items()}
+    used = {id(part.offer): part.offer for part in parts.values()}
+    values = {key: values_of(offer, choice) for key, offer in used.items()}
     several = list(values.values())
-    clocks = _clocks(offers, held, several, choice)
+    clocks = _clocks(offers, used, several, choice)
     calendar = on_one_timeline([*several, *clocks], choice)
     _demand_places(parts, values)
     on_one_datum([*several, *clocks], parts, values)
-    if "reference" in parts:
+    if "reference" in parts and "position" in parts:
         in_one_frame(parts, values, choice, pair)
     return [
         _source(one, [r for r, p in parts.items() if id(p.offer) == key], prefix, pair, calendar)
@@ -114,7 +115,16 @@ def _of_the_tested(parts: Mapping[Role, Part]) -> dict[Role, Part]:
     return kept
 
 
-def _demand_parts(offers: Sequence[Offer], parts: Mapping[Role, Part]) -> None:
+def _left(parts: Mapping[Role, Part], held: frozenset[Role]) -> dict[Role, Part]:
+    """The parts that no other file plays; ranges and a reference do not go together."""
+    kept = {role: part for role, part in parts.items() if role not in held or part.sure == "stated"}
+    reference = kept.get("reference")
+    if "ranging" in held and reference is not None and reference.sure != "stated":
+        del kept["reference"]
+    return kept
+
+
+def _demand_parts(offers: Sequence[Offer], parts: set[Role]) -> None:
     path = offers[0].path
     if "position" not in parts:
         raise refuse(
@@ -126,7 +136,7 @@ def _demand_parts(offers: Sequence[Offer], parts: Mapping[Role, Part]) -> None:
     if "reference" not in parts and "ranging" not in parts:
         raise refuse(
             path,
-            f"nothing to hold {parts['position'].offer.name} against",
+            "nothing to hold the positions against",
             expected="a second trajectory, or ranges to surveyed targets",
             hint="give its file too, or name it: log: {streams: {reference: NAME}}",
         )
