@@ -179,8 +179,11 @@ def test_two_trajectories_are_compared_pose_by_pose(tmp_path: Path) -> None:
     assert result.log.kind == "pose"
     value, sigma = latency(result)
     assert abs(value - LATE_S) < 5.0 * sigma + 1e-3
-    turned, spread = latency(result, "attitude")
-    assert abs(turned - LATE_S) < 5.0 * spread + 1e-3
+    (one,) = [f for f in result.findings if f.kind == "cause"]
+    assert one.also == ("attitude",)  # one delay of the whole system, not two
+    assert one.sentence.lower().startswith("position and attitude data are")
+    entries = {(e.effect, e.sensor) for e in result.effects_entries()}
+    assert entries == {("latency", "position"), ("latency", "attitude")}
 
 
 def test_ranges_in_a_table_stand_beside_a_bag(tmp_path: Path) -> None:
@@ -195,7 +198,8 @@ def test_ranges_in_a_table_stand_beside_a_bag(tmp_path: Path) -> None:
     ]
     head = "time,range_m,azimuth_rad,elevation_rad,target_north_m,target_east_m,target_down_m"
     lines = [head] + [
-        f"{m},{r:.9f},{np.arctan2(b[1], b[0]):.12f},{-np.arcsin(b[2] / r):.12f},{t[0]},{t[1]},{t[2]}"
+        f"{m},{r:.9f},{np.arctan2(b[1], b[0]):.12f},{-np.arcsin(b[2] / r):.12f},"
+        f"{t[0]},{t[1]},{t[2]}"
         for m, r, b, t in zip(moments, length, body, targets, strict=True)
     ]
     table_path = tmp_path / "ranges.csv"

@@ -53,3 +53,23 @@ def test_a_missing_library_is_one_clear_line(tmp_path: Path) -> None:
 
 def test_every_reader_says_what_it_reads() -> None:
     assert all(reader.format for reader in registry().values())
+
+
+def test_nothing_of_others_is_imported_until_a_file_asks_for_it(tmp_path: Path) -> None:
+    """Looking for the reader of a file loads no library of a format."""
+    import subprocess
+    import sys
+
+    libraries = ("rosbags", "mcap", "pyulog", "pymavlink", "laspy", "lazrs", "pyubx2", "pynmeagps",
+                 "dpkt", "lz4", "zstandard")  # fmt: skip
+    path = tmp_path / "a.csv"
+    path.write_text("time_s,x_m\n0,1\n", "utf-8")
+    code = (
+        "import sys; from pathlib import Path; from syncline_design.logs.readers import *;"
+        "from syncline_design.logs.readers import registry, reader_of;"
+        "from syncline_design.logs.readers.reader import head_of;"
+        f"registry(); reader_of(head_of(Path({str(path)!r})));"
+        f"print([n for n in {libraries!r} if n in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Final, Literal
 
 from syncline_design.effects import registry
@@ -97,6 +97,7 @@ class Finding(Record):
     material: whether it matters, by its own RMS size_m on this log or by what it does to the
     requirements.  probability: posterior odds inside the class with its aliases.
     varying: its one parameter in four quarters of the log, where it is not one value.
+    also: other sensors that share it, of a delay of a whole system.
     """
 
     effect: str
@@ -118,6 +119,7 @@ class Finding(Record):
     size_m: float | None = optional()
     probability: float | None = optional()
     varying: tuple[Stretch, ...] | None = optional()
+    also: tuple[str, ...] | None = optional()
 
     @property
     def fits_a_spec(self) -> bool:
@@ -126,6 +128,11 @@ class Finding(Record):
         return self.sensor in effect.sensors and all(
             p.misfit(self.parameters[p.name].value, self.sensor) is None for p in effect.parameters
         )
+
+    def as_entries(self) -> tuple[EffectChoice, ...]:
+        """The finding in a spec's `effects:`, one entry for each sensor that has it."""
+        sensors = (self.sensor, *(self.also or ()))
+        return tuple(replace(self, sensor=sensor).as_entry() for sensor in sensors)
 
     def as_entry(self) -> EffectChoice:
         """The finding as an entry of a spec's `effects:`."""
@@ -474,7 +481,8 @@ class Diagnosis(Record):
         Without stand-ins, what does not matter, and conventions that are to be mended in the log.
         """
         return tuple(
-            finding.as_entry()
+            entry
             for finding in self.findings
+            for entry in finding.as_entries()
             if finding.material and finding.kind != "stand_in" and finding.fits_a_spec
         )

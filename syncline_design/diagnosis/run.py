@@ -56,6 +56,7 @@ from syncline_design.diagnosis.sight import informative, smallest_seen
 from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.survey import survey_m, with_shown_survey
 from syncline_design.diagnosis.system import Measured, measured
+from syncline_design.diagnosis.system_delay import with_system_delay
 from syncline_design.diagnosis.untouched import untouched_error
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
@@ -194,7 +195,7 @@ def _weighed_up(
         size_m=rest.size_m,
         material=material,
     )
-    return _WeighedUp(named, remaining)
+    return _WeighedUp(with_system_delay(named, data.view.log.kind), remaining)
 
 
 def _with_sizes(

@@ -38,6 +38,7 @@ class Laid:
     shift_m: Array
     rms_m: float
     extent_m: float
+    delay_s: float = 0.0  # by which the second come after the first, where that clearly shows
 
     @property
     def heading_rad(self) -> float:
@@ -89,7 +90,7 @@ def laid(moved: Track, onto: Array, any_turn: bool) -> Laid | None:
         more = width - best.width
         if fell > FALLS * best.squares and fell > CLEARLY * more * noise:
             best = wider
-    return Laid(best.turn, best.shift_m, best.rms_m, extent)
+    return Laid(best.turn, best.shift_m, best.rms_m, extent, best.delay_s)
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +100,7 @@ class _Fit:
     squares: float  # of what is left, far points weighted down
     rms_m: float
     width: int
+    delay_s: float
 
 
 def _fitted(
@@ -120,7 +122,7 @@ def _fitted(
         turn, shift = _small(axis) @ turn, shift + step[count : count + 3]
         extra = extra + np.pad(step[count + 3 :], (0, 4 - width))
     squares = float(np.sum(weight * np.sum(rest**2, axis=1)))
-    return _Fit(turn, shift, squares, _rms(rest), width)
+    return _Fit(turn, shift, squares, _rms(rest), width, float(extra[0]))
 
 
 def _rms(apart: Array) -> float:

@@ -114,8 +114,8 @@ def _lay(reference: Values, tested: Values, pair: bool) -> None:
     if fit is not None:
         _move(reference, fit)
         _say_laid(reference, tested, fit)
-    if pair and (reference.assumed or tested.assumed or fit is not None):
-        _lay_bodies(reference, tested)
+    if pair and free:
+        _lay_bodies(reference, tested, 0.0 if fit is None else fit.delay_s)
 
 
 def _drop_idle_down(reference: Values, tested: Values) -> bool:
@@ -181,12 +181,13 @@ def _say_laid(reference: Values, tested: Values, fit: Laid) -> None:
     )
 
 
-def _lay_bodies(reference: Values, tested: Values) -> None:
+def _lay_bodies(reference: Values, tested: Values, delay_s: float) -> None:
     """A constant turn between the bodies, where their axes are not told."""
+    moments = tested.time_ns - round(delay_s * 1e9)
     order = np.argsort(reference.time_ns, kind="stable")
     own = reference.time_ns[order]
-    nearest = order[np.clip(np.searchsorted(own, tested.time_ns), 0, own.shape[0] - 1)]
-    inside = (tested.time_ns >= own[0]) & (tested.time_ns <= own[-1])
+    nearest = order[np.clip(np.searchsorted(own, moments), 0, own.shape[0] - 1)]
+    inside = (moments >= own[0]) & (moments <= own[-1])
     a = euler_to_rotation(reference.vectors(ATTITUDE)[nearest[inside]])
     b = euler_to_rotation(tested.vectors(ATTITUDE)[inside])
     between = np.swapaxes(a, 1, 2) @ b

@@ -23,6 +23,7 @@ TYPES: Final = {
 LONGEST_SCAN_S: Final = 2.0
 ABSOLUTE_S: Final = 1e6  # a figure above is a time of its own, not after the stamp
 UNITS_S: Final = (1.0, 1e-3, 1e-6, 1e-9)
+SHORTEST_S: Final = 1e-3  # of a scan in whole units, by which nanoseconds and microseconds differ
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,12 +85,13 @@ def _after_stamp(values: NDArray[Any], stamp_s: float) -> CloudTimes | None:
     figures = figures[np.isfinite(figures)]
     if not figures.shape[0] or float(np.ptp(figures)) == 0.0:
         return None
-    units = UNITS_S if values.dtype.kind == "f" else UNITS_S[::-1]
+    whole = values.dtype.kind != "f"
+    units, least = (UNITS_S[::-1], SHORTEST_S) if whole else (UNITS_S, 1e-6)
     for unit in units:
         scaled = figures * unit
         low, high = float(scaled.min()), float(scaled.max())
         if abs(stamp_s) > ABSOLUTE_S and low > ABSOLUTE_S:
             low, high = low - stamp_s, high - stamp_s
-        if max(abs(low), abs(high)) <= LONGEST_SCAN_S and high - low > 1e-6:
+        if max(abs(low), abs(high)) <= LONGEST_SCAN_S and high - low > least:
             return CloudTimes(low, high)
     return None
