@@ -389,3 +389,35 @@ def test_a_wider_spacing_is_found_beside_simulated_requirements(tmp_path: Path) 
     assert verdict["verdict"] == "infeasible"
     (fix,) = [one for one in verdict["infeasibility"]["fixes"] if one["requirement"] == "GAP-1"]
     assert fix["to"] == pytest.approx(0.4, rel=1e-9)
+
+
+def test_the_board_of_what_cannot_exist_is_paid_for_too(tmp_path: Path) -> None:
+    """The pinned payload's price, by hand: sensors, one method of hardware and one board."""
+    spec = spec_of("short_lidar", {"timestamping": "hardware"})
+    stage = spec["stages"][0]
+    for role, method in (
+        ("position", "arrival"),
+        ("attitude", "arrival"),
+        ("ranging", "own_board"),
+    ):
+        stage[role] |= {"primitive": "arrival" if method == "arrival" else "pps"}
+        stage[role] |= {"timestamping": method}
+    board = {"channels": 4, "cost": "250 EUR"}
+    error = {"distribution": "uniform", "low": "-1 us", "high": "1 us"}
+    method = {"primitives": ["pps"], "error": error, "cost": "7 EUR", "requires": {"own": 1}}
+    catalog = {
+        "sensors": {"short_lidar": LIDAR}, "timestamping": {"own_board": method},
+        "infrastructure": {"own": board},
+    }  # fmt: skip
+    (tmp_path / "parts.yaml").write_text(json.dumps(catalog))
+    verdicts = []
+    for distance in ("50 m", "500 m"):
+        text = json.dumps(spec | {"stages": [stage | at(distance)]}, indent=1)
+        verdicts.append(check_loaded(load_text(text, tmp_path / "spec.yaml"), QUICK).to_json())
+    near, far = verdicts
+    assert [one["verdict"] for one in verdicts] == ["fails", "fails"]  # arrival is too late
+    assert far["design"]["cost"] == near["design"]["cost"]
+    assert [row["id"] for row in far["requirements"] if row["id"] == "FACTS"] == ["FACTS"]
+    roles = far["design"]["stages"][0]["roles"]
+    assert roles["ranging"]["cost"] == 907.0
+    assert far["design"]["cost"] == sum(role["cost"] for role in roles.values()) + 250.0

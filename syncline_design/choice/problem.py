@@ -189,10 +189,16 @@ def _clock(case: Case, clock: Candidate[ClockEntry]) -> ClockOption:
 
 
 def _required(tables: Sequence[RoleTable], vehicles: Sequence[VehicleTable]) -> set[str]:
-    """Shared hardware that any option or clock requires, excluded options included."""
+    """Shared hardware that any option or clock requires, excluded options included.
+
+    What cannot work is bought only where a spec leaves nothing else.
+    """
     needs = [kind for table in tables for kind in table.anywhere().required]
-    needs += [o.requires for t in tables for one in t.excluded.rest for o in one.impossible]
-    needs += [clock.requires for vehicle in vehicles for clock in vehicle.clocks]
+    if not all(len(table.options) for table in tables):
+        needs += [o.requires for t in tables for one in t.excluded.rest for o in one.impossible]
+    for vehicle in vehicles:
+        offered = vehicle.clocks or [one.clock for one in vehicle.excluded]
+        needs += [clock.requires for clock in offered]
     return {name for requires in needs for name, _ in requires}
 
 
