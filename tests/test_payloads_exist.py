@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import random
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +48,11 @@ def spec_of(ranging: Raw | list[str] | str, stage: Raw | None = None, **keys: An
     }  # fmt: skip
 
 
-def said(folder: Path, spec: Raw, **parts: Raw) -> Raw:
+def said(folder: Path, spec: Raw, explain: str = "", **parts: Raw) -> Raw:
     sensors = {"short_lidar": LIDAR, "sonar": SONAR, **parts}
     (folder / "parts.yaml").write_text(json.dumps({"sensors": sensors}))
     case = load_text(json.dumps(spec, indent=1), folder / "spec.yaml")
-    return check_loaded(case, QUICK).to_json()
+    return check_loaded(case, replace(QUICK, explain=(explain,))).to_json()
 
 
 def at(distance: str, **keys: str) -> Raw:
@@ -98,6 +99,10 @@ def test_pinned_it_fails_by_what_is_implied(tmp_path: Path) -> None:
         True,
     )
     assert "short_lidar ends at 70 m, vessel is 500 m away" in row["note"]
+    (worked,) = said(tmp_path, pinned, explain="FACTS")["explained"]
+    (step,) = worked["steps"]
+    assert (step["value"], step["numbers"]) == (1, "1")
+    assert "short_lidar ends at 70 m" in step["formula"]
     near = said(tmp_path, pinned | {"stages": [pinned["stages"][0] | at("70 m")]})
     assert near["verdict"] == "meets"
     assert not [one for one in near["requirements"] if one["id"] == "FACTS"]

@@ -57,6 +57,10 @@ def _steps(worked: Worked, row: RequirementResult) -> Iterator[ExplainedStep]:
         yield from _ratios(worked)
     elif row.kind in ("cost", "mass", "power"):
         yield from _sum(worked, row)
+    elif row.kind == "feasible" and row.value is not None:
+        formula = f"entries that cannot work where they stand: {row.note}"
+        each = " + ".join(["1"] * int(row.value))
+        yield ExplainedStep(row.id, formula, each, row.value, row.unit)
     elif row.kind == "sample_spacing" and row.value is not None:
         formula = "largest v_max / rate over the ranging sensors, by sound v_max * 2 d / c"
         yield ExplainedStep(row.id, formula, _n(row.value), row.value, row.unit)
