@@ -21,8 +21,8 @@ from syncline_design.diagnosis.noise import (
 )
 from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch
 from syncline_design.diagnosis.scene import Scene
+from syncline_design.diagnosis.sensor_tails import sensor_tails
 from syncline_design.diagnosis.settling import Settled
-from syncline_design.diagnosis.tails import tails_in
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.model.known import EffectEntry
@@ -235,7 +235,7 @@ def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:
         value = model.level.size[opened.directed]
         figures = [(value, value * _log_spread(data, model, ("size", opened.directed, 0)))]
     elif opened.what == "tails":
-        found = tails_in(data, model)
+        found = sensor_tails(data, model, sensor)
         freedom = (found.degrees_of_freedom, found.freedom_uncertainty)
         figures = [freedom, (found.outlier_rate, math.inf)]
     elif opened.what == "factor":
