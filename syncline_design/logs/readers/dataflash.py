@@ -209,7 +209,7 @@ class DataFlashRecording(BatchRecording):
             primary=kind.clock or "",
             notes=tuple(notes),
             body="frd" if meaning.body else "unknown",
-            kind=kind.name,
+            kind="" if name == kind.name else kind.name,
             nature=meaning.nature,
         )
 

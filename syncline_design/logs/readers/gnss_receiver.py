@@ -308,7 +308,7 @@ class ReceiverRecording(BatchRecording):
             notes=notes,
             of_times=of_times,
             body="frd" if "attitude" in quantity or "rate" in quantity else "unknown",
-            kind=name,
+            kind="",
             columns=columns,
             nature="fused" if "attitude" in quantity else "measured" if quantity else "unknown",
         )
