@@ -12,7 +12,12 @@ import pytest
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.csv_names import plain_name
 from syncline_design.logs.readers.decimal_stamps import column, nanoseconds
-from syncline_design.logs.readers.epochs import gps_minus_utc_s, gps_to_utc, utc_to_gps
+from syncline_design.logs.readers.epochs import (
+    gps_minus_utc_s,
+    gps_to_utc,
+    nanoseconds_of,
+    utc_to_gps,
+)
 from syncline_design.logs.readers.stream import UNSET, Recording, Stream
 from syncline_design.spec.load import BadInput
 
@@ -201,3 +206,11 @@ def test_leap_seconds_are_those_of_the_bulletins() -> None:
         assert utc_to_gps(utc)[0] == utc[0] + leaps * 10**9
         assert gps_to_utc(utc_to_gps(utc))[0] == utc[0]
     assert utc_to_gps(np.array([UNSET]))[0] == UNSET
+
+
+def test_seconds_become_nanoseconds_to_the_last_digit() -> None:
+    odd = np.array([np.nan, np.inf, -np.inf, 1e300, 9.3e9])
+    assert nanoseconds_of(odd).tolist() == [UNSET] * 5
+    for value in (400825.001313, -0.25, 604799.9999999999, 1.4e9 + 0.1):
+        exact = Decimal(value) * 10**9  # of the double itself
+        assert nanoseconds_of(np.array([value]))[0] == int(exact.to_integral_value())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import time
 from datetime import UTC, datetime, timedelta
 from functools import reduce
 from operator import xor
@@ -13,7 +14,7 @@ import numpy as np
 import pytest
 
 from syncline_design.logs.readers import open_recording
-from syncline_design.logs.readers.receiver_frames import fletcher
+from syncline_design.logs.readers.receiver_frames import Sums
 from syncline_design.logs.readers.stream import UNSET, Recording, Stream
 from syncline_design.spec.load import BadInput
 
@@ -292,8 +293,20 @@ def test_comments_of_an_archive_and_rtcm_are_passed_over(tmp_path: Path) -> None
 
 
 def test_the_sum_of_a_message_is_that_of_the_library() -> None:
-    body = bytes(range(7, 200, 3))
-    assert fletcher(body) == pyubx2.calc_checksum(body)
+    block = bytes(np.random.default_rng(1).integers(0, 256, 70_000, dtype=np.uint8))
+    sums = Sums(block)
+    for first, end in ((0, 0), (0, 1), (5, 97), (69_000, 70_000), (3, 65_000)):
+        assert sums.of(first, end) == pyubx2.calc_checksum(block[first:end])
+
+
+def test_heads_that_claim_much_cost_little(tmp_path: Path) -> None:
+    """Each of 50 000 heads claims 64 kB: summed one by one, that would be 3 GB."""
+    at = datetime(2026, 5, 4, 10, 0, 0, tzinfo=UTC)
+    hostile = b"\xb5b\x01\x07\xff\xff" * 50_000
+    start = time.process_time()
+    recording = opened(tmp_path, pvt(at), hostile, pvt(at))
+    assert by_name(recording)["NAV-PVT"].messages == 2
+    assert time.process_time() - start < 5
 
 
 @pytest.mark.parametrize("name", ["GPRMC,000345.03,A,4808", "GPGGA,2561"])

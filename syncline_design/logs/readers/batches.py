@@ -167,7 +167,9 @@ class BatchRecording(ABC):
         return self._pieces(name)
 
     def _pieces(self, name: str) -> Iterator[Piece]:
+        deadline = in_force()
         for batch in self._batches(name):
+            deadline.check()
             if batch.stream == name:
                 primary = batch.primary_ns
                 if primary is None:

@@ -70,10 +70,11 @@ def week_of(gps_ns: int) -> int:
 def nanoseconds_of(seconds: np.typing.ArrayLike) -> Nanoseconds:
     """Seconds as whole nanoseconds; what is not finite or beyond 64 bits is UNSET."""
     values = np.asarray(seconds, dtype=np.float64)
-    whole = np.floor(values)
-    held = np.isfinite(values) & (np.abs(values) < 9.2e9)
-    whole = np.where(held, whole, 0.0)
-    rest = np.where(held, values - whole, 0.0)  # exact, so that no digit of the file is lost
+    with np.errstate(invalid="ignore"):  # of bit patterns that a damaged file holds
+        held = np.isfinite(values) & (np.abs(values) < 9.2e9)
+    safe = np.where(held, values, 0.0)
+    whole = np.floor(safe)
+    rest = safe - whole  # exact, so that no digit of the file is lost
     found = whole.astype(np.int64) * NANO + np.rint(rest * NANO).astype(np.int64)
     stamps: Nanoseconds = np.where(held, found, UNSET)
     return stamps

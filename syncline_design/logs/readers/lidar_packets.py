@@ -159,7 +159,7 @@ class NovatelStream:
                 found.append((name, _gps_ns(*struct.unpack_from("<HI", log, 14))))
                 self._held = log[size:]
             else:
-                self._held = log[3:]
+                self._held = log[NOVATEL_HEAD:]
 
 
 def _gps_ns(week: int, milliseconds: int) -> int:

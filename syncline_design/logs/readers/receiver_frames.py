@@ -11,9 +11,10 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import reduce
-from itertools import accumulate
 from operator import xor
 from typing import BinaryIO, Literal
+
+import numpy as np
 
 BLOCK = 1 << 20
 LONGEST_SENTENCE = 1024
@@ -31,6 +32,25 @@ class FrameCount:
     cut: int = 0  # bytes of a last frame that is not whole
 
 
+class Sums:
+    """The 8-bit Fletcher sum of any piece of a block at once, by running sums.
+
+    Of x_i .. x_(j-1): a = sum x_k, b = sum (j - k) x_k, both modulo 256.  A file of heads that
+    claim 64 kB each would else be summed over and over.
+    """
+
+    def __init__(self, block: bytes) -> None:
+        figures = np.frombuffer(block, dtype=np.uint8).astype(np.int64)
+        none = np.zeros(1, dtype=np.int64)
+        self._plain = np.concatenate([none, np.cumsum(figures)])
+        self._weighed = np.concatenate([none, np.cumsum(figures * np.arange(figures.shape[0]))])
+
+    def of(self, first: int, end: int) -> bytes:
+        plain = int(self._plain[end]) - int(self._plain[first])
+        weighed = int(self._weighed[end]) - int(self._weighed[first])
+        return bytes((plain & 0xFF, (end * plain - weighed) & 0xFF))
+
+
 Frame = tuple[Literal["nmea", "ubx"], bytes]
 
 
@@ -42,8 +62,9 @@ def frames(file: BinaryIO, count: FrameCount) -> Iterator[Frame]:
         ended = not more
         held += more
         at = 0
+        sums = Sums(held) if UBX in held else None
         while at < len(held):
-            found, after = _at(held, at, ended, count)
+            found, after = _at(held, at, ended, count, sums)
             if after < 0:
                 break
             if found is not None:
@@ -54,13 +75,15 @@ def frames(file: BinaryIO, count: FrameCount) -> Iterator[Frame]:
         count.cut = len(held)
 
 
-def _at(held: bytes, at: int, ended: bool, count: FrameCount) -> tuple[Frame | None, int]:
+def _at(
+    held: bytes, at: int, ended: bool, count: FrameCount, sums: Sums | None
+) -> tuple[Frame | None, int]:
     """A frame at a place, and the place behind it; negative where more bytes are wanted."""
     first = held[at]
     if first in b"$!":
         return _sentence(held, at, ended, count)
     if first == 0xB5:
-        return _ubx(held, at, ended, count)
+        return _ubx(held, at, ended, count, sums)
     if first == 0xD3 and len(held) >= at + 3 and held[at + 1] < 4:
         after = at + 6 + ((held[at + 1] << 8) | held[at + 2])
         if after <= len(held) and (after == len(held) or START.match(held, after)):
@@ -111,7 +134,9 @@ def sentence(raw: bytes) -> bytes | None:
     return found[1]
 
 
-def _ubx(held: bytes, at: int, ended: bool, count: FrameCount) -> tuple[Frame | None, int]:
+def _ubx(
+    held: bytes, at: int, ended: bool, count: FrameCount, sums: Sums | None
+) -> tuple[Frame | None, int]:
     if not held.startswith(UBX, at) and len(held) > at + 1:
         return None, _next(held, at, ended, count)
     size = 8 + int.from_bytes(held[at + 4 : at + 6], "little") if len(held) >= at + 6 else 8
@@ -122,14 +147,8 @@ def _ubx(held: bytes, at: int, ended: bool, count: FrameCount) -> tuple[Frame | 
             count.cut = len(held) - at
             return None, len(held)
         return None, _next(held, at, ended, count)
-    body = held[at + 2 : at + size - 2]
-    if fletcher(body) == held[at + size - 2 : at + size]:
-        return ("ubx", body), at + size
+    end = at + size - 2
+    if sums is not None and sums.of(at + 2, end) == held[end : end + 2]:
+        return ("ubx", held[at + 2 : end]), at + size
     count.refused += 1
     return None, _next(held, at, ended, count)
-
-
-def fletcher(body: bytes) -> bytes:
-    """The two bytes of the 8-bit Fletcher sum."""
-    sums = list(accumulate(body))
-    return bytes(((sums[-1] if sums else 0) & 0xFF, sum(sums) & 0xFF))
