@@ -6,6 +6,7 @@ import csv
 import io
 import json
 import math
+import shlex
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,7 @@ from tests.world.hidden import hidden
 from tests.world.motions import Sensors
 from tests.world.noise import Noise
 from tests.world.planned import driven
-from tests.world.scenarios import Scenario
+from tests.world.scenarios import Scenario, scenario
 from tests.world.worldlog import make_log
 
 DEGREE = math.pi / 180.0
@@ -244,7 +245,7 @@ def test_a_drive_that_is_driven_names_what_was_hidden(pair: PlanRun, spec: Path)
     """The world drives the plan with 30 ms hidden; the class is told, the value as predicted."""
     log = make_log(world(pair, seed=11), (hidden("latency", "position", latency_s=0.03),), Noise())
     path = log.to_csv(spec.parent / "driven.csv")
-    answer = sd.diagnose(spec, path)
+    answer = sd.diagnose(spec, path, max_effects=2)
     named = {(f.effect, f.sensor): f for f in answer.findings if f.kind == "cause"}
     assert set(named) == {("latency", "position")}
     found = named["latency", "position"]
@@ -324,3 +325,45 @@ def test_doubles_are_said_to_be_doubles(spec: Path) -> None:
     assert "No drive of this platform tells lever_arm(position) and lever_arm(ranging)" in " ".join(
         done.stdout.split()
     )
+
+
+@pytest.fixture(scope="module")
+def straight(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A straight line at one speed, 30 ms of GNSS latency hidden in it: spec and log."""
+    folder = tmp_path_factory.mktemp("straight")
+    line = scenario("straight_constant_speed", 3, 40.0, 10.0)
+    log = make_log(line, (hidden("latency", "position", latency_s=0.03),), Noise())
+    spec = folder / "line.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    return spec, log.to_csv(folder / "line.csv")
+
+
+def test_a_diagnosis_with_a_class_ends_with_the_drive_that_tells(
+    straight: tuple[Path, Path],
+) -> None:
+    spec, log = straight
+    result = spec.parent / "line.json"
+    done = CliRunner().invoke(
+        app, ["diagnose", str(spec), str(log), "--max-effects", "1", "-o", f"json:{result}"]
+    )
+    assert done.exit_code == 1
+    data = json.loads(result.read_text("utf-8"))
+    jsonschema.validate(data, result_schema("diagnosis"))
+    named = {(f["effect"], f["sensor"]): f for f in data["findings"]}
+    aliases = {a["effect"] for f in named.values() for a in f["aliases"]}
+    assert {"latency", "lever_arm"} <= {name for name, _ in named} | aliases
+    drive = data["plan"]
+    assert drive["reached"]
+    assert drive["first"] != drive["second"]
+    assert drive["command"].startswith("syncline-design plan ")
+    assert drive["command"].removeprefix("syncline-design ")[:30] in " ".join(done.stdout.split())
+    words = shlex.split(drive["command"])[2:]
+    whole = call(*words, "-o", "json:-")
+    assert whole.exit_code == 0
+    assert [leg["words"] for leg in json.loads(whole.stdout)["legs"]] == [
+        leg.partition(": ")[2] for leg in drive["legs"]
+    ]
+    from_file = call(spec, "--diagnosis", result, "-o", "json:-")
+    pairs = json.loads(from_file.stdout)["pairs"]
+    assert pairs[0]["sizes"]["latency_s"] == pytest.approx(0.03, rel=0.1)
+    assert all(pair["separated"] for pair in pairs)

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 MOST_POINTS = 2000
+FAR = 1e6  # times what is asked: not seen yet, and off the scale
 
 
 def path(run: PlanRun) -> InlineFigure:
@@ -54,6 +55,7 @@ def after(found: Plan) -> InlineFigure:
     """Sigma over tolerance after every leg, logarithmic; reached below the line at 1."""
     keys = [k for k in found.after[-1].sigma if k in found.tolerance]
     legs = list(range(1, len(found.after) + 1))
+    ratios = [ratio for key in keys for ratio in _ratios(found, key) if ratio < FAR]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
@@ -62,10 +64,13 @@ def after(found: Plan) -> InlineFigure:
                       color=SERIES[k % len(SERIES)], label=key)  # fmt: skip
         axes.axhline(1.0, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
+        low, high = 0.8 * min(*ratios, 1.0), 1.25 * max(*ratios, 1.0)
+        axes.set_ylim(low, high)
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), lambda v: f"{v:g}")
         axes.set_xticks(legs)
         axes.set_xlabel("leg")
         axes.set_ylabel("sigma / asked")
-        axes.legend(loc="upper right", fontsize=8)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.24), ncols=2, fontsize=8)
         scales.grid(axes, "y")
 
     last = "; ".join(f"{key} {_ratios(found, key)[-1]:.2g}" for key in keys)

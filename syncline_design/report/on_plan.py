@@ -17,11 +17,11 @@ from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,
     Document,
-    Facts,
     Items,
     Node,
     Outcome,
     Text,
+    code,
     provenance,
     section,
     show,
@@ -240,7 +240,8 @@ def _open(found: Plan) -> list[Node]:
 def _log(found: Plan) -> list[Node]:
     rate = numbers.typeset(f"{found.rate_hz:.4g} Hz")
     return [
-        Facts((("Columns", ", ".join(found.columns)), ("Rows", f"{rate}, from first to last leg"))),
+        Text(("Columns: ", code(", ".join(found.columns)))),
+        Text(f"Rows: {rate}, from the first leg to the last."),
     ]
 
 
