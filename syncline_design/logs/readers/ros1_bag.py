@@ -75,9 +75,24 @@ class Ros1Bag(Container):
         return int(index)
 
     def _of_chunk(self, data: bytes) -> Iterator[RawMessage]:
+        """Records of a chunk; message headers that look like the last one are not parsed anew."""
         at, end = 0, len(data)
+        alike: _Alike | None = None
         while at < end:
+            if alike is not None and at + alike.length + 8 <= end and alike.fits(data, at):
+                body = at + alike.length + 4
+                length = _LENGTH.unpack_from(data, body)[0]
+                channel = self._channels.get(_LENGTH.unpack_from(data, at + alike.connection)[0])
+                if channel is not None and body + 4 + length <= end:
+                    seconds, rest = _TIME.unpack_from(data, at + alike.time)
+                    at = body + 4 + length
+                    stamp = seconds * 1_000_000_000 + rest
+                    yield RawMessage(channel, stamp, None, data[body + 4 : at])
+                    continue
+            begun = at
             fields, at = _fields_of(data, at)
+            if fields.get(b"op") == bytes([MESSAGE]):
+                alike = _Alike.of(data, begun, at, fields)
             length, at = _length_of(data, at)
             if at + length > end:
                 raise DamagedError("a record reaches beyond its chunk")
@@ -99,6 +114,34 @@ class Ros1Bag(Container):
             raise DamagedError("a message of no known connection")
         seconds, rest = _TIME.unpack(time)
         yield RawMessage(self._channels[connection], seconds * 1_000_000_000 + rest, None, data)
+
+
+class _Alike:
+    """Where connection and time stand in a message's header: a writer's headers are all alike."""
+
+    def __init__(self, head: bytes, connection: int, time: int) -> None:
+        self.length = len(head) - 4
+        self.connection, self.time = connection, time
+        ends = sorted([(connection, connection + 4), (time, time + 8)])
+        bounds = [0, *(edge for pair in ends for edge in pair), len(head)]
+        self._fixed = [
+            (a, b, head[a:b]) for a, b in zip(bounds[::2], bounds[1::2], strict=True) if a < b
+        ]
+
+    @staticmethod
+    def of(data: bytes, begun: int, end: int, fields: Fields) -> _Alike | None:
+        """By the header from `begun` to `end`, its length included; None where it is unusual."""
+        head = data[begun:end]
+        places = {name: head.find(name + b"=") + len(name) + 1 for name in (b"conn", b"time")}
+        usual = set(fields) == {b"op", b"conn", b"time"} and all(
+            head.count(name + b"=") == 1 for name in places
+        )
+        right = usual and (len(fields[b"conn"]), len(fields[b"time"])) == (4, 8)
+        return _Alike(head, places[b"conn"], places[b"time"]) if right else None
+
+    def fits(self, data: bytes, at: int) -> bool:
+        """Whether a header of the same form begins there."""
+        return all(data[at + a : at + b] == fixed for a, b, fixed in self._fixed)
 
 
 def _record_head(file: BinaryIO) -> tuple[Fields, int]:
