@@ -54,6 +54,11 @@ class McapFile(Container):
                     break
                 else:
                     yield from self._one(record)
+            file.seek(0, 2)
+            file.seek(max(file.tell() - len(MAGIC), 0))
+            whole = file.read() == MAGIC
+        if ended and not whole:
+            raise DamagedError("cut off behind its data; no message is missing")
         if not ended:
             raise DamagedError("the file was not closed: its data have no end")
 
@@ -78,6 +83,8 @@ class McapFile(Container):
             channel = self._channels.get(record.channel_id)
             if channel is None:
                 raise DamagedError("a message of no known channel")
+            if self.wanted is not None and channel.topic != self.wanted:
+                return
             yield RawMessage(channel, record.log_time, record.publish_time, record.data)
         elif isinstance(record, self._records.Schema):
             text = record.data.decode("utf-8", "replace")

@@ -53,8 +53,11 @@ class Ros1Bag(Container):
                     most = f"at most {MOST_RECORD} bytes"
                     raise refuse(self.path, "absurd length", expected=most, found=str(length))
                 if operation == CHUNK:
-                    data = _unpacked(_taken(file, length), fields, budget, self.path)
-                    yield from self._of_chunk(data)
+                    data = file.read(min(length, MOST_RECORD))
+                    cut = len(data) < length  # what is there of a cut chunk is read
+                    yield from self._of_chunk(_unpacked(data, fields, budget, self.path, cut))
+                    if cut:
+                        raise DamagedError("cut off within a chunk")
                 elif operation in (MESSAGE, CONNECTION):
                     yield from self._one(operation, fields, _taken(file, length))
                 else:
@@ -86,6 +89,8 @@ class Ros1Bag(Container):
                 if channel is not None and body + 4 + length <= end:
                     seconds, rest = _TIME.unpack_from(data, at + alike.time)
                     at = body + 4 + length
+                    if self.wanted is not None and channel.topic != self.wanted:
+                        continue
                     stamp = seconds * 1_000_000_000 + rest
                     yield RawMessage(channel, stamp, None, data[body + 4 : at])
                     continue
@@ -197,7 +202,7 @@ def _skip(file: BinaryIO, length: int, size: int) -> None:
     file.seek(length, 1)
 
 
-def _unpacked(data: bytes, fields: Fields, budget: UnpackBudget, path: Path) -> bytes:
+def _unpacked(data: bytes, fields: Fields, budget: UnpackBudget, path: Path, cut: bool) -> bytes:
     size = fields.get(b"size", b"")
     packing = fields.get(b"compression", b"none").decode("ascii", "replace")
     if len(size) != 4:
@@ -212,7 +217,7 @@ def _unpacked(data: bytes, fields: Fields, budget: UnpackBudget, path: Path) -> 
         plain = _from_lz4(data, due, path)
     else:
         raise DamagedError(f"a chunk packed as {packing[:20]!r}")
-    if len(plain) != due:
+    if len(plain) != due and not (cut and len(plain) < due):
         raise DamagedError("a chunk does not unpack to its size")
     return plain
 

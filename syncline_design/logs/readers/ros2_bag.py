@@ -58,9 +58,11 @@ class Ros2Bag(Container):
         except OSError as error:
             raise DamagedError(f"cannot be read: {error.strerror}") from None
         if head.startswith(MCAP_MAGIC):
-            yield from McapFile(path)._read()
+            inner = McapFile(path)
+            inner.wanted = self.wanted
+            yield from inner._read()
         elif head == MAGIC:
-            yield from _of_database(path)
+            yield from _of_database(path, self.wanted)
         elif head.startswith(ZSTD_MAGIC):
             hint = f"zstd -d {path.name}"
             raise refuse(path, "the bag's file is compressed as a whole", found="zstd", hint=hint)
@@ -105,7 +107,7 @@ def _named(path: Path) -> list[str]:
         raise refuse(path, "no metadata of a bag", found=short) from None
 
 
-def _of_database(path: Path) -> Iterator[RawMessage]:
+def _of_database(path: Path, wanted: str | None) -> Iterator[RawMessage]:
     """Messages by their number, which is their order of arrival; only real tables are asked."""
     try:
         file = sqlite3.connect(f"file:{quote(str(path.resolve()))}?mode=ro&immutable=1", uri=True)
@@ -117,7 +119,11 @@ def _of_database(path: Path) -> Iterator[RawMessage]:
         file.set_progress_handler(_checked, STEPS)
         channels, packed = _channels(file, path)
         budget = UnpackBudget(path, path.stat().st_size)
-        rows = file.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id")
+        only = [n for n, c in channels.items() if wanted is not None and c.topic == wanted]
+        some = f"WHERE topic_id IN ({', '.join('?' * len(only))})" if only else ""
+        rows = file.execute(
+            f"SELECT topic_id, timestamp, data FROM messages {some} ORDER BY id", only
+        )
         for topic, stamp, data in rows:
             channel = channels.get(topic)
             if channel is None or not isinstance(stamp, int) or not isinstance(data, bytes):

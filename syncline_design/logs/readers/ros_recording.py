@@ -69,10 +69,21 @@ class Container(ABC):
         self.path, self.format = path, format
         self.incomplete: Incomplete | None = None
         self.cut = ""  # what is known of a cut before reading comes to it
+        self.wanted: str | None = None  # the one topic that is read; None: all
 
     @abstractmethod
     def _read(self) -> Iterator[RawMessage]:
         """Every message in the order of the file; DamagedError where that ends early."""
+
+    def of_topic(self, topic: str) -> Iterator[RawMessage]:
+        """The messages of one topic, up to the last good one."""
+        known, self.wanted = self.incomplete, topic
+        try:
+            for message in self.messages():
+                if message.channel.topic == topic:
+                    yield message
+        finally:
+            self.wanted, self.incomplete = None, known
 
     def messages(self) -> Iterator[RawMessage]:
         """Every message up to the last good one; then `incomplete` is known."""
@@ -89,7 +100,7 @@ class Container(ABC):
         else:
             if self.cut:
                 self.incomplete = Incomplete(self.cut, count)
-        if not count and self.incomplete is not None:
+        if not count and self.incomplete is not None and self.wanted is None:
             raise refuse(self.path, f"no message of this {self.format} can be read",
                          found=self.incomplete.reason)  # fmt: skip
 
@@ -158,9 +169,8 @@ class RosRecording:
         if wanted is None:
             raise refuse(self.path, f"no stream {name}", found=", ".join(sorted(self._channels)))
         collected: _Rows | None = None
-        for message in self._container.messages():
-            channel = message.channel
-            if (channel.topic, channel.kind) != (wanted.topic, wanted.kind):
+        for message in self._container.of_topic(wanted.topic):
+            if message.channel.kind != wanted.kind:
                 continue
             if collected is None:
                 collected = _rows_of(self._begun(message, 0))
