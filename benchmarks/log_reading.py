@@ -69,9 +69,9 @@ def _timed(code: str, path: Path) -> tuple[float, float]:
     """Processor time [s], the best of three runs, and the most memory held [MB]."""
     found = []
     watch = (
-        "import resource as _r\n"
-        "import atexit; atexit.register(lambda: __import__('sys').stderr.write("
-        "'%d' % _r.getrusage(_r.RUSAGE_SELF).ru_maxrss))\n"
+        "import atexit, sys\n"
+        "held = lambda: next(l for l in open('/proc/self/status') if 'VmHWM' in l).split()[1]\n"
+        "atexit.register(lambda: sys.stderr.write(held()))\n"
     )
     for _ in range(3):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)

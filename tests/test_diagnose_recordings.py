@@ -215,3 +215,28 @@ def test_ranges_in_a_table_stand_beside_a_bag(tmp_path: Path) -> None:
     assert stage.antenna_m is not None
     at = np.searchsorted(rows, log.time_s + 1e-6) - 1
     assert np.abs(stage.antenna_m - TRUTH.place[at]).max() < 1e-3
+
+
+def test_parts_of_one_run_are_one_log(tmp_path: Path) -> None:
+    """A bag split in two, given in any order, is the whole bag; two runs at once are not."""
+
+    def part(name: str, made: Flight) -> Path:
+        return write_ros1(tmp_path / name, made)
+
+    def cut(rows: slice) -> Flight:
+        return Flight(TRUTH.stamp_ns[rows], TRUTH.place[rows], TRUTH.velocity[rows],
+                      TRUTH.turn[rows], TRUTH.rate[rows])  # fmt: skip
+
+    choice = LogChoice()
+    whole, split = (
+        read_log(row_sources(paths, choice, ["uav"], poses=False), ["uav"], needs_ranging=False)
+        for paths in (
+            [part("whole.bag", TRUTH)],
+            [part("b.bag", cut(slice(200, None))), part("a.bag", cut(slice(0, 200)))],
+        )
+    )
+    assert len(split) == len(whole)
+    np.testing.assert_array_equal(split.time_s, whole.time_s)
+    np.testing.assert_allclose(split.truth_m, whole.truth_m, atol=1e-9)
+    assert split.stages[0].antenna_m is not None
+    np.testing.assert_allclose(split.stages[0].antenna_m, whole.stages[0].antenna_m, atol=1e-9)

@@ -15,7 +15,8 @@ from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.epochs import WEEK_SECONDS
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Stream
 from syncline_design.logs.readers.timelines import calendar
-from syncline_design.logs.roles import Offer, Part, Role, Sureness, parts_of
+from syncline_design.logs.roles import Offer, Part, Role, Sureness, offers_of, parts_of
+from syncline_design.logs.run_parts import Known, one_run
 from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
 from syncline_design.machine.records import Json, Named, Record, optional
@@ -151,20 +152,21 @@ def inspect_logs(
 
     choice: what a spec already says of its log.  poses: whether attitudes may be compared too.
     """
-    offers: list[Offer] = []
+    recordings: list[Recording] = []
     unread = []
     files, streams = [], []
     for path in paths:
         try:
-            recording = open_recording(path)
+            recording = Known(open_recording(path))
             found = recording.streams()
         except BadInput as error:
             unread.append(UnreadFile(str(path), str(error)))
             continue
-        offers += [Offer(recording, one) for one in found]
+        recordings.append(recording)
         files.append(_file(recording, found))
         outside = _outside(found)
         streams += [_stream(path, one, outside.get(one.name, ())) for one in found]
+    offers = offers_of(one_run(recordings))
     proposal = _proposal(offers, choice or LogChoice(), poses)
     return LogInspection(SCHEMA, __version__, tuple(files), tuple(streams), proposal, tuple(unread))
 

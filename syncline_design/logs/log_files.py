@@ -21,6 +21,7 @@ from syncline_design.logs.columns import (
 from syncline_design.logs.readers import open_recording, reader_of
 from syncline_design.logs.readers.reader import head_of
 from syncline_design.logs.roles import Role, offers_of
+from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
 from syncline_design.logs.stream_sources import sources_of
 from syncline_design.spec.load import BadInput
@@ -43,7 +44,7 @@ def row_sources(
     recordings = [open_recording(path) for path in paths if path not in read]
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
     held = _held(tables, choice.columns, stages)
-    return [*tables, *sources_of(offers_of(recordings), choice, prefix, poses, held)]
+    return [*tables, *sources_of(offers_of(one_run(recordings)), choice, prefix, poses, held)]
 
 
 def _held(
