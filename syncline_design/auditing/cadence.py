@@ -22,6 +22,7 @@ REGULAR: Final = 0.35  # of an interval: larger irregularities are no rhythm
 _PLACED: Final = 0.2  # of an interval: how near to its place a message after a loss is
 _LAG: Final = 16
 _STRETCH: Final = 24  # messages over which a rhythm is followed
+_MOST_STRETCHES: Final = 5000
 _GROWTH: Final = 2.0  # of irregularity over 16 intervals against over one: a rhythm 1, a walk 4
 _HOLE: Final = 0.85  # of an interval: more than a late message
 _WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
@@ -94,13 +95,15 @@ def about_rhythm(when: Array) -> Array | None:
     one, far = scatter(np.diff(dev)), scatter(dev[_LAG:] - dev[:-_LAG])
     if usual <= 0.0 or far > _GROWTH * one or one > usual:
         return None
-    kept = []
-    for piece in np.array_split(dev, when.size // _STRETCH):
-        if np.max(np.abs(np.diff(piece))) < _HOLE * usual:
-            k = np.arange(piece.size) - 0.5 * (piece.size - 1)
-            level = piece - k * float(k @ piece) / float(k @ k)
-            kept.append(level - np.median(level))
-    return np.concatenate(kept) if len(kept) > 3 else None
+    pieces = dev[: dev.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
+    pieces = pieces[:: max(1, pieces.shape[0] // _MOST_STRETCHES)]
+    whole = np.max(np.abs(np.diff(pieces, axis=1)), axis=1) < _HOLE * usual
+    pieces = pieces[whole]
+    if pieces.shape[0] < 4:
+        return None
+    k = np.arange(_STRETCH) - 0.5 * (_STRETCH - 1)
+    level = pieces - np.outer(pieces @ k / float(k @ k), k)
+    return np.asarray((level - np.median(level, axis=1, keepdims=True)).ravel())
 
 
 def missing(

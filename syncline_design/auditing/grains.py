@@ -19,6 +19,8 @@ ROUNDING_NS: Final = 600  # of a file that keeps microseconds, or doubles of Uni
 TIMERS: Final = (0.016, 0.008, 0.004, 0.005, 0.01, 0.02, 0.0125, 0.025, 0.032, 0.04, 0.05, 0.1)
 FTDI_S: Final = 0.016
 _FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
+_MOST_MOMENTS: Final = 200_000
+_LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
 _COHERENT: Final = 0.75
 _EVENLY: Final = 0.25  # scatter of the distance between skips
 _BUNCHED: Final = 0.25  # share of neighbours that come together
@@ -75,6 +77,8 @@ def _ticks(stamp: np.ndarray, grain: int) -> bool:
 
 def _alternates(stamp: np.ndarray, grain: int) -> bool:
     counts = np.round(np.diff(stamp) / grain)
+    if np.count_nonzero(counts) < _LEAST_STEPS:
+        return False
     values, often = np.unique(counts, return_counts=True)
     usual = values[int(np.argmax(often))]
     if usual == 0:
@@ -149,7 +153,7 @@ def _bunches(
     size, often = np.unique(sizes, return_counts=True)
     constant = often.max() > 0.97 * sizes.size
     timer = best_timer(heads)
-    if timer is None and (sizes.mean() < 1.8 or spread(apart) > 0.3 * np.median(apart)):
+    if timer is None and (sizes.mean() < 1.8 or spread(apart) > 0.5 * np.median(apart)):
         return None  # messages that wait for one another
     if constant and int(size[int(np.argmax(often))]) > 1 and timer not in (0.016, 0.008, 0.004):
         return None  # several messages of one epoch, as designed
@@ -188,6 +192,7 @@ def _beat(interval: Array) -> float | None:
 
 def best_timer(when: Array) -> float | None:
     """The timer that all moments are ticks of; the longest of those that fit best."""
+    when = when[:_MOST_MOMENTS]
     fits = {t: _coherence(when, t) for t in TIMERS}
     best = max(fits.values())
     if best < _COHERENT:

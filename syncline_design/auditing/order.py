@@ -47,7 +47,7 @@ def without_unset(series: Series) -> Repaired:
         for begin, end in isolated:
             if end - begin > 2:
                 zero[begin:end] = True
-    zero &= ~_passing(stamp, zero)
+    zero &= ~_passing(stamp, stamp == 0)
     count = int(zero.sum())
     if not count:
         return Repaired(series)

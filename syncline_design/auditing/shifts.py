@@ -249,7 +249,8 @@ def _waits_for_ticks(series: Series, late: Array) -> bool:
 def _has_tail(late: Array) -> bool:
     """Whether delays reach further above their median than below it, block by block."""
     skews = []
-    for piece in np.array_split(late, max(4, late.size // 64)):
+    pieces = np.array_split(late, max(4, late.size // 64))
+    for piece in pieces[:: max(1, len(pieces) // 1000)]:
         k = np.arange(piece.size) - 0.5 * (piece.size - 1)
         low, middle, high = np.percentile(piece - k * float(k @ piece) / float(k @ k), [5, 50, 95])
         if high > low:
@@ -261,7 +262,7 @@ def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple
     """A shape put where the stamps' own rhythm breaks, and whether it breaks there at all."""
     if shape.kind in ("drift", "bend", "holdover") or not pace.regular:
         return shape, "unknown"
-    side, at = _broken(pace, shape.begin_s, -shape.size_s, time_s, blocks)
+    side, at = _broken(pace, shape.begin_s, -shape.size_s, time_s, blocks, shape.settle_s)
     if at is not None:
         end = at if shape.kind == "relock" else shape.end_s
         shape = replace(shape, begin_s=at, end_s=end)
@@ -273,12 +274,17 @@ def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple
 
 
 def _broken(
-    pace: Cadence, at_s: float, jump_s: float, time_s: Array, blocks: Blocks
+    pace: Cadence,
+    at_s: float,
+    jump_s: float,
+    time_s: Array,
+    blocks: Blocks,
+    settle_s: float = 0.0,
 ) -> tuple[Side, float | None]:
     """Whether stamps leave their rhythm by a jump near a moment, and where.
 
     The interval that does is the jump longer; where the rhythm scatters too much for one interval,
-    the sum of all near by.
+    the sum of all near by.  What settles was larger, had it begun earlier than it was put.
     """
     width = _LOOK * blocks.length_s
     inside = np.flatnonzero((time_s[1:] > at_s - width) & (time_s[:-1] < at_s + width))
@@ -288,9 +294,12 @@ def _broken(
     large = abs(jump_s) > 0.4 * period
     steps = 1.0 if large else pace.steps[inside]
     off = pace.interval[inside] - steps * period
-    apart = np.abs(off - jump_s)
+    sizes = np.full(inside.size, jump_s)
+    if settle_s > 0.0:
+        sizes *= np.exp(np.clip((at_s - time_s[inside + 1]) / settle_s, -3.0, 3.0))
+    apart = np.abs(off - sizes) / np.abs(sizes)
     nearest = int(np.argmin(apart))
-    if abs(jump_s) > noise and apart[nearest] < 0.35 * abs(jump_s):
+    if abs(sizes[nearest]) > noise and apart[nearest] < 0.35:
         return "stamp", float(time_s[inside[nearest] + 1])
     if large:
         hole = bool(np.any(pace.interval[inside] > 4.0 * period))

@@ -22,10 +22,11 @@ from syncline_design.auditing.result import (
 )
 from syncline_design.auditing.series import NS, Array, Series, seconds, series_of
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
-from syncline_design.logs.readers.stream import Nanoseconds, Stamps, Stream
+from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
 
 RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
+_SAMPLE: Final = 100_000  # messages that tell a resolution
 TRACE_POINTS: Final = 240
 _NONE: Final = Stamps("", None, np.zeros(0, np.int64))
 _LARGE_STEP_NS: Final = 1e6
@@ -61,13 +62,11 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     grain = _grain(series, step_ns, found)
     arrived = None if grain else arrival.stamped_on_arrival(series, cadence(series))
     if arrived is not None:
-        series = _arrivals(series, arrived, found)
+        found.append(_with_alike(series, arrived))
     elif step_ns >= _LARGE_STEP_NS:  # duplicates are the unit's
         series = order.without_duplicates(series).series
     elif grain is None or not grain.explains_duplicates:
         series = _take(order.without_duplicates(series), found)
-    else:
-        series = order.without_duplicates(series).series
     series = _take(order.without_spikes(series), found)
     epoch = None if unit else epoch_fault(series)
     found[:] = _with_epoch(found, _as_declared(epoch, stream))
@@ -84,7 +83,9 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
 
 def _receipts(stamps: Stamps) -> Nanoseconds | None:
     """The second time where another clock told it: one clock cannot be held against itself."""
-    return stamps.secondary_ns if is_receipt(stamps.secondary) else None
+    second = stamps.secondary_ns
+    told = is_receipt(stamps.secondary) and second is not None and bool(np.any(second != UNSET))
+    return second if told else None
 
 
 def is_receipt(name: str | None) -> bool:
@@ -136,12 +137,11 @@ def _with_epoch(found: list[StampFault], epoch: StampFault | None) -> list[Stamp
     return [whole if f is wraps[0] else f for f in found]
 
 
-def _arrivals(series: Series, arrived: StampFault, found: list[StampFault]) -> Series:
+def _with_alike(series: Series, arrived: StampFault) -> StampFault:
     """Stamps of messages that came at once follow from being stamped on arrival."""
-    alike = order.without_duplicates(series)
-    follows = tuple(Consequence("duplicates", f.parameters, f.evidence) for f in alike.faults)
-    found.append(replace(arrived, consequences=follows))
-    return alike.series
+    alike = order.without_duplicates(series).faults
+    follows = tuple(Consequence("duplicates", f.parameters, f.evidence) for f in alike)
+    return replace(arrived, consequences=follows)
 
 
 def _known(epoch: StampFault | None, series: Series, unit: bool) -> float | None:
@@ -167,7 +167,7 @@ def _coarse(raw: Series) -> float:
     if raw.receive is None or raw.receive.size < 20:
         return 0.0
     for grain in grains.GRAINS:
-        rest = raw.receive % grain
+        rest = raw.receive[:_SAMPLE] % grain
         if float(np.mean(np.minimum(rest, grain - rest) <= grains.ROUNDING_NS)) > 0.995:
             return grain / NS
     return 0.0
@@ -241,10 +241,13 @@ def residual_of(raw: Series, series: Series, faults: tuple[StampFault, ...]) -> 
     if series.receive is None or series.good.sum() < 2:
         return ResidualTime(None, None, None)
     drifts = any(f.fault == "drift" for f in faults)
-    restored = _restored(series, cadence(series), faults)
+    restored = _restored(series, faults)
+    if restored is None:
+        return ResidualTime(None, None, None)
     left = above_floor(series.seconds[series.places()], restored, sloping=drifts)
-    return ResidualTime(float(left.max()), float(np.percentile(left, 95.0)),
-                        float(np.ptp(_recorded(raw, series))))  # fmt: skip
+    bound = float(left.max())
+    recorded = max(bound, float(np.ptp(_recorded(raw, series))))
+    return ResidualTime(bound, float(np.percentile(left, 95.0)), recorded)
 
 
 def without_clock_step(one: Examined, shift: Shift) -> Examined:
@@ -274,30 +277,39 @@ def _offset(raw: Series) -> float | None:
     return float(seconds(np.max((raw.stamp - raw.receive)[raw.good])))
 
 
-def _restored(series: Series, pace: Cadence, found: tuple[StampFault, ...]) -> Array:
-    """Receipt minus stamp [s], stamps of a coarse clock put back to their sensor's rhythm."""
+def _restored(series: Series, faults: tuple[StampFault, ...]) -> Array | None:
+    """Receipt minus stamp [s], stamps of a coarse or late clock put back to their sensor's rhythm.
+
+    None where stamps are arrivals and no rhythm says of what: how late they are is not known.
+    """
     assert series.receive is not None
-    whole = (series.receive - series.stamp)[pace.places]
+    places = series.places()
+    whole = (series.receive - series.stamp)[places]
     late = seconds(whole - whole.min())
-    names = {f.fault for f in found}
+    names = {f.fault for f in faults}
     if not names & {"packetised", "truncated_stamps", "stamped_on_arrival"}:
         return late
-    when = seconds(series.stamp[pace.places] - series.stamp[pace.places[0]])
-    rhythm = _rhythm(when, pace)
-    return late if rhythm is None else np.asarray(late + when - rhythm)
+    when = seconds(series.stamp[places] - series.stamp[places[0]])
+    rhythm = _rhythm(when, cadence(series))
+    if rhythm is not None:
+        return np.asarray(late + when - rhythm)
+    return None if names & {"packetised", "stamped_on_arrival"} else late
 
 
 def _rhythm(when: Array, pace: Cadence) -> Array | None:
     """When a regular sensor measured, from its own mean rhythm; None of an irregular one."""
     if when.size < 40 or when[-1] <= 0.0:
         return None
-    counts = np.arange(when.size, dtype=np.float64)
-    if pace.regular:
-        counts[1:] = np.cumsum(pace.steps)
-    first, mean = np.polynomial.polynomial.polyfit(counts, when, 1)
-    even = first + mean * counts
-    grain = float(np.percentile(np.diff(when), 99.0))
-    return np.asarray(even) if float(np.ptp(when - even)) < 2.0 * grain + 2.0 * mean else None
+    ways = [np.arange(when.size, dtype=np.float64)]
+    if pace.regular:  # with losses counted
+        ways.append(np.concatenate([[0.0], np.cumsum(pace.steps)]))
+    for counts in ways:
+        first, mean = np.polynomial.polynomial.polyfit(counts, when, 1)
+        even = np.asarray(first + mean * counts)
+        grain = float(np.percentile(np.diff(when), 99.0))
+        if float(np.ptp(when - even)) < 2.0 * grain + 2.0 * float(mean):
+            return even
+    return None
 
 
 def _recorded(raw: Series, series: Series) -> Array:
