@@ -42,6 +42,13 @@ def test_a_name_with_its_unit_in_brackets_is_mapped_as_it_stands(
     assert log.stages[0].euler_rad == pytest.approx(plain.stages[0].euler_rad, rel=1e-8)
 
 
+def test_a_quantity_given_twice_alike_differs_in_nothing(tmp_path: Path) -> None:
+    made = columns()
+    log = read(write(tmp_path / "a.csv", made | {"yaw_rad": np.pi / 180.0 * made["yaw_deg"]}))
+    assert "yaw_rad was not read, as yaw_deg is there too" in log.notes
+    assert not any("differ" in one for one in log.notes)
+
+
 def test_a_mapped_column_that_is_nowhere_is_not_replaced_by_another(tmp_path: Path) -> None:
     path = write(tmp_path / "a.csv", columns())
     said = refusal(path, {"range_m": "range_corected [m]"})
@@ -69,13 +76,19 @@ def test_a_mapped_column_may_be_in_another_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("other", "of"),
-    [("yaw_rad", "yaw_deg"), ("heading_deg", "yaw_deg"), ("range_mm", "range_m")],
+    ("other", "of", "apart"),
+    [
+        ("heading_deg", "yaw_deg", "30 deg"),
+        ("heading_rad", "yaw_deg", "30 deg"),
+        ("range_mm", "range_m", "30 m"),
+    ],
 )
-def test_a_quantity_given_twice_is_said(tmp_path: Path, other: str, of: str) -> None:
-    made = columns() | {other: columns()[of] + 30.0}
+def test_a_quantity_given_twice_is_said(tmp_path: Path, other: str, of: str, apart: str) -> None:
+    per = {"heading_rad": np.pi / 180.0, "range_mm": 1000.0}.get(other, 1.0)
+    made = columns() | {other: per * (columns()[of] + 30.0)}
     log = read(write(tmp_path / "a.csv", made))
     assert f"{other} was not read, as {of} is there too" in log.notes
+    assert f"{of} and {other} differ by {apart} in the median" in log.notes
     plain = read(write(tmp_path / "plain.csv", columns()))
     assert log.stages[0].euler_rad == pytest.approx(plain.stages[0].euler_rad)
     assert log.stages[0].range_m == pytest.approx(plain.stages[0].range_m)

@@ -95,6 +95,15 @@ def test_one_run_in_any_order_is_one_run(tmp_path: Path, kind: str) -> None:
         assert log.stages[0].range_m == pytest.approx(plain.stages[0].range_m)
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_a_file_in_no_order_is_put_in_order(tmp_path: Path, seed: int) -> None:
+    """Half of its steps lead back, now more and now less."""
+    made = run(0, 5, 120)
+    order = np.random.default_rng(seed).permutation(120)
+    log = read(write(tmp_path / "mixed.csv", ordered(made, order)))
+    assert log.time_s == pytest.approx(np.sort(made["time_s"]))
+
+
 def test_a_parked_vehicle_may_start_again(tmp_path: Path) -> None:
     made = joined(run(0, 1), run(80, 2))
     for axis, value in (("north", 3.0), ("east", 4.0), ("down", -1.0)):

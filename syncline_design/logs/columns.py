@@ -78,17 +78,25 @@ def named_column(theirs: str, present: Container[str]) -> tuple[str, str]:
 def passed_over(
     header: Iterable[str], found: Mapping[str, tuple[str, float]], mapping: Mapping[str, str]
 ) -> tuple[str, ...]:
-    """What to say of columns that give what another one is read for: `yaw_rad` beside `yaw_deg`.
+    """What to say of columns that give what another one is read for: `yaw_rad` beside `yaw_deg`."""
+    return tuple(
+        f"{name} was not read, as {found[si][0]} is there too"
+        for name, si in rivals(header, found, mapping)
+    )
 
-    A column that the spec maps is meant, and nothing is said of its rivals.
+
+def rivals(
+    header: Iterable[str], found: Mapping[str, tuple[str, float]], mapping: Mapping[str, str]
+) -> tuple[tuple[str, str], ...]:
+    """(column, SI name) of columns that give what another one is read for.
+
+    A column that the spec maps is meant, and has none.
     """
     meant = {_as_found(name) for name in mapping}
-    notes = []
-    for name in header:
-        si = _as_found(name)
-        if si in found and found[si][0] != name and si not in meant:
-            notes.append(f"{name} was not read, as {found[si][0]} is there too")
-    return tuple(notes)
+    named = [(name, _as_found(name)) for name in header]
+    return tuple(
+        (name, si) for name, si in named if si in found and found[si][0] != name and si not in meant
+    )
 
 
 def _as_found(name: str) -> str:

@@ -18,6 +18,7 @@ MOST_KEPT = 500_000  # rows of one file that are held in memory
 WINDOWS = 40
 LONGEST_S = 1e8  # a log longer than three years has its stamps in the wrong unit
 LARGEST = 4  # times as many rows in windows as there should be are one stamp's
+BACKWARDS = 0.9  # share of the steps: the file was written from its end
 STRAY = 0.01  # share of rows out of order up to which they are strays, and not the file's order
 MARGIN_S, MARGIN_STEPS = 2.0, 3.0  # beyond a window, of files that are interpolated
 
@@ -86,7 +87,7 @@ def _demand_sense(path: Path, finite: Array) -> None:
             raise refuse(path, "no time stamps", field=TIME, found="empty column")
         raise refuse(path, "one time stamp only", field=TIME, expected="two or more")
     back = int(np.count_nonzero(finite[1:] < finite[:-1]))
-    if back > 0.5 * (finite.shape[0] - 1):
+    if back > BACKWARDS * (finite.shape[0] - 1):  # half of them is a file in no order at all
         raise refuse(path, "time runs backwards", field=TIME, hint="reverse the rows")
     if finite.max() == finite.min():
         raise refuse(path, "time stands still", field=TIME, found=f"{finite[0]:.9g} s throughout")

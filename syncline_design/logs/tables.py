@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -18,17 +18,20 @@ from syncline_design.logs.columns import (
     known_names,
     named_column,
     passed_over,
+    rivals,
     si_columns,
 )
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.row_choice import Arranged, arranged, thinned
 from syncline_design.logs.runs import demand_one_run
-from syncline_design.logs.sources import NANOSECONDS, Clock, RowSource, opened
+from syncline_design.logs.sources import NANOSECONDS, Clock, Mask, RowSource, opened
 from syncline_design.logs.surveys import Survey, has_places, is_survey, joined, survey_of
-from syncline_design.model.quantity import si_name
+from syncline_design.model.quantity import format_estimate, si_name, suffix_unit
 from syncline_design.spec.fields import did_you_mean
+from syncline_design.spec.load import BadInput
 
 DAY = 86_400 * NANOSECONDS
+UNLIKE = 0.002  # rad, or share of the usual figure, by which a quantity given twice differs
 Slip = tuple[Sequence[str], float]  # files with one of these columns have stamps ahead by so much
 
 
@@ -63,6 +66,7 @@ class _Open:
     seconds: Array
     day: int | None
     notes: tuple[str, ...]
+    rivals: tuple[tuple[str, str], ...] = ()
 
 
 def read_tables(
@@ -135,7 +139,8 @@ def _opened(source: RowSource, mapping: Mapping[str, str], stages: tuple[str, ..
     seconds, day, said = _seconds(path, name, factor, clock)
     if not seconds.shape[0]:
         raise refuse(path, "no rows below the header", line=2, column=1)
-    return _Open(source, found, seconds, day, (*notes, *said))
+    twice = rivals(source.header, found, mapping)
+    return _Open(source, found, seconds, day, (*notes, *said), twice)
 
 
 def _with_absent(files: list[_Open], mapping: Mapping[str, str], surveyed: set[str]) -> list[_Open]:
@@ -208,6 +213,31 @@ def _on_one_scale(files: list[_Open]) -> list[_Open]:
     return [replace(moved[0], notes=(*moved[0].notes, note)), *moved[1:]]
 
 
+def _unlike(file: _Open, keep: Mask, place: Array, columns: Mapping[str, Array]) -> Iterator[str]:
+    """What to say of a quantity that is given twice and not alike."""
+    for name, si in file.rivals:
+        if si in (TIME, TARGET_ID):
+            continue
+        try:
+            other = file.source.numbers([name], keep)[name][place] * suffix_unit(name)[0]
+        except BadInput:  # no figures: nobody reads them
+            continue
+        angle = si.endswith("_rad")
+        apart = other - columns[si]
+        apart = np.abs((apart + np.pi) % (2.0 * np.pi) - np.pi) if angle else np.abs(apart)
+        size = float(np.nanmedian(apart)) if np.any(np.isfinite(apart)) else 0.0
+        usual = 1.0 if angle else float(np.nanmedian(np.abs(columns[si])))
+        if size > UNLIKE * usual:
+            shown = format_estimate(size, None, "rad" if angle else _si_unit(si))
+            yield f"{file.found[si][0]} and {name} differ by {shown} in the median"
+
+
+def _si_unit(si: str) -> str:
+    """The unit that an SI name ends in, as it is written."""
+    suffix = si.rsplit("_", 1)[-1]
+    return {"mps": "m/s", "radps": "rad/s"}.get(suffix, suffix)
+
+
 def _table(file: _Open, rows: Arranged) -> LogTable:
     """The columns of the rows that are worked on."""
     keep = np.zeros(rows.rows, dtype=bool)
@@ -222,6 +252,7 @@ def _table(file: _Open, rows: Arranged) -> LogTable:
     if rows.pieces is not None:
         demand_one_run(file.source.path, columns, rows.order, rows.pieces)
     rejected, notes, count = dict(rows.rejected), [*file.notes, *rows.notes], rows.rows
+    notes += _unlike(file, keep, place, columns)
     if file.source.cut:
         rejected["cut off in the last row"] = 1
         count += 1
