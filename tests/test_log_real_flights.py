@@ -13,6 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 
+from syncline_design.diagnosis import diagnose
+from syncline_design.logs.inspection import inspect_logs
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.stream import Stream
 
@@ -157,3 +159,63 @@ def test_a_laser_scan_says_when_its_points_were_measured() -> None:
     scan = streams_of("rosbag1/sick_rms_lms.bag")["/sick_lms_1xx/scan"]
     assert scan.points is not None
     assert scan.points.last_s == pytest.approx(0.015, abs=1e-6)
+
+
+PARTS: dict[tuple[str, ...], tuple[str, str, str]] = {  # kind, position, reference
+    ("mcap/test1_60s.mcap",): ("position", "/fix", HUSKY),
+    ("ulog/test_ulog.ulg",): ("position", "vehicle_gps_position[0]", "vehicle_local_position[0]"),
+    ("ulog/sample_px4_events.ulg",): (
+        "position", "vehicle_gps_position[0]", "vehicle_local_position[0]",
+    ),
+    ("dataflash/sample.bin",): ("position", "GPS", "NKF1"),
+    ("pos/rover_1Hz_rtk.pos", "pos/reference.csv"): ("position", "rover_1Hz_rtk", "reference"),
+    ("trajectory/v2_03_mono.txt", "trajectory/v2_03_stereo.txt"): (
+        "pose", "v2_03_mono", "v2_03_stereo",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("names", PARTS, ids=lambda names: names[0])
+def test_a_mapping_is_proposed_for_every_file_that_diagnose_can_use(names: tuple[str, ...]) -> None:
+    kind, position, reference = PARTS[names]
+    proposal = inspect_logs([DATA / name for name in names]).proposal
+    assert (proposal.kind, proposal.lacking) == (kind, ())
+    assert proposal.log["streams"]["position"] == position
+    assert proposal.log["streams"]["reference"] == reference
+    assert proposal.conversions
+
+
+def test_a_stray_stamp_is_told_and_a_log_without_positions_is_no_reference() -> None:
+    found = inspect_logs([DATA / "ulog/sample_log_small.ulg"])
+    notes = {s.name: s.notes for s in found.streams}
+    assert any("off those of the file's other streams" in n for n in notes["mission[0]"])
+    assert "1 of 1 stamps are 0 or not set" in notes["test_motor[0]"]
+    assert "never holds a valid position" in found.proposal.lacking[0]
+
+
+def test_rates_of_the_odometry_come_half_a_second_late(tmp_path: Path) -> None:
+    """The oracle is plain correlation: the logged rate against the slope of the logged heading."""
+    recording = open_recording(DATA / "rosbag1/test1.bag")
+    pieces = list(recording.samples(HUSKY))
+    c = {n: np.concatenate([p.columns[n] for p in pieces]) for n in pieces[0].columns}
+    w, z = c["quaternion_w"], c["quaternion_z"]
+    x, y = c["quaternion_x"], c["quaternion_y"]
+    heading = np.unwrap(np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)))
+    slope, rate = np.gradient(heading), c["rate_z_radps"]
+    lags = range(11)
+    best = max(lags, key=lambda k: np.corrcoef(slope[: len(slope) - k], rate[k:])[0, 1])
+    assert best == 5  # tenths of a second: a mean over ten wheel readings
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(
+        "syncline: 1\nname: robot\n"
+        "requirements: [{id: A, kind: accuracy, limit: 1 m}]\n"
+        "stages:\n  - name: robot\n"
+        "    platform: {v_max: 1.5 m/s, omega_max: 60 deg/s, distance: 10 m, baseline: 0.5 m}\n"
+        "    position:\n"
+        "      sensor: {modality: position, type: gnss, sigma_position: 0.3 m, primitives: [pps]}\n"
+        "      primitive: pps\n"
+        "      timestamping: {error: {distribution: uniform, low: -1 us, high: 1 us}}\n",
+        "utf-8",
+    )
+    found = diagnose(spec, [DATA / "mcap/test1_60s.mcap"])
+    assert any("500 ms late" in check.message for check in found.checks)

@@ -165,6 +165,7 @@ def _reference(
         key=lambda o: (
             not _same_kind(o, tested),
             *_reference_rank(o)[:2],
+            o.has("velocity"),
             globe and o.stream.frame == "wgs84",
             o.stream.messages,
         ),

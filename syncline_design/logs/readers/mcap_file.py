@@ -21,6 +21,9 @@ from syncline_design.logs.readers.ros_types import Channel, Encoding, modern
 MAGIC = b"\x89MCAP0\r\n"
 FORMAT = "MCAP file"
 MOST_RECORD = 1 << 28
+MESSAGE = 5  # the kind of record
+_RECORD = struct.Struct("<BQ")  # kind, length
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 ENCODINGS: dict[tuple[str, str], Encoding] = {
     ("cdr", "ros2msg"): "cdr",
     ("cdr", "ros2idl"): "cdr",
@@ -47,8 +50,7 @@ class McapFile(Container):
             for record in self._of(file, whole=True):
                 if isinstance(record, self._records.Chunk):
                     data = self._unpacked(record, budget)
-                    for inner in self._of(BytesIO(data), whole=False):
-                        yield from self._one(inner)
+                    yield from self._of_chunk(data)
                 elif isinstance(record, self._records.DataEnd):
                     ended = True
                     break
@@ -62,8 +64,31 @@ class McapFile(Container):
         if not ended:
             raise DamagedError("the file was not closed: its data have no end")
 
+    def _of_chunk(self, data: bytes) -> Iterator[RawMessage]:
+        """The records of an unpacked chunk; messages are taken apart here, which is quicker."""
+        at, end = 0, len(data)
+        while at < end:
+            if at + _RECORD.size > end:
+                raise DamagedError("cut off within a record of a chunk")
+            kind, length = _RECORD.unpack_from(data, at)
+            body, at = at + _RECORD.size, at + _RECORD.size + length
+            if at > end:
+                raise DamagedError("a record reaches beyond its chunk")
+            if kind != MESSAGE:
+                for inner in self._of(BytesIO(data[body - _RECORD.size : at]), whole=False):
+                    yield from self._one(inner)
+                continue
+            if length < _MESSAGE.size:
+                raise DamagedError("a message without its times")
+            number, _, log_ns, publish_ns = _MESSAGE.unpack_from(data, body)
+            channel = self._channels.get(number)
+            if channel is None:
+                raise DamagedError("a message of no known channel")
+            if self.wanted is None or channel.topic == self.wanted:
+                yield RawMessage(channel, log_ns, publish_ns, data[body + _MESSAGE.size : at])
+
     def _of(self, file: Any, whole: bool) -> Iterator[Any]:
-        """The records of a file, or of an unpacked chunk, which has no magic and simply ends."""
+        """The records of a file, or some of a chunk, which have no magic and simply end."""
         exceptions = library("mcap.exceptions", self.path, FORMAT)
         reader = self._stream.StreamReader(
             file, skip_magic=not whole, emit_chunks=True, record_size_limit=MOST_RECORD

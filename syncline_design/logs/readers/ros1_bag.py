@@ -146,7 +146,10 @@ class _Alike:
 
     def fits(self, data: bytes, at: int) -> bool:
         """Whether a header of the same form begins there."""
-        return all(data[at + a : at + b] == fixed for a, b, fixed in self._fixed)
+        for a, b, fixed in self._fixed:  # noqa: SIM110  called for every message
+            if data[at + a : at + b] != fixed:
+                return False
+        return True
 
 
 def _record_head(file: BinaryIO) -> tuple[Fields, int]:
