@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.spatial.transform import Rotation
 
 Columns = dict[str, NDArray[np.float64]]
@@ -27,7 +28,8 @@ def _late(names: tuple[str, ...], late_s: float) -> Callable[[Columns], None]:
             angle = name.endswith("_deg")
             values = np.degrees(np.unwrap(np.radians(log[name]))) if angle else log[name]
             first = np.unique(time_s, return_index=True)[1]
-            log[name] = np.interp(time_s - late_s, time_s[first], values[first])
+            spline = CubicSpline(time_s[first], values[first])  # straight lines would smooth
+            log[name] = spline(np.maximum(time_s - late_s, time_s[0]))
 
     return plant
 

@@ -11,7 +11,7 @@ from syncline_design.diagnosis.noise import Directed
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
-from syncline_design.effects.record import Array, Effect, Target
+from syncline_design.effects.record import SELDOM, Array, Effect, Target
 from syncline_design.model.system import Stage
 
 STEP_TIMES = 24  # places along the log where a step is looked for at first
@@ -114,7 +114,10 @@ def _is_noise_of_heading(view: Scene, effect: Effect, index: int) -> bool:
 def commonness(label: tuple[str, str, int]) -> tuple[int, int]:
     """How seldom it is met; sensors in the order position, attitude, ranging, target."""
     name, sensor, _ = label
-    return registry()[name].rarity, ("position", "attitude", "ranging", "target").index(sensor)
+    known = registry().get(name)  # a wave has no cause that could be common
+    return known.rarity if known else SELDOM, ("position", "attitude", "ranging", "target").index(
+        sensor
+    )
 
 
 def zero_values(effect: Effect, at: dict[str, float] | None = None) -> dict[str, float]:

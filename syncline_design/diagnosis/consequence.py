@@ -121,7 +121,7 @@ class Weights:
 
     def material(self, size_m: float, entry: EffectEntry) -> bool:
         """Whether a finding of this RMS is."""
-        if size_m >= SHARE * self.spec_m or self.promise is None:
+        if size_m >= SHARE * self.spec_m or self.promise is None or entry.effect not in registry():
             return size_m >= SHARE * self.spec_m
         raised = self.promise.total_m([entry]) > (1.0 + RAISED) * self.promise.total_m()
         return raised or self.promise.turned([entry])

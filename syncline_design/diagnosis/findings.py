@@ -13,6 +13,7 @@ from syncline_design.diagnosis.consequence import Weights, rms_m
 from syncline_design.diagnosis.fitting import Data, Model, Opened, bounds_of
 from syncline_design.diagnosis.gross import Gross
 from syncline_design.diagnosis.identify import Alias, Comparison
+from syncline_design.diagnosis.lines import wave_of
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
     clipped,
@@ -84,7 +85,7 @@ def finding(
         confused_with=effect.confused_with,
         separated_by=effect.separated_by,
         source=effect.source,
-        kind="noise" if is_noise(effect) else "cause",
+        kind="stand_in" if wave_of(effect) else "noise" if is_noise(effect) else "cause",
         material=material,
         size_m=size_m,
         probability=_probability(rivals[0]) if rivals[0] else None,
@@ -154,6 +155,10 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
             interval = (value - half, value + half) if seen else None
             at += 1
         found[p.name] = estimate(value, spread, p.unit, seen, interval)
+    wave = wave_of(one.effect)
+    if wave is not None:
+        said = wave.shown({p.name: one.values[p.name] for p in one.effect.parameters})
+        found = {name: estimate(value, None, unit) for name, (value, unit) in said.items()}
     others = tuple(a for a in model.acting if a.label != one.label)
     size_m = rms_m(final.data, final.data.error(others) - model.error)
     named = _finding(final, one.effect, one.label, found, size_m, weights)

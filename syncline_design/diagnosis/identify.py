@@ -19,6 +19,7 @@ from syncline_design.effects.record import Array, Effect
 
 Label = tuple[str, str, int]
 SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
+NEAR = 0.97  # above which another is refitted in its place: first order is not the last word
 CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
 MOST_REFITTED = 8
 RIVAL_COSINE = 0.7  # from which a rival that fits as well is said not to be told apart
@@ -76,7 +77,7 @@ def competed(
     model has to be fitted.
     """
     screened, found = _screened(data, model, label, others)
-    near = [a for a in screened if a.cosine > SAME or a.fit < RIVAL_NATS]
+    near = [a for a in screened if a.cosine > NEAR or a.fit < RIVAL_NATS]
     near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]
     rest = without(model, label)
     fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)

@@ -124,9 +124,14 @@ class Finding(Record):
     @property
     def fits_a_spec(self) -> bool:
         """Whether a spec can hold it."""
-        effect = registry()[self.effect]
-        return self.sensor in effect.sensors and all(
-            p.misfit(self.parameters[p.name].value, self.sensor) is None for p in effect.parameters
+        effect = registry().get(self.effect)
+        return (
+            effect is not None
+            and self.sensor in effect.sensors
+            and all(
+                p.misfit(self.parameters[p.name].value, self.sensor) is None
+                for p in effect.parameters
+            )
         )
 
     def as_entries(self) -> tuple[EffectChoice, ...]:

@@ -181,8 +181,9 @@ def _weighed_up(
     named = findings(result.final, faults, weights, left)
     if untouched is not None:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
-    causes = [entry_of(one) for one in named if one.kind != "noise" and one.material]
-    material = left and weights.left(rest.size_m, causes)
+    causes = [entry_of(one) for one in named if one.kind == "cause" and one.material]
+    waves = [one for one in named if one.kind == "stand_in" and one.material]
+    material = bool(waves) or (left and weights.left(rest.size_m, causes))
     if material:
         named = stand_ins(named, data, result.model, rest.size_m)
     after = where_map(data.view, result.model.error, result.model.precision)

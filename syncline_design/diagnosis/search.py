@@ -24,6 +24,7 @@ from syncline_design.diagnosis.candidates import (
     signatures,
 )
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
+from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settling import Settled, settle
@@ -155,10 +156,12 @@ class Search:
     def best(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
         """The candidate that best explains what is left, its noise fitted anew; none beats chance.
 
-        Effects that move the mean go first.
+        Effects that move the mean go first, then waves without a name, then noise.
         """
         moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
+        if not kept and (wave := self.wave_trial(model)) is not None:
+            return wave
         if not kept:
             scattering = [t for t in self.scatter_trials(model) if plausible(self.data, t.model)]
             kept = [t for t in scattering if t.log_p <= threshold]
@@ -208,6 +211,19 @@ class Search:
         fitted = with_effect(self.data, model, found, level)
         freedom = freedom_of(found.candidate.effect)
         return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
+
+    def wave_trial(self, model: Model) -> Trial | None:
+        """The model with a wave that stands out of what is left, before any noise takes it up."""
+        if LINE in self.settings.exclude_effects:
+            return None
+        found = best_wave(self.data, model)
+        if found is None:
+            return None
+        (judged,) = self.states.judged(model, [found.columns])
+        if not judged.log_p < self.chance(len({s.candidate.label for s in self.signatures})):
+            return None
+        trial = self.trial(model, found, model.level)
+        return trial if trial.gain > WANDER_NATS else None
 
     def scatter_trials(self, model: Model) -> list[Trial]:
         """Candidates that only change the covariance, if a rough guess gains anything."""

@@ -1,0 +1,65 @@
+"""Waves in one reading are said as what they are, with their pace, and are no cause."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.diagnosis import diagnose
+from syncline_design.diagnosis.result import Diagnosis
+from tests.world import make_log, scenario
+
+Columns = dict[str, np.ndarray]
+
+
+def heave(log: Columns) -> None:
+    log["position_down_m"] = log["position_down_m"] + 0.06 * np.sin(log["time_s"] * 2 * np.pi / 7.0)
+
+
+def cyclic(log: Columns) -> None:
+    log["range_m"] = log["range_m"] + 0.03 * np.cos(log["range_m"] * 2 * np.pi / 0.8)
+
+
+def soft_iron(log: Columns) -> None:
+    twice = 2.0 * np.radians(log["yaw_deg"])
+    log["yaw_deg"] = log["yaw_deg"] + 0.25 * np.sin(twice + 0.4)
+
+
+WAVES: dict[str, tuple[Callable[[Columns], None], str, dict[str, float], str]] = {
+    "heave": (heave, "position", {"period_s": 7.0, "amplitude_m": 0.06}, "down"),
+    "cyclic": (cyclic, "ranging", {"wavelength_m": 0.8, "amplitude_m": 0.03}, "range"),
+    "soft iron": (
+        soft_iron, "attitude", {"harmonic": 2.0, "amplitude_rad": np.radians(0.25)}, "yaw"),
+}  # fmt: skip
+
+
+def asked(plant: Callable[[Columns], None] | None, folder: Path) -> Diagnosis:
+    log = make_log(scenario("car_stops", 4, 100.0, 5.0))
+    columns = {name: values.astype(float) for name, values in log.columns.items()}
+    if plant is not None:
+        plant(columns)
+    spec = folder / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    return diagnose(spec, [replace(log, columns=columns).to_csv(folder / "log.csv")])
+
+
+@pytest.mark.parametrize("name", WAVES)
+def test_a_wave_is_a_stand_in_with_its_pace_and_channel(name: str, tmp_path: Path) -> None:
+    plant, sensor, truth, channel = WAVES[name]
+    found = asked(plant, tmp_path)
+    (one,) = found.findings
+    assert (one.effect, one.sensor, one.kind) == ("spectral_line", sensor, "stand_in")
+    assert one.parameters["channel"].value == channel
+    for key, value in truth.items():
+        close = 0.01 if not key.startswith("amplitude") else 0.15
+        assert one.parameters[key].value == pytest.approx(value, rel=close)
+    assert found.verdict == "unexplained"
+    assert found.effects_entries() == ()
+
+
+def test_noise_makes_no_wave(tmp_path: Path) -> None:
+    assert asked(None, tmp_path).findings == ()
