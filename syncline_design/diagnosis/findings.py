@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from syncline_design.diagnosis.candidates import EDGE
 from syncline_design.diagnosis.consequence import Weights, rms_m
 from syncline_design.diagnosis.fitting import Data, Model, Opened, bounds_of
 from syncline_design.diagnosis.gross import Gross
@@ -35,6 +36,7 @@ WORDS = {"position": "position", "attitude": "attitude", "ranging": "range", "ta
 MOST_EXCLUDED = 4
 ONE_VALUE = 0.001  # chance below which a parameter is not one value along the log
 VARIES = 0.1  # of its value, by which it has to vary to be said to
+EDGE_SHARE = 0.02  # of the log
 MOST_NATS = 300.0
 NOT_SEEN = "(not seen)"
 
@@ -162,7 +164,19 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
     others = tuple(a for a in model.acting if a.label != one.label)
     size_m = rms_m(final.data, final.data.error(others) - model.error)
     named = _finding(final, one.effect, one.label, found, size_m, weights)
+    if _at_the_edge(final, one):
+        named = replace(named, kind="stand_in")
     return replace(named, varying=_varying(final, one))
+
+
+def _at_the_edge(final: Settled, one: Acting) -> bool:
+    """Whether it begins as early or as late as is looked for: it stands for what always acts."""
+    time_s = final.data.view.log.time_s
+    since = time_s - time_s[0]
+    ends = np.quantile(since, [EDGE, 1.0 - EDGE])
+    near = EDGE_SHARE * float(since[-1])
+    places = [float(one.values[p.name]) for p in one.effect.parameters if p.located]
+    return any(bool(np.min(np.abs(ends - place)) < near) for place in places)
 
 
 def _varying(final: Settled, one: Acting) -> tuple[Stretch, ...] | None:

@@ -1,4 +1,4 @@
-"""Waves in one reading are said as what they are, with their pace, and are no cause."""
+"""What is no cause is not called one: waves in one reading, and steps that stand for a delay."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.diagnosis import diagnose
+from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.diagnosis.result import Diagnosis
-from tests.world import make_log, scenario
+from tests.world import hidden, make_log, scenario
 
 Columns = dict[str, np.ndarray]
 
@@ -63,3 +63,17 @@ def test_a_wave_is_a_stand_in_with_its_pace_and_channel(name: str, tmp_path: Pat
 
 def test_noise_makes_no_wave(tmp_path: Path) -> None:
     assert asked(None, tmp_path).findings == ()
+
+
+def test_a_step_as_early_as_is_looked_for_stands_for_a_delay(tmp_path: Path) -> None:
+    """A delay that the dictionary must not name acts from the first row on."""
+    late = hidden("latency", "position", latency_s=0.01)
+    log = make_log(scenario("multirotor_lines", 9, 100.0, 5.0), (late,))
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    less = ("latency", "packetised_timestamps", "filter_lag")
+    settings = DiagnosisSettings(exclude_effects=less)
+    found = diagnose(spec, [log.to_csv(tmp_path / "log.csv")], settings)
+    assert found.verdict == "unexplained"
+    assert all(one.kind == "stand_in" for one in found.findings if one.effect == "timestamp_step")
+    assert found.effects_entries() == ()
