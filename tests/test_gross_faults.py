@@ -117,7 +117,7 @@ FAULTS: dict[str, tuple[Fault, str]] = {
 SHIFTS = {
     "slip": (late(names("position"), 1.0), ("integer_second_slip", "position"), 1.0),
     "long slip": (late(names("position"), 18.0), ("integer_second_slip", "position"), 18.0),
-    "two clocks": (late(names("position"), 12.8), ("latency", "position"), 12.8),
+    "two clocks": (late(names("position"), 12.5), ("latency", "position"), 12.5),
     "late attitudes": (late([*ANGLES, *RATES], 2.0), ("latency", "attitude"), 2.0),
 }
 

@@ -35,6 +35,7 @@ SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of secon
 SEARCHED_TO = 0.1  # what is searched so widely has to help so much
 FAR_BETTER = 0.5  # of the error of the best fault of the list
 SHORT_SHIFT_S = 0.5  # a shorter shift of stamps is a latency, to be fitted
+MOST_DELAY_S = 0.25  # that a slip may have beside it
 NEARLY_FREE = 2.0  # the same for what is searched
 NEARLY_NOISE = 1.05  # times the expected size: what is left after a short slip has to be so little
 
@@ -283,12 +284,14 @@ def _shifts(
 
 
 def _shift_named(shift: Shift) -> Acting:
-    """Whole seconds of the positions are a slip, anything else a delay."""
-    seconds = float(round(shift.seconds)) if shift.whole else shift.seconds
+    """Whole seconds are a slip where a sensor can have one, with a delay beside it; else a delay."""
+    whole = float(round(shift.seconds))
     slip = _undone(by_mending=False)
     assert slip.undoing is not None
-    as_delay = registry()[slip.undoing.instead_of]
-    effect = slip if shift.whole and shift.sensor in slip.sensors else as_delay
+    beside = abs(shift.seconds - whole) <= MOST_DELAY_S and abs(whole) > SHORT_SLIP
+    slipped = shift.sensor in slip.sensors and (shift.whole or beside)
+    effect = slip if slipped else registry()[slip.undoing.instead_of]
+    seconds = whole if slipped or shift.whole else shift.seconds
     return Acting(effect, shift.sensor, 0, {effect.parameters[0].name: seconds})
 
 
