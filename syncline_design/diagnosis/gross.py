@@ -284,7 +284,7 @@ def _shifts(
 
 
 def _shift_named(shift: Shift) -> Acting:
-    """Whole seconds are a slip where a sensor can have one, with a delay beside it; else a delay."""
+    """Whole seconds are a slip where a sensor can have one, a delay beside it; else a delay."""
     whole = float(round(shift.seconds))
     slip = _undone(by_mending=False)
     assert slip.undoing is not None
