@@ -225,6 +225,40 @@ def test_a_scan_whose_last_point_lies_behind_its_receipt_is_stamped_at_its_end()
     assert (declared.parameters["kind"], declared.counts) == ("declared", False)
 
 
+@pytest.mark.parametrize("rate", [10.0, 50.0, 200.0])
+def test_duplicates_of_a_sensor_at_exact_epochs_are_not_taken_for_truncation(rate: float) -> None:
+    bench = Bench(rate=rate)
+    for k in (41, 160, 222, 305, 411):
+        bench.stamp[k] = bench.stamp[k - 1]
+    assert only(bench.audited(), "duplicates").parameters["count"] == 5.0
+
+
+@pytest.mark.parametrize(
+    ("seconds", "kind"),
+    [(37.0, "tai"), (3600.0, "time_zone"), (-3600.0, "time_zone"), (-1.69e9, "boot")],
+)
+def test_an_epoch_that_changes_in_the_middle_is_named_from_there_on(
+    seconds: float, kind: str
+) -> None:
+    bench = Bench(length=30.0)
+    bench.stamp[1000:] += seconds
+    fault = only(bench.audited(), "epoch_offset")
+    assert fault.parameters["kind"] == kind
+    assert fault.parameters["seconds"] == pytest.approx(seconds, abs=0.01)
+    assert fault.from_s == pytest.approx(10.0, abs=0.02)
+    assert fault.to_s == pytest.approx(29.99, abs=0.02)
+
+
+def test_a_host_that_stands_still_is_no_fault_of_the_stream() -> None:
+    bench = Bench()
+    arrived = bench.true + bench.late
+    for begin, length in ((12.0, 1.4), (31.0, 1.1), (33.5, 0.4)):
+        held = (arrived > begin) & (arrived < begin + length)
+        arrived = np.where(held, begin + length, arrived)
+    bench.late = arrived - bench.true
+    assert bench.audited().faults == ()
+
+
 # ---- streams together -----------------------------------------------------------------------
 
 

@@ -11,8 +11,10 @@ from syncline_design.auditing.series import Array, Mask, scatter, spread
 
 MOST_BLOCKS: Final = 180
 LEAST_MESSAGES: Final = 10  # of a block
+FEW, LEAST_OF_FEW = 160, 6  # a log of so few messages makes do with smaller blocks
 LOW: Final = 25.0  # per cent
 _GAP: Final = 3.0  # of the usual length: a block with a gap in it lies nowhere
+_BACKLOG: Final = 0.3  # of the usual length
 _STEEP: Final = 1.0  # of the spread: how much a course may rise within a block
 LOADED_FEW: Final = 7.0  # over the messages of a block: how much more chance alone gives few
 LOADED: Final = 1.7  # a spread so many times the usual: the host is busy, delays are longer
@@ -43,7 +45,8 @@ class Blocks:
 
 def blocks_of(time_s: Array, late_s: Array) -> Blocks | None:
     """Blocks of equal numbers of messages; None where there are too few."""
-    count = min(MOST_BLOCKS, time_s.size // LEAST_MESSAGES)
+    least = LEAST_MESSAGES if time_s.size >= FEW else LEAST_OF_FEW
+    count = min(MOST_BLOCKS, time_s.size // least)
     if count < 8:
         return None
     edges = np.linspace(0, time_s.size, count + 1).astype(np.intp)
@@ -54,10 +57,11 @@ def blocks_of(time_s: Array, late_s: Array) -> Blocks | None:
         low[k], width[k] = _level(time_s[part] - middle[k], late_s[part])
     usual = float(np.median(width))
     loaded = LOADED + LOADED_FEW * count / time_s.size
-    usable = _calm(_around(width) < loaded * usual + 1e-12)
     span = time_s[edges[1:] - 1] - time_s[edges[:-1]]
-    whole = span <= _GAP * float(np.median(span)) + 1e-12
-    usable &= ~_stray(low, _noise(low)) & whole
+    typical = float(np.median(span))
+    waited = span < _BACKLOG * typical  # messages that came at once, after the host stood still
+    usable = _calm((_around(width) < loaded * usual + 1e-12) & ~waited)
+    usable &= ~_stray(low, _noise(low)) & (span <= _GAP * typical + 1e-12)
     return Blocks(middle, low, usable, max(_noise(low), 1e-10), usual, edges)
 
 

@@ -84,11 +84,9 @@ def _alternates(stamp: np.ndarray, grain: int) -> bool:
     if usual == 0:
         return True
     near = (np.abs(counts - usual) <= 1) & (counts != usual)
-    multiples = counts % usual == 0
-    odd = int(np.sum(near & ~multiples)) + (int(np.sum(near)) if usual == 1 else 0)
-    if usual == 1:  # of 0 and 2 grains beside 1, 0 cannot be a lost message
-        odd = int(np.sum(counts == 0)) if grain <= _FINE else 0
-    return odd >= 3 or (usual == 1 and skips_evenly(counts))
+    if usual == 1:  # of 0 and 2 grains beside 1: duplicates and losses, unless they come evenly
+        return skips_evenly(counts) or (grain <= _FINE and _evenly(np.flatnonzero(counts == 0)))
+    return int(np.sum(near & (counts % usual != 0))) >= 3
 
 
 def skips_evenly(counts: Array) -> bool:
@@ -96,8 +94,15 @@ def skips_evenly(counts: Array) -> bool:
     skips = np.flatnonzero(counts == 2)
     if skips.size < 6 or float(np.mean((counts == 1) | (counts == 2))) < 0.99:
         return False
-    apart = np.diff(skips)
-    return bool(spread(apart) < _EVENLY * float(np.median(apart)))
+    return _evenly(skips)
+
+
+def _evenly(places: np.ndarray) -> bool:
+    """Whether places come at even distances, as a beat makes them."""
+    if places.size < 6:
+        return False
+    apart = np.diff(places)
+    return bool(spread(apart) <= max(1.0, _EVENLY * float(np.median(apart))))
 
 
 def _grain(series: Series, pace: Cadence, grain: int) -> Grain:

@@ -20,13 +20,15 @@ from syncline_design.auditing.result import (
     SmallestSeen,
     StampFault,
 )
-from syncline_design.auditing.series import NS, Array, Series, seconds, series_of
+from syncline_design.auditing.series import NS, Array, Mask, Series, seconds, series_of
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
 
 RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
 _SAMPLE: Final = 100_000  # messages that tell a resolution
+LARGE_SLIP_S: Final = 15.0  # from here on another epoch, no pulse of the wrong second
+EDGE_S: Final = 1.5  # how near to the end of a shift a repeated stamp is its own
 TRACE_POINTS: Final = 240
 _NONE: Final = Stamps("", None, np.zeros(0, np.int64))
 _LARGE_STEP_NS: Final = 1e6
@@ -72,9 +74,13 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     found[:] = _with_epoch(found, _as_declared(epoch, stream))
     known = _known(epoch, series, unit is not None)
     slips = without_slips(series, known)
+    if any(abs(float(f.parameters["seconds"])) >= LARGE_SLIP_S for f in slips.faults):
+        slips, base = _as_epochs(slips, series, epoch)
+        found = [f for f in found if f is not epoch]
+        known = _known(base, slips.series, False)
     least = max(_coarse(raw), grain.size_s if grain is not None else 0.0)
     moved = without_shifts(slips.series, least_s=least)
-    found += [*slips.faults, *moved.faults]
+    found = _with_jumps(found, [*slips.faults, *moved.faults])
     series = moved.series
     pace = cadence(series)
     _last(series, pace, stream, known, grain, found)
@@ -142,6 +148,55 @@ def _with_alike(series: Series, arrived: StampFault) -> StampFault:
     alike = order.without_duplicates(series).faults
     follows = tuple(Consequence("duplicates", f.parameters, f.evidence) for f in alike)
     return replace(arrived, consequences=follows)
+
+
+def _as_epochs(
+    slips: Shifts, series: Series, whole: StampFault | None
+) -> tuple[Shifts, StampFault | None]:  # fmt: skip
+    """Slips of many seconds are stretches of another epoch; the stretch without one is right.
+
+    Returns them with the epoch of what was taken as the base.
+    """
+    times = series.seconds
+    large = [f for f in slips.faults if abs(float(f.parameters["seconds"])) >= LARGE_SLIP_S]
+    inside = [_within(f, times) for f in large]
+    rest = series.good & ~np.logical_or.reduce(inside)
+    base = epoch_fault(replace(series, good=rest))
+    faults = [f for f in slips.faults if f not in large]
+    right = base is None
+    for slip, mask in zip(large, inside, strict=True):
+        own = epoch_fault(replace(series, good=series.good & mask))
+        if own is not None:
+            faults.append(replace(own, from_s=slip.from_s, to_s=slip.to_s))
+        elif base is None:
+            faults.append(slip)
+        right |= own is None
+    if base is not None:
+        ends = times[rest][[0, -1]]
+        spans = (None, None) if not right or base is whole else (float(ends[0]), float(ends[1]))
+        faults.append(replace(base, from_s=spans[0], to_s=spans[1]))
+    return replace(slips, faults=tuple(faults)), base
+
+
+def _within(fault: StampFault, times: Array) -> Mask:
+    begin, end = fault.from_s or 0.0, fault.to_s or 0.0
+    last = bool(end >= times[-1])
+    return np.asarray((times >= begin) & ((times < end) | last))
+
+
+def _with_jumps(found: list[StampFault], jumps: list[StampFault]) -> list[StampFault]:
+    """Shifts beside what was found; a stamp that comes twice where one ends is its consequence."""
+    twice = [f for f in found if f.fault == "duplicates"]
+    edges = [e for f in jumps for e in (f.from_s, f.to_s) if e is not None]
+    if not twice or not edges or float(twice[0].parameters["count"]) > len(edges):
+        return [*found, *jumps]
+    near = [min(abs(e - at) for e in edges) for at in (twice[0].from_s, twice[0].to_s)
+            if at is not None]  # fmt: skip
+    if max(near) > EDGE_S:
+        return [*found, *jumps]
+    follows = Consequence("duplicates", twice[0].parameters, twice[0].evidence)
+    first = replace(jumps[0], consequences=(*jumps[0].consequences, follows))
+    return [*(f for f in found if f is not twice[0]), first, *jumps[1:]]
 
 
 def _known(epoch: StampFault | None, series: Series, unit: bool) -> float | None:

@@ -89,6 +89,7 @@ def on_audit(result: Audit) -> Document:
             *section("streams", "Streams", show(_streams(result), silent=True)),
             *section("left", "What is left once every named fault is out",
                      show(_left(result), silent=True), "Residuals"),
+            *section("roles", "What each stream was taken as", _roles(result), "Roles"),
             *section("open", "What these stamps cannot show", _open(result), "Cannot show"),
             *section("notes", "Notes", [Items(tuple(given(n) for n in result.notes))]
                      if result.notes else []),
@@ -250,12 +251,21 @@ def _ppm(value: float | None) -> str:
 
 
 def _share(row: StreamAudit) -> Cell:
-    if row.role is None or row.tau_crit_s is None or row.residual_s.bound is None:
-        return Cell("")
+    known = row.error_m is not None and row.residual_s.bound is not None
+    if not known or row.tau_crit_s is None or row.residual_s.bound is None:
+        return Cell("")  # stamped in hardware: receipts say nothing of it
     share = row.residual_s.bound / row.tau_crit_s
     kept = share < 1.0
     return Cell(numbers.percent(share), share, "good" if kept else "warn",
                 "\u2713" if kept else "!")  # fmt: skip
+
+
+def _roles(result: Audit) -> list[Node]:
+    lines = tuple(
+        (given(row.name), ": ", given(row.notes[-1])) for row in result.streams
+        if row.role is not None and row.notes
+    )  # fmt: skip
+    return [Items(lines)] if lines else []
 
 
 def _open(result: Audit) -> list[Node]:
