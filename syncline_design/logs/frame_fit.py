@@ -1,21 +1,25 @@
 """Two trajectories whose frames nothing relates, laid onto each other; what that hides is said.
 
-A turn about down and a shift (where neither says which way is down, any turn) by least squares, in
-which far points count less.  Where a delay or a lever arm between the two clearly shows, it is
-fitted along, so that what the diagnosis is to find does not go into the frames; only turn and shift
-are used.  They take up a constant shift and turn between the two, which can no longer be found.
+A turn about down and a shift (where neither says which way is down, any turn; where both know
+north, none) by least squares, in which far points count less.  Where a delay or a lever arm
+between the two clearly shows, it is fitted along, so that what the diagnosis is to find does not go
+into the frames (to first order: a lever turning during the delay does); only turn and shift are
+used.  They take up a constant shift and turn between the two, which can no longer be found.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
 
 from syncline_design.effects.record import Array
 
+Turns = Literal["none", "heading", "any"]
+FREE: Final[Mapping[Turns, int]] = {"none": 0, "heading": 1, "any": 3}
 ROUNDS: Final = 12
 FAR: Final = 2.0  # usual distances from which a point counts less
 ONE_FRAME: Final = 0.05  # of the extent: places as near as this stand in one frame already
@@ -58,7 +62,7 @@ class Track:
     body: Array | None
 
 
-def laid(moved: Track, onto: Array, any_turn: bool) -> Laid | None:
+def laid(moved: Track, onto: Array, turns: Turns) -> Laid | None:
     """The turn and shift that bring the first places onto the second (n, 3), pair by pair.
 
     None where they are in one frame already; StillError where the motion cannot tell the turn.
@@ -77,14 +81,14 @@ def laid(moved: Track, onto: Array, any_turn: bool) -> Laid | None:
     extent = _rms(b - b.mean(axis=0))
     if _rms(own.place - b) < max(ONE_FRAME * extent, ONE_FRAME * LEAST_EXTENT_M):
         return None
-    if extent < LEAST_EXTENT_M:
+    if extent < LEAST_EXTENT_M and turns != "none":
         raise StillError(f"the positions extend over {extent:.2g} m")
-    begun = _kabsch(own.place, b, any_turn)
-    best = _fitted(own, b, begun, any_turn, WIDTHS[0])
+    begun = _kabsch(own.place, b, turns)
+    best = _fitted(own, b, begun, turns, WIDTHS[0])
     for width in WIDTHS[1:]:
         if width > 1 and own.body is None:
             break
-        wider = _fitted(own, b, begun, any_turn, width)
+        wider = _fitted(own, b, begun, turns, width)
         noise = wider.squares / (3 * b.shape[0])
         fell = best.squares - wider.squares
         more = width - best.width
@@ -103,22 +107,20 @@ class _Fit:
     delay_s: float
 
 
-def _fitted(
-    own: Track, onto: Array, begun: tuple[Array, Array], any_turn: bool, width: int
-) -> _Fit:
+def _fitted(own: Track, onto: Array, begun: tuple[Array, Array], turns: Turns, width: int) -> _Fit:
     """Gauss-Newton with so many figures beside turn and shift."""
     turn, shift = begun
     extra = np.zeros(4)
-    count = 3 if any_turn else 1
+    count = FREE[turns]
     rest, weight = onto, np.ones(onto.shape[0])
     for _ in range(ROUNDS):
-        local, slope = _slope(own, turn, extra, any_turn)
+        local, slope = _slope(own, turn, extra, count)
         rest = onto - local - shift
         apart = np.linalg.norm(rest, axis=1)
         usual = max(float(np.median(apart)), 1e-9)
         weight = np.minimum(1.0, FAR * usual / np.maximum(apart, 1e-12))
         step = _step(slope[:, :, : count + 3 + width], rest, weight)
-        axis = step[:3] if any_turn else np.array([0.0, 0.0, step[0]])
+        axis = np.concatenate([np.zeros(3 - count), step[:count]])  # the last is about down
         turn, shift = _small(axis) @ turn, shift + step[count : count + 3]
         extra = extra + np.pad(step[count + 3 :], (0, 4 - width))
     squares = float(np.sum(weight * np.sum(rest**2, axis=1)))
@@ -129,25 +131,25 @@ def _rms(apart: Array) -> float:
     return float(np.sqrt(np.mean(np.sum(apart**2, axis=1))))
 
 
-def _kabsch(a: Array, b: Array, any_turn: bool) -> tuple[Array, Array]:
+def _kabsch(a: Array, b: Array, turns: Turns) -> tuple[Array, Array]:
     middle_a, middle_b = a.mean(axis=0), b.mean(axis=0)
     cross = (a - middle_a).T @ (b - middle_b)
     turn = np.eye(3)
-    if any_turn:
+    if turns == "any":
         u, _, v = np.linalg.svd(cross)
         flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(v.T @ u.T))])
         turn = v.T @ flip @ u.T
-    else:
+    elif turns == "heading":
         angle = math.atan2(cross[0, 1] - cross[1, 0], cross[0, 0] + cross[1, 1])
         c, s = math.cos(angle), math.sin(angle)
         turn[:2, :2] = [[c, -s], [s, c]]
     return turn, middle_b - turn @ middle_a
 
 
-def _slope(own: Track, turn: Array, extra: Array, any_turn: bool) -> tuple[Array, Array]:
+def _slope(own: Track, turn: Array, extra: Array, count: int) -> tuple[Array, Array]:
     """The turned places with delay and lever, (n, 3), and how they move with every figure.
 
-    Figures: turn (1 or 3), shift (3), delay, lever (3).
+    Figures: turn (as many as are free), shift (3), delay, lever (3).
     """
     a = own.place
     axes = np.zeros((a.shape[0], 3, 3)) if own.body is None else turn @ own.body
@@ -158,7 +160,7 @@ def _slope(own: Track, turn: Array, extra: Array, any_turn: bool) -> tuple[Array
     spin = np.stack(
         [np.stack([zero, -z, y], 1), np.stack([z, zero, -x], 1), np.stack([-y, x, zero], 1)], 2
     )
-    turned = spin if any_turn else spin[:, :, 2:]
+    turned = spin[:, :, 3 - count :]
     shift = np.broadcast_to(np.eye(3), (a.shape[0], 3, 3))
     return local, np.concatenate([turned, shift, -swept[:, :, None], axes], axis=2)
 

@@ -99,8 +99,8 @@ def _lay(reference: Values, tested: Values, pair: bool) -> None:
     onto = tested.vectors(POSITION) if not flat else flattened(tested)
     free = reference.assumed or tested.assumed
     try:
-        fit = laid(track, onto, any_turn=False)
-        freely = laid(track, onto, any_turn=True) if fit is not None and free and not flat else None
+        fit = laid(track, onto, "none" if _know_north(reference, tested) else "heading")
+        freely = laid(track, onto, "any") if fit is not None and free and not flat else None
     except StillError as still:
         raise refuse(
             reference.offer.path,
@@ -116,6 +116,11 @@ def _lay(reference: Values, tested: Values, pair: bool) -> None:
         _say_laid(reference, tested, fit)
     if pair and free:
         _lay_bodies(reference, tested, 0.0 if fit is None else fit.delay_s)
+
+
+def _know_north(*several: Values) -> bool:
+    """Whether all frames are true to north: WGS 84, and those that call themselves so."""
+    return all(one.offer.stream.frame in ("wgs84", "ned") for one in several)
 
 
 def _drop_idle_down(reference: Values, tested: Values) -> bool:
@@ -171,11 +176,13 @@ def _move(one: Values, fit: Laid) -> None:
 
 
 def _say_laid(reference: Values, tested: Values, fit: Laid) -> None:
-    turn = f"{np.degrees(fit.heading_rad):.3f} deg about down"
-    if fit.tilt_rad > WORTH_SAYING_RAD:
+    turn = f"turned by {np.degrees(fit.heading_rad):.3f} deg about down"
+    if _know_north(reference, tested):
+        turn = "kept to its north"
+    elif fit.tilt_rad > WORTH_SAYING_RAD:
         turn += f" and {np.degrees(fit.tilt_rad):.3f} deg of tilt"
     reference.note(
-        f"nothing relates its frame to that of {tested.offer.name}: it was turned by {turn} and "
+        f"nothing relates its frame to that of {tested.offer.name}: it was {turn} and "
         f"shifted by {np.linalg.norm(fit.shift_m):.3f} m onto it (left: {fit.rms_m:.3f} m RMS over "
         f"{fit.extent_m:.1f} m); a constant shift or turn between the two cannot be found"
     )
