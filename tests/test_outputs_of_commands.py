@@ -16,7 +16,9 @@ ROOT = Path(__file__).resolve().parent.parent
 TRACK, USV = "specs/position_track.yaml", "specs/usv_mapping.yaml"
 # command -> arguments that make it run, and the formats that its page in docs/ promises
 COMMANDS = {
-    "check": ([TRACK], {"json", "html", "junit", "sarif", "github", "markdown", "csv"}),
+    "check": (
+        [TRACK], {"json", "html", "junit", "sarif", "github", "markdown", "csv", "bill"},
+    ),
     "optimize": ([TRACK], {"json", "html", "csv"}),
     "simulate": ([TRACK, "--samples", "500"], {"json", "html", "csv"}),
     "diagnose": ([TRACK, "x.csv"], {"json", "html", "markdown"}),

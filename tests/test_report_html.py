@@ -145,7 +145,7 @@ def test_every_section_is_there_and_listed(page: Page) -> None:
     sections = page.attribute("section", "id")
     listed = [target[1:] for target in page.attribute("a", "href") if target != "#main"]
     assert sections == listed
-    assert len(sections) == 12
+    assert len(sections) == 13
 
 
 def test_missing_parts_are_left_out() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from syncline_design.report.csv_out import render_csv
+from syncline_design.report.csv_out import render_bill, render_csv
 from syncline_design.report.formats import CHECK_FORMATS as CHECK_FORMATS
 from syncline_design.report.github import render_github
 from syncline_design.report.json_out import verdicts_json
@@ -40,5 +40,7 @@ def render_checks(name: str, verdicts: Sequence[Checked]) -> str:
             return "\n".join(markdown(on_verdict(verdict)) for verdict in verdicts)
         case "csv":
             return render_csv(verdicts)
+        case "bill":
+            return render_bill(verdicts)
         case _:
             raise ValueError(f"unknown format {name}")

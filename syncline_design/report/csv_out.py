@@ -63,6 +63,24 @@ def render_csv(verdicts: Sequence[Checked]) -> str:
     return csv_text(_COLUMNS, rows)
 
 
+_BILL = ("spec", "file", "stage", "use", "item", "entry", "quantity", "cost", "currency",
+         "mass_kg", "power_w", "basis")  # fmt: skip
+
+
+def render_bill(verdicts: Sequence[Checked]) -> str:
+    """A row per line of every spec's bill of materials; the columns add up to the totals."""
+    rows: list[dict[str, Any]] = []
+    for verdict in verdicts:
+        if isinstance(verdict, Refused):
+            continue
+        head = {"spec": verdict.name, "file": verdict.file, "currency": verdict.spec.currency}
+        for line in verdict.bill_of_materials or ():
+            told = line.to_json()
+            told |= {"mass_kg": told.pop("mass"), "power_w": told.pop("power")}
+            rows.append(head | told)
+    return csv_text(_BILL, rows)
+
+
 def _about(verdict: Verdict, row: RequirementResult) -> dict[str, Any]:
     """A requirement, the codes of the warnings about it, and what its waiver does."""
     codes = " ".join(w.code for w in verdict.warnings if w.requirement == row.id)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final, Literal
 
-CHECK_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown", "csv")
+CHECK_FORMATS: Final = ("json", "html", "junit", "sarif", "github", "markdown", "csv", "bill")
 OPTIMIZE_FORMATS: Final = ("json", "html", "csv")
 SIMULATE_FORMATS: Final = ("json", "html", "csv")
 DIAGNOSE_FORMATS: Final = ("json", "html", "markdown")

@@ -97,6 +97,14 @@ def money(value: Any, currency: str) -> str:
     return _shown(value, Dimension.MONEY, 4, currency)
 
 
+def to_the_cent(value: Any, currency: str) -> str:
+    """An amount as on a bill, both decimals: `38 412.50 EUR`."""
+    amount = finite(value)
+    if amount is None:
+        return MISSING
+    return f"{amount:,.2f}\N{NO-BREAK SPACE}{currency}".replace(",", "\N{NO-BREAK SPACE}")
+
+
 def number(value: Any, digits: int = 4) -> str:
     """A plain number."""
     return _shown(value, Dimension.DIMENSIONLESS, digits)

@@ -76,6 +76,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
             *section("figures", "Three figures", error_figures(verdict), "Figures"),
             *section("warnings", "Warnings", verdict_words.warning_nodes(verdict.warnings)),
             *section("payload", "Payload and timestamping", _payload(verdict), "Payload"),
+            *section("bill", "Bill of materials", _bill(verdict), "Bill"),
             *section("timing", "Timestamp error of each sensor", _timing(verdict), "Timing"),
             *section("syncline", "Syncline", _syncline(verdict)),
             *section("ledger", "Where the error comes from", _ledger(verdict), "Ledger"),
@@ -207,6 +208,11 @@ def _payload(verdict: Verdict) -> list[Node]:
         *show(verdict_tables.payload(verdict, design), silent=True),
         *show(verdict_tables.shared(verdict, design)),
     ]
+
+
+def _bill(verdict: Verdict) -> list[Node]:
+    lines = verdict.bill_of_materials
+    return show(verdict_tables.bill(verdict, lines), silent=True) if lines else []
 
 
 def _timing(verdict: Verdict) -> list[Node]:

@@ -16,10 +16,11 @@ from syncline_design.report.verdict_words import (
     waiver_text,
 )
 from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, TIMELINES
+from syncline_design.verdict.bill import total
 from syncline_design.verdict.measured import claim_words
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.named import NamedDesign
+    from syncline_design.verdict.named import BillLine, NamedDesign
     from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
 
@@ -93,6 +94,35 @@ def shared(verdict: Verdict, design: NamedDesign) -> Table | None:
     ]
     heads = ("Shared hardware", "Vehicle", "Count #", "Cost #")
     return table("Shared hardware and clocks", heads, rows) if rows else None
+
+
+def bill(verdict: Verdict, lines: tuple[BillLine, ...]) -> Table:
+    """What to buy, line by line, and what it comes to."""
+    rows = [
+        (
+            line.stage,
+            line.item,
+            line.use,
+            Cell(numbers.count(line.quantity), float(line.quantity)),
+            *_amounts(verdict, line.cost, line.mass, line.power),
+            line.basis,
+        )
+        for line in lines
+    ]
+    sums = (total(lines, name) for name in ("cost", "mass", "power"))
+    rows.append(("", "Total", "", Cell("", None), *_amounts(verdict, *sums), ""))
+    heads = ("Stage", "Item", "For", "Quantity #", "Cost #", "Mass #", "Power #", "Basis")
+    return table("Bill of materials", heads, rows)
+
+
+def _amounts(
+    verdict: Verdict, cost: float | None, mass: float | None, power: float | None
+) -> tuple[Cell, Cell, Cell]:
+    return (
+        Cell(numbers.to_the_cent(cost, currency_of(verdict)), cost),
+        Cell(numbers.mass(mass, 9), mass),
+        Cell(numbers.power(power, 9), power),
+    )
 
 
 def taus(design: NamedDesign) -> Table:

@@ -66,6 +66,25 @@ class HostClock(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class BillLine(Record):
+    """What is bought for a stage (or a vehicle of several): cost, mass, power of all pieces.
+
+    use: what it is for; item: its name; entry: its id in the catalog; basis: what its figures
+    stand on.  Money is in the spec's currency, to the cent.  None: the entry does not say.
+    """
+
+    stage: str
+    use: str
+    item: str
+    entry: str
+    quantity: int
+    cost: float | None
+    mass: float | None
+    power: float | None
+    basis: str
+
+
+@dataclass(frozen=True, slots=True)
 class NamedDesign(Record):
     """A design in the names of the spec and its catalogs, the `design` of a verdict.
 

@@ -17,7 +17,7 @@ from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
-from syncline_design.verdict.named import ChoiceResult, ExplainedRequirement, NamedDesign
+from syncline_design.verdict.named import BillLine, ChoiceResult, ExplainedRequirement, NamedDesign
 
 SCHEMA = "syncline-design/verdict/v1"
 SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
@@ -343,6 +343,7 @@ class Verdict(Record):
     choice: ChoiceResult | None = optional()
     measured: tuple[MeasuredEntry, ...] | None = optional()
     explained: tuple[ExplainedRequirement, ...] | None = optional()
+    bill_of_materials: tuple[BillLine, ...] | None = optional()
 
     @property
     def name(self) -> str:

@@ -29,6 +29,7 @@ from syncline_design.verdict.acceptance import (
     refuse_trajectory,
     simulation_settings,
 )
+from syncline_design.verdict.bill import bill_of_materials, total
 from syncline_design.verdict.cautions import cautions
 from syncline_design.verdict.cautions_of_facts import implausible_cautions, lifecycle_cautions
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
@@ -325,7 +326,10 @@ def _verdict(
     assumed = assumptions(entries)
     figures = error_figures(verified, settings.seed, settings.monte_carlo)
     told = sources(entries)
+    bill = bill_of_materials(case, problem, verified.design)
     shown = named_design(case, problem, verified.design, verified.figures)
+    if shown.cost is not None:
+        shown = replace(shown, cost=total(bill, "cost"))  # to the cent, as its lines
     worked = Worked(verified.system, case.spec.sync_model, shown, figures, told)
     asked = [row for row in verified.requirements if row.id in settings.explain]
     return Verdict(
@@ -347,4 +351,5 @@ def _verdict(
         choice=choice or None,
         measured=measured(case, entries),
         explained=explained(worked, asked) if asked else None,
+        bill_of_materials=bill,
     )

@@ -1,0 +1,88 @@
+"""The bill of materials of a design: what to buy, line by line, in the names of the catalogs.
+
+It is made from the entries themselves, not from the sums of the choice, so that it can be held
+against them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from fractions import Fraction
+
+from syncline_design.choice.evaluate import chosen_clocks, chosen_options, evaluate
+from syncline_design.choice.table import Design, Problem
+from syncline_design.model.quantity import Quantity
+from syncline_design.spec.case import Case
+from syncline_design.spec.catalog import Product
+from syncline_design.verdict.named import BillLine
+
+_RESOURCES = ("cost", "mass", "power")
+
+
+def bill_of_materials(case: Case, problem: Problem, design: Design) -> tuple[BillLine, ...]:
+    """Sensors with their timestamping stage by stage, then what each vehicle shares."""
+    return tuple(
+        _line(case, place, use, identity, entry, count)
+        for place, use, identity, entry, count in _bought(case, problem, design)
+    )
+
+
+def total(lines: tuple[BillLine, ...], name: str) -> float | None:
+    """The sum of a column, exact in what the lines say; None where a line does not say."""
+    amounts = [getattr(line, name) for line in lines]
+    if any(amount is None for amount in amounts):
+        return None
+    return float(sum((Fraction(repr(amount)) for amount in amounts), Fraction(0)))
+
+
+Bought = tuple[str, str, str, Product, int]  # stage or vehicle, use, id, entry, quantity
+
+
+def _bought(case: Case, problem: Problem, design: Design) -> Iterator[Bought]:
+    for table, option in zip(problem.roles, chosen_options(problem, design), strict=True):
+        role = case.stages[table.stage].role(table.role)
+        assert role is not None
+        sensor, method = role.sensor(option.sensor), role.method(option.method)
+        if sensor is not None:
+            yield table.stage_name, f"{table.role} sensor", option.sensor, sensor, 1
+        if method is not None:
+            yield table.stage_name, f"{table.role} timestamping", option.method, method, 1
+    for units in evaluate(problem, design).units:
+        identity = problem.infrastructure[units.infrastructure].id
+        place = problem.vehicles[units.vehicle].name
+        yield place, "shared hardware", identity, case.hardware[identity].entry, units.count
+    for vehicle, clock in zip(problem.vehicles, chosen_clocks(problem, design), strict=True):
+        entry = case.clock(vehicle.name, clock.id)
+        if entry is not None and clock.id is not None:
+            yield vehicle.name, "host clock", clock.id, entry, 1
+
+
+def _line(case: Case, place: str, use: str, identity: str, entry: Product, count: int) -> BillLine:
+    amounts = {name: _amount(case, getattr(entry, name), count) for name in _RESOURCES}
+    return BillLine(
+        place, use, entry.name or identity, identity, count, **amounts, basis=_basis(entry)
+    )
+
+
+def _amount(case: Case, each: Quantity | None, count: int) -> float | None:
+    """All pieces of a line together; money in the spec's currency, to the cent, halves up."""
+    if each is None:
+        return None
+    if each.currency is None:
+        return float(each.exact * count)
+    cents = case.spec.in_currency(each) * count * 100
+    return float(Fraction((cents + Fraction(1, 2)).__floor__(), 100))
+
+
+def _basis(entry: Product) -> str:
+    """What cost, mass and power stand on: `source`, or which of them on what else.
+
+    Nothing weighs nothing and needs no source.
+    """
+    stated = {name: getattr(entry, name) for name in _RESOURCES}
+    told = [name for name, each in stated.items() if each is not None and each.exact != 0]
+    told = told or [name for name, each in stated.items() if each is not None]
+    kinds = {name: entry.basis_of(name) or "source" for name in told}
+    if len(set(kinds.values())) <= 1:
+        return next(iter(kinds.values()), "unknown")
+    return ", ".join(f"{name}: {kind}" for name, kind in kinds.items())
