@@ -162,6 +162,7 @@ def test_rates_do_not_depend_on_gaps_packets_and_strays() -> None:
     assert rate_hz(burst) == pytest.approx(100.0)
     assert rate_hz(np.append(even, 10**18)) == pytest.approx(100.0)
     assert rate_hz(even[:1]) is None
+    assert rate_hz(np.arange(1000, 3000)) is None  # counts, not times
 
 
 def test_stamps_far_from_all_others_are_told(tmp_path: Path) -> None:

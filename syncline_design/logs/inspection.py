@@ -25,6 +25,7 @@ from syncline_design.spec.log_block import LogChoice
 
 SCHEMA: Final = "syncline-design/log/v1"
 NANO: Final = 1e9
+LEAST_STEP_S: Final = 1e-6  # between messages; what follows each other quicker are counts
 CALENDARS: Final = ("utc", "gps", "tai")
 
 
@@ -224,7 +225,7 @@ def rate_hz(stamps: Nanoseconds) -> float | None:
     if different.shape[0] < 2:
         return None
     usual = float(np.median(np.diff(different))) / NANO
-    return float(stamps.shape[0] / different.shape[0] / usual) if usual > 0.0 else None
+    return float(stamps.shape[0] / different.shape[0] / usual) if usual >= LEAST_STEP_S else None
 
 
 def _outside(found: Sequence[Stream]) -> dict[str, tuple[str, ...]]:
