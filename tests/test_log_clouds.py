@@ -337,3 +337,25 @@ def test_a_capture_of_nothing_is_refused(tmp_path: Path, rest: bytes) -> None:
     path.write_bytes(b"\xd4\xc3\xb2\xa1" + rest)
     with pytest.raises(BadInput):
         open_recording(path).streams()
+
+
+def test_pcapng_is_read_too_and_its_absurd_times_are_unset(tmp_path: Path) -> None:
+    path = tmp_path / "a.pcapng"
+    with path.open("wb") as file:
+        writer = dpkt.pcapng.Writer(file)
+        for k in range(3):
+            writer.writepkt(udp(legacy(5 * SECOND + k, 97_656, 9, 0), 7502), ts=1_700_000_000.5 + k)
+    (stream,) = open_recording(path).streams()
+    assert stamps_of(stream) == [5 * SECOND + k for k in range(3)]
+    assert stream.stamps is not None
+    assert stream.stamps.secondary_ns is not None
+    at = 1_700_000_000_500_000_000
+    assert stream.stamps.secondary_ns.tolist() == [at + k * SECOND for k in range(3)]
+    raw = bytearray(path.read_bytes())
+    high = raw.index(struct.pack("<I", int(1_700_000_000.5e6) >> 32))
+    raw[high : high + 4] = b"\xff\xff\xff\x7f"
+    path.write_bytes(bytes(raw))
+    (stream,) = open_recording(path).streams()
+    assert stream.stamps is not None
+    assert stream.stamps.secondary_ns is not None
+    assert stream.stamps.secondary_ns[0] == UNSET

@@ -121,6 +121,14 @@ def test_week_seconds_without_a_week_have_no_timeline(tmp_path: Path) -> None:
     assert any("whose number is not there" in note for note in stream.notes)
 
 
+def test_a_time_of_week_that_is_none_has_no_moment(tmp_path: Path) -> None:
+    text = "gps_week,gps_tow_s,height_m\n2270,,1\n2270,1e12,2\n,5,3\n2270,-1e10,4\n2270,0,5\n"
+    stamps = only(opened(tmp_path, text)).stamps
+    assert stamps is not None
+    start = int(np.datetime64("2023-07-09T00:00:00", "ns").astype(np.int64))
+    assert stamps.primary_ns.tolist() == [UNSET] * 4 + [start]
+
+
 def test_a_survey_has_no_times(tmp_path: Path) -> None:
     recording = opened(
         tmp_path, "target_id,target_north_m,target_east_m,target_down_m\nA,1,2,3\nB,4,5,6\n"

@@ -296,6 +296,7 @@ def test_errors_of_an_sbet(tmp_path: Path) -> None:
     [
         (f"{TITLE}2023/07/11 06:04:32.000 35.1 x 41.4 {REST}\n", 2, "no epoch"),
         (f"{TITLE}2023/07/11 06:04:32.000 95.1 136.8 41.4 {REST}\n", 2, "no place"),
+        (f"{TITLE}2137 9.1e9 35.1 136.8 41.4 {REST}\n", 2, "no epoch"),
         (f"{TITLE}2023/13/11 06:04:32.000 35.1 136.8 41.4 {REST}\n", 2, "no epoch"),
         (f"{TITLE}2023/07/11 06:04:32.000 nan 136.8 41.4 {REST}\n", 2, "no place"),
         ("1 0 0 0 0 0 0 1\n2 0 0 0 0 0 0 1\n3 0 0 0 0 0 1\n4 0 0 0 0 0 0 1\n", 3, "7 cells"),

@@ -21,7 +21,7 @@ from syncline_design.logs.cells import (
 from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts, scaled
 from syncline_design.logs.readers.csv_names import Layout, TimeColumn, layout_of, time_columns
 from syncline_design.logs.readers.decimal_stamps import column as exact_stamps
-from syncline_design.logs.readers.epochs import WEEK_SECONDS, week_start_ns
+from syncline_design.logs.readers.epochs import WEEK_NS, WEEK_SECONDS, week_start_ns
 from syncline_design.logs.readers.reader import NO, Head, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Timeline
 from syncline_design.logs.readers.timelines import timeline_of
@@ -131,6 +131,7 @@ class CsvRecording(BatchRecording):
         if week is None:
             return tow
         known = np.isfinite(week) & (week >= 0) & (week < 10_000) & (tow != UNSET)
+        known &= (tow >= -WEEK_NS) & (tow <= 2 * WEEK_NS)
         start = np.array([week_start_ns(int(w)) for w in np.where(known, week, 0)], dtype=np.int64)
         stamps: Nanoseconds = np.where(known, start + np.where(known, tow, 0), UNSET)
         return stamps

@@ -67,14 +67,19 @@ def week_of(gps_ns: int) -> int:
     return (gps_ns - GPS_EPOCH_S * NANO) // WEEK_NS
 
 
+def held(nanoseconds: int) -> int:
+    """Nanoseconds as 64 bits hold them, else UNSET."""
+    return nanoseconds if -(2**63) <= nanoseconds < 2**63 else UNSET
+
+
 def nanoseconds_of(seconds: np.typing.ArrayLike) -> Nanoseconds:
     """Seconds as whole nanoseconds; what is not finite or beyond 64 bits is UNSET."""
     values = np.asarray(seconds, dtype=np.float64)
     with np.errstate(invalid="ignore"):  # of bit patterns that a damaged file holds
-        held = np.isfinite(values) & (np.abs(values) < 9.2e9)
-    safe = np.where(held, values, 0.0)
+        fits = np.isfinite(values) & (np.abs(values) < 9.2e9)
+    safe = np.where(fits, values, 0.0)
     whole = np.floor(safe)
     rest = safe - whole  # exact, so that no digit of the file is lost
     found = whole.astype(np.int64) * NANO + np.rint(rest * NANO).astype(np.int64)
-    stamps: Nanoseconds = np.where(held, found, UNSET)
+    stamps: Nanoseconds = np.where(fits, found, UNSET)
     return stamps

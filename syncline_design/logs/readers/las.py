@@ -156,7 +156,8 @@ class LasRecording(BatchRecording):
         stamps = nanoseconds_of(times)
         if not self._adjusted:
             return stamps
-        shifted: Nanoseconds = np.where(stamps == UNSET, UNSET, stamps + SHIFT_NS)
+        lost = (stamps == UNSET) | (stamps >= 2**63 - SHIFT_NS)
+        shifted: Nanoseconds = np.where(lost, UNSET, np.where(lost, 0, stamps) + SHIFT_NS)
         return shifted
 
     def _facts(self, name: str) -> Facts:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers import lidar_packets
 from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts, Tally
+from syncline_design.logs.readers.epochs import held as held_ns
 from syncline_design.logs.readers.lidar_packets import NovatelStream, Packet, packet_of
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
 from syncline_design.logs.readers.stream import PointTimes, Recording, Timeline
@@ -178,9 +179,9 @@ class CaptureRecording(BatchRecording):
         self, seen: _Seen, rows: _Rows, stamp: int, captured_ns: int, values: tuple[float, ...]
     ) -> None:
         if len(seen.first) < 1000:
-            seen.first.append(stamp)
-        rows.stamps.append(stamp)
-        rows.captured.append(captured_ns)
+            seen.first.append(held_ns(stamp))
+        rows.stamps.append(held_ns(stamp))
+        rows.captured.append(held_ns(captured_ns))
         rows.values.append(values)
 
     def _payloads(

@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
 from syncline_design.logs.readers.decimal_stamps import nanoseconds
-from syncline_design.logs.readers.epochs import DAY_NS, NANO, week_start_ns
+from syncline_design.logs.readers.epochs import DAY_NS, NANO, WEEK_NS, week_start_ns
 from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Reader
-from syncline_design.logs.readers.stream import UNSET, Frame, Recording, Timeline
+from syncline_design.logs.readers.stream import Frame, Recording, Timeline
 from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
 from syncline_design.logs.refusals import refuse
 
@@ -143,7 +143,9 @@ class PosRecording(BatchRecording):
             if not day.isdecimal() or len(day) > 4:
                 raise ValueError
             tow = nanoseconds(clock)
-            return UNSET if tow == UNSET else week_start_ns(int(day)) + tow
+            if not 0 <= tow <= 2 * WEEK_NS:
+                raise ValueError
+            return week_start_ns(int(day)) + tow
         days = date(int(found[1]), int(found[2]), int(found[3])).toordinal() - UNIX_DAY
         seconds = int(time[1]) * 3600 + int(time[2]) * 60 + int(time[3])
         rest = nanoseconds("0" + (time[4] or ".0"))
