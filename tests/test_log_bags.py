@@ -192,3 +192,18 @@ def test_one_damaged_file_of_several_hides_no_other(tmp_path: Path) -> None:
     assert sum(s.messages for s in streams) == 3 * len(MADE)
     assert recording.incomplete is not None
     assert "bag_1.db3" in recording.incomplete.reason
+
+
+def test_the_time_limit_passes_through_whatever_unpacks(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A signal may strike while a message is unpacked: that is no foreign message."""
+    from syncline_design.logs.readers import ros_recording
+    from syncline_design.machine.deadline import OutOfTime
+
+    def struck(_: bytes) -> object:
+        raise OutOfTime("over")
+
+    monkeypatch.setattr(ros_recording, "unpacker", lambda *_: struck)
+    with pytest.raises(OutOfTime):
+        open_recording(write_ros1(tmp_path / "a.bag", flight(1.0))).streams()

@@ -24,7 +24,7 @@ from syncline_design.logs.readers.stream import (
 )
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
-from syncline_design.machine.deadline import in_force
+from syncline_design.machine.deadline import NoVerdict, in_force
 
 PIECE_ROWS = 20_000
 CHECK_EVERY = 8_192  # messages between two looks at the clock
@@ -226,6 +226,8 @@ def _unpacked(unpack: Callable[[bytes], Any] | None, data: bytes) -> Any:
         return None
     try:
         return unpack(data)
+    except NoVerdict:  # the time is over, wherever the signal struck
+        raise
     except Exception:  # the generated code raises whatever foreign bytes lead it to
         return None
 

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 from syncline_design.logs.readers.reader import library
 from syncline_design.logs.readers.stream import UNSET
+from syncline_design.machine.deadline import NoVerdict
 
 Encoding = Literal["ros1", "cdr", "other"]
 StampOf = Callable[[bytes], int]
@@ -164,6 +165,8 @@ def _store_of(kind: str, encoding: Encoding, text: str, typesys: Any) -> Any:
         store = typesys.get_typestore(typesys.Stores.EMPTY)
         store.register(_with_headers(found, encoding, typesys))
         store.get_msgdef(kind)
+    except NoVerdict:
+        raise
     except Exception:  # whatever the parser of definitions says of a foreign text
         return None
     return store
