@@ -171,7 +171,8 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
     about = about_rhythm(when)
     if about is None:
         return None
-    period = float(interval[interval < 2.5 * np.median(interval)].mean())
+    usual = float(np.median(interval[interval > 0.0]))
+    period = float(interval[interval < 2.5 * usual].mean())
     beat = _beat(interval)
     if beat is not None:
         return _packets(series, interval, beat, True, 1.0, pace)
