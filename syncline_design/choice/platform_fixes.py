@@ -16,7 +16,7 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choice.acceptable import without_simulation
-from syncline_design.choice.options import MARGIN, Option, Options
+from syncline_design.choice.options import Option, Options
 from syncline_design.choice.outcome import Fix
 from syncline_design.choice.parts import CLOSE, is_feasible
 from syncline_design.choice.table import NOTHING, Limits, Pair, Problem, RoleTable, with_limits
@@ -31,6 +31,7 @@ from syncline_design.choice.variations import (
 from syncline_design.choice.written import DIGITS, in_unit_of
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.case import Case
+from syncline_design.spec.exact import fraction_of
 
 LEAST_SHARE = 1e-3  # a platform figure is not lowered below this share of itself
 LARGEST_SHARE = 10.0  # nor a distance raised above this multiple
@@ -136,11 +137,11 @@ class _Asked:
         """Where and how fast the stage is between two values of the figure."""
         least, most = min(one, other), max(one, other)
         near = far = float(platform_figure(self.case, self.stage, "distance"))
-        slowest = float(platform_figure(self.case, self.stage, "v_max"))
+        slowest = fraction_of(platform_figure(self.case, self.stage, "v_max"))
         if self.figure == "distance":
             near, far = least, most
         elif self.figure == "v_max":
-            slowest = least
+            slowest = Fraction(least)
         return Moved(self.stage, near, far, slowest)
 
     def _edges(self, one: float, other: float) -> list[float]:
@@ -262,7 +263,7 @@ class Moved:
     stage: int
     near: float
     far: float
-    slowest: float
+    slowest: Fraction
 
 
 def better_of(one: Problem, other: Problem, moved: Moved | None = None) -> Problem:
@@ -311,9 +312,7 @@ def _better_role(
     keeps = first.keep_own_tau_crit(limits.sync) | second.keep_own_tau_crit(limits.sync)
     if moved is not None and moved.stage == one.stage:
         keeps &= first.reach(moved.near, moved.far)
-        if limits.spacing_m is not None:
-            apart = first.spacing(moved.slowest, moved.near)
-            keeps &= apart <= limits.spacing_m * (1.0 + MARGIN)
+        keeps &= first.keep_spacing(moved.slowest, Fraction(moved.near), limits.spacing_m)
     beside = dict(zip(first.at.tolist(), second.at.tolist(), strict=True))
     better = replace(
         first,
