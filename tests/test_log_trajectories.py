@@ -172,6 +172,13 @@ def test_a_header_may_name_another_order(tmp_path: Path) -> None:
     assert np.allclose([found[f"quaternion_{a}"][0] for a in "xyzw"], q)
 
 
+def test_a_quaternion_without_length_is_none(tmp_path: Path) -> None:
+    rows = ["1 0 0 0 0 0 0 1"] * 9 + ["2 0 0 0 0 0 0 0", "3 0 0 0 1e308 0 0 1"]
+    recording = opened(tmp_path, "\n".join(rows) + "\n")
+    assert np.isnan(columns_of(recording)["quaternion_w"]).tolist() == [False] * 9 + [True] * 2
+    assert any("2 quaternions without length" in note for note in only(recording).notes)
+
+
 @pytest.mark.parametrize("header", [True, False])
 def test_euroc_is_wxyz_and_nanoseconds(tmp_path: Path, header: bool) -> None:
     q = turns(3).as_quat()

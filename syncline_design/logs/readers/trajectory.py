@@ -144,14 +144,22 @@ def _order(comments: Sequence[str]) -> tuple[str, ...]:
 
 
 def _unit(quaternions: NDArray[np.float64]) -> bool:
-    """Whether all of them have length 1, some rows of zeros (no attitude) aside."""
-    size = np.linalg.norm(quaternions, axis=1)
+    """Whether they have length 1, rows of zeros (no attitude) and a few bad ones aside."""
+    size = _sizes(quaternions)
     good = np.abs(size - 1) < LENGTH_SLACK
-    return bool(np.all(good | (size == 0)) and 2 * np.count_nonzero(good) > size.shape[0])
+    none = size == 0
+    most = 4 * np.count_nonzero(good | none) >= 3 * size.shape[0]
+    return bool(most and 2 * np.count_nonzero(good) > size.shape[0])
+
+
+def _sizes(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Lengths; of figures that no quaternion has, some that are as wrong."""
+    sizes: NDArray[np.float64] = np.linalg.norm(np.clip(quaternions, -1e9, 1e9), axis=1)
+    return sizes
 
 
 def _are_rotations(rows: NDArray[np.float64]) -> bool:
-    turn = rows.reshape(-1, 3, 4)[:, :, :3]
+    turn = np.clip(rows.reshape(-1, 3, 4)[:, :, :3], -1e9, 1e9)
     product = turn @ np.swapaxes(turn, 1, 2)
     return bool(
         np.all(np.abs(product - np.eye(3)) < LENGTH_SLACK) and np.all(np.linalg.det(turn) > 0)
@@ -264,7 +272,7 @@ class TrajectoryRecording(BatchRecording):
         columns = {name: table[:, k] for k, name in enumerate(self._layout.columns) if name}
         if set(WXYZ) <= set(columns):
             q = np.stack([columns[name] for name in WXYZ], axis=1)
-            size = np.linalg.norm(q, axis=1)
+            size = _sizes(q)
             lost = np.abs(size - 1) > 10 * LENGTH_SLACK
             with np.errstate(invalid="ignore", divide="ignore"):
                 q = np.where(lost[:, None], np.nan, q / size[:, None])
