@@ -45,8 +45,7 @@ import sys; from pathlib import Path
 from syncline_design.logs.readers import open_recording
 recording = open_recording(Path(sys.argv[1]))
 recording.streams()
-for topic in {topics}:
-    for piece in recording.samples(topic): pass
+for topic, piece in recording.together({topics}): pass
 """
 
 

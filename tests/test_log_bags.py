@@ -207,3 +207,20 @@ def test_the_time_limit_passes_through_whatever_unpacks(
     monkeypatch.setattr(ros_recording, "unpacker", lambda *_: struck)
     with pytest.raises(OutOfTime):
         open_recording(write_ros1(tmp_path / "a.bag", flight(1.0))).streams()
+
+
+@pytest.mark.parametrize("writer", ["ros1", "ros2", "mcap"])
+def test_streams_read_together_are_the_streams_read_alone(tmp_path: Path, writer: str) -> None:
+    from syncline_design.logs.run_parts import Known, pieces_of
+
+    recording = Known(open_recording(WRITERS[writer](tmp_path, MADE)))
+    joined: dict[str, list[np.ndarray]] = {}
+    for name, piece in pieces_of(recording, ["/fix", "/odom"]):
+        joined.setdefault(name, []).append(np.stack(list(piece.columns.values())))
+    assert set(joined) == {"/fix", "/odom"}
+    for name, pieces in joined.items():
+        alone = columns_of(recording, name)
+        del alone["primary"]
+        np.testing.assert_array_equal(
+            np.concatenate(pieces, axis=1), np.stack(list(alone.values()))
+        )

@@ -42,6 +42,21 @@ class Known:
     def samples(self, name: str) -> Iterator[Piece]:
         return self._recording.samples(name)
 
+    def together(self, names: Sequence[str]) -> Iterator[tuple[str, Piece]]:
+        """The pieces of several streams, in one pass where the format can."""
+        yield from pieces_of(self._recording, names)
+
+
+def pieces_of(recording: Recording, names: Sequence[str]) -> Iterator[tuple[str, Piece]]:
+    """The pieces of several streams, each with its stream's name."""
+    together = getattr(recording, "together", None)
+    if together is not None:
+        yield from together(names)
+        return
+    for name in names:
+        for piece in recording.samples(name):
+            yield name, piece
+
 
 class RunParts:
     """Recordings of the same streams, one after the other."""

@@ -37,7 +37,7 @@ from syncline_design.logs.stream_times import UTC_CLOCK, on_one_timeline
 from syncline_design.logs.stream_values import (
     GLOBE,
     Values,
-    values_of,
+    all_values,
 )
 from syncline_design.spec.log_block import LogChoice
 
@@ -85,7 +85,8 @@ def sources_of(
     if pair:
         parts = _of_the_tested(parts)
     used = {id(part.offer): part.offer for part in parts.values()}
-    values = {key: values_of(offer, choice) for key, offer in used.items()}
+    read = all_values(list(used.values()), choice)
+    values = dict(zip(used, read, strict=True))
     several = list(values.values())
     clocks = _clocks(offers, used, several, choice)
     calendar = on_one_timeline([*several, *clocks], choice)
@@ -172,8 +173,8 @@ def _clocks(
 ) -> list[Values]:
     """Streams that play no part but tell UTC or the geoid, of recordings that need it."""
     recordings = {id(one.offer.recording) for one in several}
-    return [
-        values_of(offer, choice)
+    telling = [
+        offer
         for offer in offers
         if id(offer) not in held
         and id(offer.recording) in recordings
@@ -181,6 +182,7 @@ def _clocks(
         and not any(UTC_CLOCK in one.columns and one.offer.recording is offer.recording
                     for one in several)
     ]  # fmt: skip
+    return all_values(telling, choice)
 
 
 def _source(

@@ -14,9 +14,10 @@ import numpy as np
 from syncline_design.effects.kinematics import euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import ATTITUDE, NED, POSITION, RANGING, RATE, TARGET, VELOCITY
-from syncline_design.logs.readers.stream import Body, Frame, Nanoseconds
+from syncline_design.logs.readers.stream import Body, Frame, Nanoseconds, Piece
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer
+from syncline_design.logs.run_parts import pieces_of
 from syncline_design.model.quantity import si_name, suffix_unit
 from syncline_design.spec.log_block import LogChoice
 
@@ -66,9 +67,27 @@ class Values:
             self.notes.append(said)
 
 
-def values_of(offer: Offer, choice: LogChoice) -> Values:
+def all_values(offers: Sequence[Offer], choice: LogChoice) -> list[Values]:
+    """The samples of some streams, made canonical; every recording is gone through once."""
+    recordings = {id(offer.recording): offer.recording for offer in offers}
+    held: dict[tuple[int, str], list[Piece]] = {}
+    for key, recording in recordings.items():
+        names = [offer.name for offer in offers if id(offer.recording) == key]
+        rows = 0
+        for name, piece in pieces_of(recording, names):
+            rows += int(piece.primary_ns.shape[0])
+            if rows > MOST_ROWS:
+                raise refuse(recording.path, "too many rows", expected=f"at most {MOST_ROWS}")
+            held.setdefault((key, name), []).append(piece)
+    return [
+        values_of(offer, held.get((id(offer.recording), offer.name), []), choice)
+        for offer in offers
+    ]
+
+
+def values_of(offer: Offer, pieces: Sequence[Piece], choice: LogChoice) -> Values:
     """All samples of a stream, made canonical."""
-    time_ns, raw = _collected(offer)
+    time_ns, raw = _collected(offer, pieces)
     columns: dict[str, Any] = {}
     for name, values in raw.items():
         if name.startswith("clock_"):  # whole nanoseconds stay whole
@@ -91,24 +110,17 @@ def values_of(offer: Offer, choice: LogChoice) -> Values:
     return found
 
 
-def _collected(offer: Offer) -> tuple[Nanoseconds, dict[str, Any]]:
-    stamps, pieces, rows = [], [], 0
-    for piece in offer.recording.samples(offer.name):
-        rows += int(piece.primary_ns.shape[0])
-        if rows > MOST_ROWS:
-            raise refuse(offer.path, "too many rows", expected=f"at most {MOST_ROWS}")
-        stamps.append(piece.primary_ns)
-        pieces.append(piece.columns)
-    if not rows:
+def _collected(offer: Offer, pieces: Sequence[Piece]) -> tuple[Nanoseconds, dict[str, Any]]:
+    if not pieces:
         raise refuse(offer.path, f"{offer.name} has no messages")
-    names = list(dict.fromkeys(name for one in pieces for name in one))
+    names = list(dict.fromkeys(name for one in pieces for name in one.columns))
     whole = {
-        name: np.concatenate([one[name] for one in pieces])
+        name: np.concatenate([one.columns[name] for one in pieces])
         for name in names
-        if all(name in one for one in pieces)
+        if all(name in one.columns for one in pieces)
     }
     figures = {n: v if v.dtype.kind == "i" else v.astype(float) for n, v in whole.items()}
-    return np.concatenate(stamps), figures
+    return np.concatenate([one.primary_ns for one in pieces]), figures
 
 
 def _axes(values: Values, choice: LogChoice) -> tuple[Frame, Body]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -179,6 +179,27 @@ class RosRecording:
                 yield collected.piece()
         if collected is not None and len(collected):
             yield collected.piece()
+
+    def together(self, names: Sequence[str]) -> Iterator[tuple[str, Piece]]:
+        """The pieces of several streams in one pass over the file."""
+        if not self._channels:
+            self.streams()
+        wanted = {(c.topic, c.kind): n for n, c in self._channels.items() if n in names}
+        rows: dict[str, _Rows] = {}
+        known = self.incomplete
+        for message in self._container.messages():
+            name = wanted.get((message.channel.topic, message.channel.kind))
+            if name is None:
+                continue
+            if name not in rows:
+                rows[name] = _rows_of(self._begun(message, 0))
+            rows[name].add(message)
+            if len(rows[name]) >= PIECE_ROWS:
+                yield name, rows[name].piece()
+        self._container.incomplete = known
+        for name, collected in rows.items():
+            if len(collected):
+                yield name, collected.piece()
 
 
 @dataclass(slots=True)
