@@ -172,11 +172,13 @@ def test_words_follow_the_sign_of_the_comparison() -> None:
     better = Rival("packetised_timestamps", "attitude", "rig", 0.97, -157.4, possible=False)
     as_well = Rival("latency", "attitude", "rig", 0.6, -0.8)
     worse = Rival("filter_lag", "position", "rig", 0.999, 31.6)
-    found = diagnosis(findings=(replace(LATENCY, lookalikes=(better, as_well, worse)),))
+    bent = Rival("flexure", "ranging", "rig", 0.995, -12.3, possible=False)
+    found = diagnosis(findings=(replace(LATENCY, lookalikes=(better, bent, as_well, worse)),))
     for render in (html, console, markdown):
         told = re.sub(r"<[^>]+>|\\", "", render(on_diagnosis(found)))
         said = " ".join(told.replace("\u00a0", " ").split())
         assert "-157" not in said
         assert "filter lag (position), 31.6 nat worse" in said
-        assert "157 nat better, but only with impossible values" in said
+        assert "157 nat better, but this log does not scatter as it would have to" in said
+        assert "12.3 nat better, but only with impossible values" in said
         assert "latency (attitude), as well in its place" in said

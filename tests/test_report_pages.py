@@ -260,7 +260,7 @@ def test_a_page_says_fits_worse_only_of_what_does() -> None:
     plain = re.sub(r"\\(.)", r"\1", markdown(on_diagnosis(data)))
     for text in (page, plain):
         assert "fits worse" not in text
-        assert "157 nat better, but only with impossible values" in text
+        assert "157 nat better, but this log does not scatter as it would have to" in text
         assert "filter lag (position), 31.6 nat worse" in text
         assert re.search("told apart on this log from filter lag .*141 nat worse", text, re.I)
 

@@ -305,7 +305,10 @@ def rival_text(one: Rival, *, alike: bool = False) -> str:
         return f"{_effect_text(one)}{other}, {one.nats_worse:.3g} nat worse{kept}"
     if not one.possible:
         better = f"{-one.nats_worse:.3g} nat better"
-        return f"{_effect_text(one)}, {better}, but only with impossible values"
+        why = "but only with impossible values"
+        if registry()[one.effect].spread is not None:
+            why = "but this log does not scatter as it would have to"
+        return f"{_effect_text(one)}, {better}, {why}"
     return f"{_effect_text(one)}, as well in its place"
 
 
