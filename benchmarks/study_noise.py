@@ -45,6 +45,7 @@ FAMILIES = (*MODEL, *KINDS, *AS_MEASURED)
 WANDER = Noise(wander_share=0.6, wander_time_s=20.0)
 BOUNDS = {"hidden": 10.0, "deleted": 60.0}
 DURATION_S, RATE_HZ = 150.0, 10.0
+STEP_AT_S = 70.0
 START, END = "<!-- noise study: start -->", "<!-- noise study: end -->"
 Row = dict[str, Any]
 
@@ -90,6 +91,10 @@ def sized(case: Case, run: Scenario) -> tuple[Hidden, ...]:
     if case.effect < 0:
         return ()
     effect = _one(case.effect)
+    if (
+        effect.effect == "timestamp_step"
+    ):  # the table's own instant is near the end of so short a log
+        effect = effect.with_values({"time_s": STEP_AT_S})
     keys = fitted_keys((effect,))
     # the bound takes Gauss-Markov noise of the model as white of half its variance: a little large
     kind = "white" if case.family in MODEL else case.family
