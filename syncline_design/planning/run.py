@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -100,6 +100,7 @@ class PlanRun:
     path: of the vehicle that drives, at most ROW_S apart; target_m: what is aimed at from a row
     on, NaN where nothing is.  leg: by row, its place among the plan's.  driven: every stage's
     motion and the targets, at the rows of the log.  motion: of the vehicle on the path.
+    others: the paths of a chain's other vehicles at the same moments, by stage.
     """
 
     result: Plan
@@ -108,6 +109,7 @@ class PlanRun:
     leg: tuple[int, ...]
     driven: Drive
     motion: str
+    others: Mapping[str, States]
 
 
 def plan(case: Case, request: PlanRequest | None = None) -> PlanRun:
@@ -259,7 +261,12 @@ class _Planning:
             flown=self._flown(),
         )
         vehicle = self.world.vehicles[found.stretches[-1].leg.stage]
-        return PlanRun(result, path, target, leg, found.driven, vehicle.motion)
+        others = {
+            one.name: found.driven.states[k].at(path.time_s)
+            for k, one in enumerate(self.system.stages)
+            if k != found.stretches[-1].leg.stage
+        }
+        return PlanRun(result, path, target, leg, found.driven, vehicle.motion, others)
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -326,12 +333,23 @@ class _Planning:
                 f"{k} {one.leg.name}",
                 one.from_s,
                 one.to_s,
-                one.leg.words,
+                one.leg.words + self._meanwhile(one.leg.stage),
                 self.system.stages[one.leg.stage].name,
                 math.degrees(one.heading_rad) % 360.0,
             )
             for k, one in enumerate(found.stretches, start=1)
         )
+
+    def _meanwhile(self, stage: int) -> str:
+        """What the other vehicles of a chain do."""
+        held = [
+            f"{v.stage} hovers"
+            if v.join_mps == 0.0
+            else f"{v.stage} circles wide at {v.join_mps:.2g} m/s"
+            for k, v in enumerate(self.world.vehicles)
+            if k != stage
+        ]
+        return f"; meanwhile {' and '.join(held)}" if held else ""
 
     def _standard(self, duration_s: float) -> tuple[StandardPlan, ...]:
         stage = self.world.every[self.goal.wanted[0]].candidate.stage if self.goal.wanted else 0

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import chain, repeat
 from typing import Any, Final
 from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from syncline_design.planning.path import States
 from syncline_design.planning.run import PlanRun
 from syncline_design.report.csv_out import plain_csv
 from syncline_design.report.json_out import json_text
@@ -54,20 +56,33 @@ def render_plan(name: str, run: PlanRun) -> str:
 def waypoints_csv(run: PlanRun) -> str:
     """The path row by row: pose of the reference point, the target aimed at, the leg."""
     path, legs = run.path, run.result.legs
-    angles = np.degrees(np.column_stack([path.euler_rad[:, :2], _wrapped(path.euler_rad[:, 2])]))
     rows = (
         [
             round(float(t), 4),
-            *(round(float(v), 4) for v in place),
-            *(round(float(v), 5) for v in turn),
+            *pose,
             *(None if math.isnan(v) else round(float(v), 4) for v in target),
             legs[leg].name,
         ]
-        for t, place, turn, target, leg in zip(
-            path.time_s, path.position_m, angles, run.target_m, run.leg, strict=True
+        for t, pose, target, leg in zip(
+            path.time_s, _pose(path), run.target_m, run.leg, strict=True
         )
     )
-    return plain_csv(COLUMNS, rows)
+    more = [(name, _pose(one)) for name, one in run.others.items()]
+    names = [f"{stage}_{column}" for stage, _ in more for column in COLUMNS[1:7]]
+    beside = zip(*(pose for _, pose in more), strict=True) if more else repeat(())
+    whole = ([*row, *chain.from_iterable(own)] for row, own in zip(rows, beside, strict=False))
+    return plain_csv((*COLUMNS, *names), whole)
+
+
+def _pose(states: States) -> list[list[float]]:
+    """Place and attitude row by row, as they are written."""
+    angles = np.degrees(
+        np.column_stack([states.euler_rad[:, :2], _wrapped(states.euler_rad[:, 2])])
+    )
+    return [
+        [*(round(float(v), 4) for v in place), *(round(float(v), 5) for v in turn)]
+        for place, turn in zip(states.position_m, angles, strict=True)
+    ]
 
 
 def _wrapped(angle: Any) -> Any:
