@@ -244,7 +244,7 @@ def test_print_is_light_and_complete(browser: Any, report: Path) -> None:
 def test_all_is_there_without_javascript(browser: Any, report: Path) -> None:
     with Opened(browser, report, java_script_enabled=False) as opened:
         assert opened.page.is_hidden("#explorer")
-        assert opened.page.locator("section:visible").count() == 12
+        assert opened.page.locator("section:visible").count() == 13
         assert opened.page.locator("figure svg:visible").count() == 5
         assert opened.page.locator("thead button").count() == 0
 

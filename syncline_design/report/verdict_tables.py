@@ -110,7 +110,7 @@ def bill(verdict: Verdict, lines: tuple[BillLine, ...]) -> Table:
         for line in lines
     ]
     sums = (total(lines, name) for name in ("cost", "mass", "power"))
-    rows.append(("", "Total", "", Cell("", None), *_amounts(verdict, *sums), ""))
+    rows.append(("Total", "", "", Cell("", None), *_amounts(verdict, *sums), ""))
     heads = ("Stage", "Item", "For", "Quantity #", "Cost #", "Mass #", "Power #", "Basis")
     return table("Bill of materials", heads, rows)
 
