@@ -272,7 +272,7 @@ def test_what_is_undone_is_what_departed(effect: Effect) -> None:
 
 
 # Words of the model, of the paper and of the spec that are an effect's name as well.
-OTHER_MEANING = {"lever_arm"}
+OTHER_MEANING = {"lever_arm", "sound_speed"}
 # Names of assumptions on a built system, which effects break.
 ASSUMPTIONS = {"latency", "mounting"}
 SPEAK_OF_ASSUMPTIONS = {"assumptions.py", "by_log.py", "acceptance.py", "sarif.py"}

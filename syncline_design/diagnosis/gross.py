@@ -17,7 +17,7 @@ import numpy as np
 from syncline_design.diagnosis.conventions import best_repairs
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.slips import Shift, attitude_restamped, best_shifts
-from syncline_design.effects import registry
+from syncline_design.effects import plain_delay, registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect, Target
 from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
@@ -287,10 +287,9 @@ def _shift_named(shift: Shift) -> Acting:
     """Whole seconds are a slip where a sensor can have one, a delay beside it; else a delay."""
     whole = float(round(shift.seconds))
     slip = _undone(by_mending=False)
-    assert slip.undoing is not None
     beside = abs(shift.seconds - whole) <= MOST_DELAY_S and abs(whole) > SHORT_SLIP
     slipped = shift.sensor in slip.sensors and (shift.whole or beside)
-    effect = slip if slipped else registry()[slip.undoing.instead_of]
+    effect = slip if slipped else plain_delay()
     seconds = whole if slipped or shift.whole else shift.seconds
     return Acting(effect, shift.sensor, 0, {effect.parameters[0].name: seconds})
 

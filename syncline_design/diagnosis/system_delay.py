@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from syncline_design.diagnosis.result import Estimate, Finding
+from syncline_design.effects import plain_delay
 from syncline_design.logs.log import Kind
 from syncline_design.model.quantity import format_estimate
 
-LATENCY, PARAMETER = "latency", "latency_s"
 SPREADS = 3.0  # standard deviations by which the two may differ
 LEAST_S = 1e-3  # and at least this much: stamps of two systems agree no better
 
@@ -23,7 +23,7 @@ def with_system_delay(found: Sequence[Finding], kind: Kind) -> tuple[Finding, ..
     place, turn = (_delay(found, sensor) for sensor in ("position", "attitude"))
     if kind != "pose" or place is None or turn is None or place.stage != turn.stage:
         return tuple(found)
-    a, b = place.parameters[PARAMETER], turn.parameters[PARAMETER]
+    a, b = (next(iter(one.parameters.values())) for one in (place, turn))
     if a.standard_uncertainty is None or b.standard_uncertainty is None:
         return tuple(found)
     apart = abs(float(a.value) - float(b.value))
@@ -36,10 +36,11 @@ def with_system_delay(found: Sequence[Finding], kind: Kind) -> tuple[Finding, ..
 
 def _delay(found: Sequence[Finding], sensor: str) -> Finding | None:
     """The one delay of a sensor that deserves its name."""
+    name = plain_delay().name
     there = [
         one
         for one in found
-        if (one.effect, one.sensor, one.kind) == (LATENCY, sensor, "cause") and not one.varying
+        if (one.effect, one.sensor, one.kind) == (name, sensor, "cause") and not one.varying
     ]
     return there[0] if len(there) == 1 else None
 
@@ -60,7 +61,7 @@ def _joined(place: Finding, turn: Finding, a: Estimate, b: Estimate) -> Finding:
     sizes = [one.size_m for one in (place, turn) if one.size_m is not None]
     return replace(
         place,
-        parameters={PARAMETER: estimate},
+        parameters={next(iter(place.parameters)): estimate},
         sentence=f"position and attitude data are {text} older than their stamps",
         evidence=f"{place.evidence}; of the attitude: {turn.evidence}",
         gain_nat=place.gain_nat + turn.gain_nat,

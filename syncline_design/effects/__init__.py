@@ -17,3 +17,9 @@ def registry() -> dict[str, Effect]:
     names = sorted(m.name for m in iter_modules(__path__) if m.name not in NOT_EFFECTS)
     effects = [import_module(f"{__name__}.{name}").EFFECT for name in names]
     return {effect.name: effect for effect in effects}
+
+
+def plain_delay() -> Effect:
+    """The constant delay of any sensor: what a slip of whole seconds is a case of."""
+    slips = (one.undoing.instead_of for one in registry().values() if one.undoing is not None)
+    return registry()[next(name for name in slips if name)]

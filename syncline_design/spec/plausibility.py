@@ -52,12 +52,12 @@ def implausible(case: Case, sensors: Iterable[Candidate[SensorEntry]]) -> Iterat
 
 def _platform(case: Case, stage: StageCase) -> Iterator[Implausible]:
     """Figures of a platform that the spec gives, against those it changes, or all there are."""
-    choice, others = stage.choice.platform, case.catalog.platforms
+    choice = stage.choice.platform
+    given = {key: getattr(choice, key) for key in FIGURES}
+    figures = {key: v for key, v in given.items() if isinstance(v, Quantity) and v > 0.0}
+    others = case.catalog.platforms if figures else {}
     base = None if choice.use is None else others.get(choice.use)
-    for key in FIGURES:
-        value = getattr(choice, key)
-        if not isinstance(value, Quantity) or not value > 0.0:
-            continue
+    for key, value in figures.items():
         reason = _changed(key, value, base) if base else _unheard(key, value, others.values())
         if reason:
             name = stage.platform.id
