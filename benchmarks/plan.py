@@ -25,7 +25,9 @@ import numpy as np
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.model.system import System
-from syncline_design.planning.run import PlanRequest, PlanRun, plan
+from syncline_design.planning.run import plan
+from syncline_design.planning.setup import PlanRequest
+from syncline_design.planning.telling import PlanRun
 from syncline_design.planning.wanted import Asked, Pair, PlanError, named
 from syncline_design.spec.load import load
 from tests.world.hidden import Hidden, hidden

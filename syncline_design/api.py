@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from syncline_design.comparison.meaning import DiagnosisAndDesign
     from syncline_design.diagnosis import Diagnosis
     from syncline_design.paper.reproduce import Reproduction
-    from syncline_design.planning.run import PlanRun
+    from syncline_design.planning.telling import PlanRun
     from syncline_design.simulation import Simulation
     from syncline_design.studies import Progress, StudyResult
     from syncline_design.verdict.optimise import Optimisation
@@ -175,7 +175,7 @@ def plan(
     reach: "latency(position)=1 ms, lever_arm(position)=1 cm".  separate: two effects to tell apart.
     diagnosis: what one could not tell apart.  flown: a log held against what is asked.
     """
-    from syncline_design.planning import run, wanted
+    from syncline_design.planning import run, setup, wanted
     from syncline_design.verdict.optimise import as_measured
 
     seed = _seed(seed)
@@ -188,7 +188,7 @@ def plan(
     files = tuple(_files(flown))
     with _limited(time_limit_s):
         case = as_measured(_case(spec), seed)
-        return run.plan(case, run.PlanRequest(asked, diagnosis, least, files, seed))
+        return run.plan(case, setup.PlanRequest(asked, diagnosis, least, files, seed))
 
 
 def study(

@@ -22,7 +22,7 @@ import syncline_design as sd
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
 from syncline_design.planning.result import Plan
-from syncline_design.planning.run import PlanRun
+from syncline_design.planning.telling import PlanRun
 from syncline_design.report.plans import render_plan
 from syncline_design.report.result_schemas import result_schema
 from tests.world.bound import cramer_rao

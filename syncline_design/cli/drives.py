@@ -59,8 +59,8 @@ def plan(
 ) -> int:
     """Plan the test drive that tells effects apart, leg by leg, within the platform's limits."""
     deadline = deadline_of(time_limit)
-    from syncline_design.planning.run import PlanRequest
     from syncline_design.planning.run import plan as plan_drive
+    from syncline_design.planning.setup import PlanRequest
     from syncline_design.report.on_plan import on_plan
     from syncline_design.report.plans import render_plan
     from syncline_design.report.render_console import console

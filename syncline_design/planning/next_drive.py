@@ -9,7 +9,9 @@ from typing import Final
 from syncline_design.diagnosis.result import Diagnosis, Finding, NextDrive, Rival
 from syncline_design.effects import registry
 from syncline_design.machine.deadline import NoVerdict, within_s
-from syncline_design.planning.run import PlanRequest, PlanRun, plan
+from syncline_design.planning.run import plan
+from syncline_design.planning.setup import PlanRequest
+from syncline_design.planning.telling import PlanRun
 from syncline_design.planning.wanted import Asked, Named, Pair, PlanError
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput

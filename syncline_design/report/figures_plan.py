@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from syncline_design.planning.result import Plan
-from syncline_design.planning.run import PlanRun
+from syncline_design.planning.telling import PlanRun
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH

@@ -11,7 +11,7 @@ from xml.etree import ElementTree as Xml
 import numpy as np
 
 from syncline_design.planning.path import States
-from syncline_design.planning.run import PlanRun
+from syncline_design.planning.telling import PlanRun
 from syncline_design.report.csv_out import plain_csv
 from syncline_design.report.json_out import json_text
 from syncline_design.report.on_plan import on_plan

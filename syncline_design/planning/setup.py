@@ -1,0 +1,185 @@
+"""What a plan starts from: a request, and the world in which it is looked for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from syncline_design.diagnosis.result import Diagnosis
+from syncline_design.diagnosis.system import pinned_system
+from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import in_force
+from syncline_design.model.system import System
+from syncline_design.planning.drives import Outcome, World
+from syncline_design.planning.from_diagnosis import asked_of
+from syncline_design.planning.information import (
+    Unknown,
+    columns,
+    noise_rms_m,
+    rms_per_unit,
+)
+from syncline_design.planning.legs import Leg
+from syncline_design.planning.path import joined
+from syncline_design.planning.search import (
+    Judge,
+    Told,
+    others_of,
+    pair_ratio,
+)
+from syncline_design.planning.vehicle import vehicles
+from syncline_design.planning.wanted import (
+    Asked,
+    Goal,
+    PlanError,
+    goal_of,
+    keys_of,
+    usual,
+)
+from syncline_design.spec.case import Case
+
+NOTHING_ASKED: Final = Asked()
+DEFAULT_HZ: Final = 10.0
+SECONDS: Final = 60.0
+MOST_OF_ALL: Final = 1e4  # times all legs: what that does not tell apart, no drive does
+
+
+@dataclass(frozen=True, slots=True)
+class PlanRequest:
+    """What a plan is asked for; none of all: a commissioning drive."""
+
+    asked: Asked = NOTHING_ASKED
+    diagnosis: Diagnosis | None = None
+    minutes: float = 10.0
+    flown: tuple[Path, ...] = ()
+    seed: int = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """What a plan starts from: the world, what is asked of it, and every leg looked at."""
+
+    case: Case
+    request: PlanRequest
+    world: World
+    goal: Goal
+    judge: Judge
+    told: tuple[Told, ...]
+    inseparable: tuple[str, ...]
+
+    @classmethod
+    def begun(cls, case: Case, request: PlanRequest) -> Setup:
+        """Looks at every leg; PlanError where nothing can be planned for."""
+        if not (0.0 < request.minutes < math.inf):
+            raise PlanError(f"--minutes {request.minutes:g}: expected more than 0 minutes")
+        system = pinned_system(case)
+        world = _world(case, system, request.diagnosis)
+        asked = _asked(system, world.every, request)
+        in_force().doing("looking at the legs")
+        noise_m, per_unit = _sizes(world)
+        goal = goal_of(system, world.every, asked, noise_m, per_unit)
+        prior = np.array([one.prior for one in world.every])
+        told = world.looked_at(_legs_of(world, goal))
+        library = np.sum([t.at(h, SECONDS * h) for t in told for h in range(4)], axis=0)
+        goal, apart = _separable(system, world.every, goal, library)
+        others = others_of(world.every, goal, library, prior)
+        return cls(case, request, world, goal, Judge(goal, prior, others), told, apart)
+
+    @property
+    def system(self) -> System:
+        """The system, pinned."""
+        return self.world.system
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Names of all unknowns."""
+        return keys_of(self.system, self.world.every)
+
+    def reached(self, found: Outcome) -> bool:
+        """Whether a drive tells all that is asked, whatever it takes."""
+        ratios = self.judge.ratios(found.after[-1], exact=True)
+        return bool(np.all(ratios <= 1.0))
+
+
+def _world(case: Case, system: System, diagnosis: Diagnosis | None) -> World:
+    types = tuple("" if s.ranging is None else s.ranging.type for s in system.stages)
+    noise = None if diagnosis is None else diagnosis.noise
+    return World(system, vehicles(case, types), _rate_hz(case, system), noise)
+
+
+def _rate_hz(case: Case, system: System) -> float:
+    """Rows a second: the last ranging sensor's rate where it is known."""
+    last = system.stages[-1].ranging
+    role = case.stages[-1].role("ranging")
+    entry = None if last is None or role is None else role.sensor(last.id)
+    rate = None if entry is None else entry.rate
+    return DEFAULT_HZ if rate is None else float(rate)
+
+
+def _asked(system: System, every: Sequence[Unknown], request: PlanRequest) -> Asked:
+    """What the options and the diagnosis ask for together; nothing: what usually matters."""
+    reach, pairs = list(request.asked.reach), list(request.asked.pairs)
+    if request.diagnosis is not None:
+        found = asked_of(system, request.diagnosis)
+        given = {one.text for one, _ in reach}
+        reach += [entry for entry in found.reach if entry[0].text not in given]
+        pairs += found.pairs
+    asked = Asked(tuple(reach), tuple(pairs))
+    if not asked.reach and not asked.pairs:
+        asked = usual(system, every)
+    if not asked.reach and not asked.pairs:
+        raise PlanError("nothing to plan for: no effect applies to this system")
+    return asked
+
+
+def _legs_of(world: World, goal: Goal) -> tuple[Leg, ...]:
+    """The legs of the vehicles that carry what is asked for; the others hold meanwhile."""
+    asked = {*goal.wanted, *(k for p in goal.pairs for k in (*p.first, *p.second))}
+    stages = {world.every[k].candidate.stage for k in asked}
+    return tuple(leg for leg in world.legs if leg.stage in stages)
+
+
+def _sizes(world: World) -> tuple[float, Array]:
+    """RMS error [m] that the noise makes, and that one unit of every unknown makes."""
+    stages = range(len(world.vehicles))
+    every = [joined([g.course for g in world.legs if g.stage == k]) for k in stages]
+    shortest = min(len(course) for course in every)
+    cut = [
+        type(c)(c.ahead[:shortest], c.right[:shortest], c.down[:shortest], c.turn[:shortest])
+        for c in every
+    ]
+    view = world.view(world.driven(cut))
+    structure, level = world.noise(view)
+    visible = np.isfinite(view.log.truth_m)
+    return noise_rms_m(structure, level, visible), rms_per_unit(columns(view, world.every))
+
+
+def _separable(
+    system: System, every: Sequence[Unknown], goal: Goal, library: Array
+) -> tuple[Goal, tuple[str, ...]]:
+    """The goal without further pairs that no drive tells apart, and these in words.
+
+    The pair that is named first stays: then no drive reaches it, and the plan says so.
+    """
+    kept, apart = list(goal.pairs[:1]), []
+    for pair in goal.pairs:
+        lost = pair_ratio(MOST_OF_ALL * library, pair) > 1.0
+        if lost:
+            apart.append(f"{pair.names[0]} and {pair.names[1]}")
+        elif pair not in kept:
+            kept.append(pair)
+    if len(kept) > 1 and apart and apart[0] == " and ".join(goal.pairs[0].names):
+        kept = kept[1:]
+    wanted = set(goal.wanted)
+    if goal.pairs and kept and kept[0] is not goal.pairs[0]:
+        own = {k for p in goal.pairs[:1] for k in (*p.first, *p.second)}
+        asked = {k for k, t in zip(goal.wanted, goal.tolerance, strict=True) if math.isfinite(t)}
+        wanted = (wanted - (own - asked)) | set(kept[0].first) | set(kept[0].second)
+    tolerance = dict(zip(goal.wanted, goal.tolerance, strict=True))
+    order = tuple(sorted(wanted))
+    sizes = np.array([tolerance.get(k, math.inf) for k in order])
+    return Goal(order, sizes, tuple(kept)), tuple(apart)

@@ -1,0 +1,315 @@
+"""A drive that was found, told: what is known after each leg, what stays unseen, the path."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from syncline_design import __version__
+from syncline_design.diagnosis.result import SpecRead
+from syncline_design.diagnosis.scene import scene
+from syncline_design.diagnosis.system import measured
+from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import in_force
+from syncline_design.model.system import System
+from syncline_design.planning.drives import Outcome, World
+from syncline_design.planning.information import (
+    canonical_correlation,
+    fisher,
+    sigmas,
+    with_shift,
+)
+from syncline_design.planning.path import States
+from syncline_design.planning.planned_log import Drive
+from syncline_design.planning.result import (
+    After,
+    Flown,
+    Plan,
+    PlannedLeg,
+    PlannedTarget,
+    PlanProvenance,
+    Separated,
+    StandardPlan,
+)
+from syncline_design.planning.search import (
+    NONCENTRALITY,
+    noncentrality_of,
+    pair_ratio,
+)
+from syncline_design.planning.setup import SECONDS, Setup
+from syncline_design.planning.standard import rounds, rounds_needed, standard_legs
+from syncline_design.planning.wanted import (
+    PairGoal,
+    PlanError,
+    text_of,
+)
+
+UNSEEN: Final = 0.7  # of the prior: what a drive leaves that uncertain, it does not show
+ROW_S: Final = 0.1  # between rows of the path that is written
+MOST_PATH_ROWS: Final = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class PlanRun:
+    """A plan, and the path that it is made of: what is written as waypoints.
+
+    path: of the vehicle that drives, at most ROW_S apart; target_m: what is aimed at from a row
+    on, NaN where nothing is.  leg: by row, its place among the plan's.  driven: every stage's
+    motion and the targets, at the rows of the log.  motion: of the vehicle on the path.
+    others: the paths of a chain's other vehicles at the same moments, by stage.
+    """
+
+    result: Plan
+    path: States
+    target_m: Array
+    leg: tuple[int, ...]
+    driven: Drive
+    motion: str
+    others: Mapping[str, States]
+
+
+def duration_s(found: Outcome) -> float:
+    """Of the whole drive."""
+    return found.stretches[-1].to_s
+
+
+@dataclass(frozen=True, eq=False)
+class Telling:
+    """What there is to say of drives of one setup."""
+
+    setup: Setup
+
+    def whole(self, found: Outcome, least_s: float | None, most_s: float) -> PlanRun:
+        """The result and the path of a drive; least_s: the least time that reaches all."""
+        duration = duration_s(found)
+        reached = self.setup.reached(found) and duration <= most_s
+        path, target, leg = self._path(found)
+        legs = self._legs(found)
+        spec = self.setup.case.spec
+        origin = spec.log.origin if spec.log else None
+        result = Plan(
+            reached=reached,
+            spec=SpecRead(spec.name, str(self.setup.case.path)),
+            minutes=self.setup.request.minutes,
+            duration_s=duration,
+            least_minutes=None if least_s is None else least_s / SECONDS,
+            legs=legs,
+            after=tuple(self._after(one.name, i) for one, i in zip(legs, found.after, strict=True)),
+            tolerance=self._tolerance(),
+            pairs=tuple(self._separated(found.after[-1], p) for p in self.setup.goal.pairs),
+            inseparable=self.setup.inseparable,
+            confused=self._confused(found.after[-1]),
+            unseen=self._unseen(found.after[-1]),
+            columns=columns_needed(self.setup.system),
+            rate_hz=self.setup.world.rate_hz,
+            noise=_noise_words(self.setup.world),
+            priors=dict(zip(self.setup.keys, map(float, self.setup.judge.prior), strict=True)),
+            standard=self._standard(duration),
+            targets=_targets(found.driven),
+            surveyed=self.setup.world.surveyed is not None,
+            assumed=_assumed(self.setup.world),
+            origin_deg_m=None
+            if origin is None
+            else (math.degrees(origin[0]), math.degrees(origin[1]), float(origin[2])),
+            provenance=PlanProvenance(
+                __version__,
+                self.setup.request.seed,
+                self.setup.case.spec_sha256,
+                self.setup.case.catalogs_sha256,
+            ),
+            flown=self._flown(),
+        )
+        vehicle = self.setup.world.vehicles[found.stretches[-1].leg.stage]
+        others = {
+            one.name: found.driven.states[k].at(path.time_s)
+            for k, one in enumerate(self.setup.system.stages)
+            if k != found.stretches[-1].leg.stage
+        }
+        return PlanRun(result, path, target, leg, found.driven, vehicle.motion, others)
+
+    def _tolerance(self) -> dict[str, float]:
+        pairs = zip(self.setup.goal.wanted, self.setup.goal.tolerance, strict=True)
+        return {self.setup.keys[k]: float(t) for k, t in pairs if math.isfinite(t)}
+
+    def _sigma(self, information: Array) -> dict[str, float]:
+        index = list(self.setup.goal.wanted)
+        found = sigmas(information, index)
+        return {self.setup.keys[k]: float(s) for k, s in zip(index, found, strict=True)}
+
+    def _correlation(self, information: Array) -> float | None:
+        if not self.setup.goal.pairs:
+            return None
+        pair = self.setup.goal.pairs[0]
+        return canonical_correlation(information, pair.first, pair.second)
+
+    def _after(self, leg: str, information: Array) -> After:
+        every = sigmas(information, range(len(self.setup.keys)), self.setup.judge.prior)
+        return After(
+            leg,
+            self._sigma(information),
+            {key: float(s) for key, s in zip(self.setup.keys, every, strict=True)},
+            self._correlation(information),
+        )
+
+    def _separated(self, information: Array, pair: PairGoal) -> Separated:
+        names = [self.setup.world.every[k].parameter.name for k in pair.first]
+        return Separated(
+            *pair.names,
+            canonical_correlation(information, pair.first, pair.second),
+            noncentrality_of(information, pair),
+            NONCENTRALITY,
+            pair_ratio(information, pair) <= 1.0,
+            dict(zip(names, map(float, pair.sizes), strict=True)),
+        )
+
+    def _confused(self, information: Array) -> tuple[str, ...]:
+        """Effects that, left free alone, would take what is asked."""
+        places = self.setup.judge.confusing(information)
+        return tuple(text_of(self.setup.system, self.setup.world.every[k]) for k in places)
+
+    def _unseen(self, information: Array) -> tuple[str, ...]:
+        """Effects whose parameters stay as uncertain as before, whole or some of them."""
+        every = sigmas(information, range(len(self.setup.keys)), self.setup.judge.prior)
+        hidden: dict[str, list[str]] = {}
+        whole: dict[str, int] = {}
+        for one, sigma in zip(self.setup.world.every, every, strict=True):
+            text = text_of(self.setup.system, one)
+            whole[text] = whole.get(text, 0) + 1
+            if sigma > UNSEEN * one.prior:
+                hidden.setdefault(text, []).append(one.parameter.name)
+        return tuple(
+            text if len(names) == whole[text] else f"{text}: {', '.join(names)}"
+            for text, names in hidden.items()
+        )
+
+    def _legs(self, found: Outcome) -> tuple[PlannedLeg, ...]:
+        return tuple(
+            PlannedLeg(
+                f"{k} {one.leg.name}",
+                one.from_s,
+                one.to_s,
+                one.leg.words + self._meanwhile(one.leg.stage),
+                self.setup.system.stages[one.leg.stage].name,
+                math.degrees(one.heading_rad) % 360.0,
+            )
+            for k, one in enumerate(found.stretches, start=1)
+        )
+
+    def _meanwhile(self, stage: int) -> str:
+        """What the other vehicles of a chain do."""
+        held = [
+            f"{v.stage} hovers"
+            if v.join_mps == 0.0
+            else f"{v.stage} circles wide at {v.join_mps:.2g} m/s"
+            for k, v in enumerate(self.setup.world.vehicles)
+            if k != stage
+        ]
+        return f"; meanwhile {' and '.join(held)}" if held else ""
+
+    def _standard(self, duration_s: float) -> tuple[StandardPlan, ...]:
+        world, wanted = self.setup.world, self.setup.goal.wanted
+        stage = world.every[wanted[0]].candidate.stage if wanted else 0
+        found = []
+        told = world.looked_at(standard_legs(world.vehicles[stage], stage))
+        for one in rounds(told):
+            in_force().check()
+            needed = rounds_needed(self.setup.judge, one)
+            information = duration_s / one.lasts_s * one.information
+            legs = None if needed is None else math.ceil(one.legs * needed - 1e-9)
+            found.append(
+                StandardPlan(
+                    one.name,
+                    legs,
+                    self._sigma(information),
+                    self._correlation(information),
+                    None if legs is None else legs * one.lasts_s / one.legs / SECONDS,
+                )
+            )
+        return tuple(found)
+
+    def _path(self, found: Outcome) -> tuple[States, Array, tuple[int, ...]]:
+        """The path of the vehicle that drives (of several, the last), as it is written."""
+        driven = found.driven
+        stage = found.stretches[-1].leg.stage
+        states = driven.states[stage]
+        begun, end = float(states.time_s[0]), float(states.time_s[-1])
+        count = min(math.ceil((end - begun) / ROW_S - 1e-9), MOST_PATH_ROWS)
+        time_s = np.linspace(begun, end, count + 1)
+        path = states.at(time_s)
+        rows = np.searchsorted(states.time_s, time_s + 1e-9, side="right") - 1
+        target = np.full((len(time_s), 3), np.nan)
+        if driven.aims is not None:
+            target = driven.aims.aimed_m[np.clip(rows, 0, len(states.time_s) - 1)]
+        starts = np.array([one.from_s for one in found.stretches])
+        leg = np.clip(np.searchsorted(starts, time_s, side="right") - 1, 0, None)
+        return path, target, tuple(int(k) for k in leg)
+
+    def _flown(self) -> Flown | None:
+        """A measured log held against what is asked: its own motion and targets, its own rate."""
+        if not self.setup.request.flown:
+            return None
+        in_force().doing("looking at the flown log")
+        inputs = measured(self.setup.case, self.setup.request.flown)
+        if len(inputs.system.stages) != len(self.setup.system.stages):
+            raise PlanError("--flown: the log holds not all stages of the spec")
+        view = scene(inputs.system, inputs.log, inputs.known)
+        own = replace(self.setup.world, rate_hz=self.setup.world.computed_hz)
+        structure, level = own.noise(view)
+        information = fisher(structure, level, with_shift(view, self.setup.world.every))
+        ratios = self.setup.judge.ratios(information, exact=True)
+        return Flown(
+            tuple(path.name for path in self.setup.request.flown),
+            inputs.log.duration_s,
+            len(inputs.log),
+            self._sigma(information),
+            self._correlation(information),
+            bool(np.all(ratios <= 1.0)),
+        )
+
+
+def _targets(driven: Drive) -> tuple[PlannedTarget, ...]:
+    """The targets in use, numbered from 1."""
+    if driven.aims is None:
+        return ()
+    used = np.unique(driven.aims.aimed[driven.aims.aimed >= 0])
+    return tuple(
+        PlannedTarget(int(k) + 1, *(float(v) for v in driven.aims.targets_m[k])) for k in used
+    )
+
+
+def _noise_words(world: World) -> str:
+    if world.measured is not None:
+        return "as the diagnosis fitted it: white and first-order Gauss-Markov per sensor"
+    return (
+        "as the spec states it: white noise of every sensor's sigma and its timing scatter, and "
+        "the Gauss-Markov noise that its effects list"
+    )
+
+
+def _assumed(world: World) -> tuple[str, ...]:
+    several = len(world.vehicles) > 1
+    return tuple(
+        f"{v.stage}: {words}" if several else words for v in world.vehicles for words in v.assumed
+    )
+
+
+def columns_needed(system: System) -> tuple[str, ...]:
+    """The columns that the log of such a drive needs, by the names of docs/diagnosis.md."""
+    found = ["time_s"]
+    ranged = system.stages[-1].ranging is not None
+    for k, stage in enumerate(system.stages):
+        prefix = f"{stage.name}_" if len(system.stages) > 1 else ""
+        own = [f"position_{axis}_m" for axis in ("north", "east", "down")] if k == 0 else []
+        own += [f"{angle}_deg" for angle in ("roll", "pitch", "yaw")]
+        own += [f"velocity_{axis}_mps" for axis in ("north", "east", "down")]
+        own += [f"rate_{axis}_degps" for axis in "xyz"]
+        if ranged:
+            own += ["range_m", "azimuth_deg", "elevation_deg"]
+        found += [prefix + name for name in own]
+    stem = "target" if ranged else "reference"
+    found += [f"{stem}_{axis}_m" for axis in ("north", "east", "down")]
+    return tuple(found)
