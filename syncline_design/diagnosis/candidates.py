@@ -63,9 +63,9 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
                     continue  # attitude and rates are the better system's
                 if _has_tails(view, effect, sensor, k):
                     continue
-                if _can_have(effect, stage, sensor, k) and not _is_noise_of_heading(
-                    view, effect, k
-                ):
+                if effect.by_heading and heading_is_noise(view, k):
+                    continue
+                if _can_have(effect, stage, sensor, k):
                     found.append(Candidate(effect, sensor, k))
     return tuple(found)
 
@@ -91,21 +91,21 @@ def noise_of_heading(view: Scene, exclude: Sequence[str] = ()) -> tuple[str, ...
         if effect.name not in exclude and view.log.kind != "position"
         for sensor in effect.sensors
         if any(
-            effect.applies(stage, sensor) and _is_noise_of_heading(view, effect, k)
+            effect.by_heading and effect.applies(stage, sensor) and heading_is_noise(view, k)
             for k, stage in enumerate(view.system.stages)
         )
     )
 
 
-def _is_noise_of_heading(view: Scene, effect: Effect, index: int) -> bool:
-    """Whether the noise of the logged heading alone could pass for the effect.
+def heading_is_noise(view: Scene, index: int) -> bool:
+    """Whether the noise of a stage's logged heading could pass for what follows the heading.
 
     A heading of spread s that is logged with white noise sigma correlates with that noise: a false
     slope of sigma^2 / (sigma^2 + s^2), worth n/2 (sigma/s)^2 nat where heading noise is all noise.
     It stays below half a nat from s = sigma sqrt(n) on.
     """
     attitude = view.system.stages[index].attitude
-    if not effect.by_heading or attitude is None:
+    if attitude is None:
         return False
     yaw = np.unwrap(view.rows[index].euler_rad[:, 2])
     return bool(np.std(yaw) < attitude.sigma[2] * np.sqrt(len(view)))

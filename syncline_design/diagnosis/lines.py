@@ -1,11 +1,11 @@
 """Waves that no effect of the dictionary makes: in time, in range, in heading.
 
 What is left, weighed by the noise, is taken apart into waves along every sensor's readings.  A wave
-counts where its power stands out of the neighbouring frequencies', by more than chance among all of
-them (Lomb 1976 for uneven stamps), or, of the few harmonics of the heading, out of the noise; and
-where it is large enough to matter and stands up in noise of another kind.  It is no cause: it goes
-into the model as what it is, a wave in one reading, so that no noise and no other name takes its
-shape.
+counts where its power stands out of the neighbouring frequencies' (Lomb 1976 for uneven stamps) and
+out of the model's noise, each by more than chance among all of them (of the few harmonics of the
+heading, out of the noise alone); and where it is large enough to matter and stands up in noise of
+another kind.  It is no cause: it goes into the model as what it is, a wave in one reading, so that
+no noise and no other name takes its shape.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from syncline_design.diagnosis.candidates import Candidate, Signature, slopes
+from syncline_design.diagnosis.candidates import Candidate, Signature, heading_is_noise, slopes
 from syncline_design.diagnosis.consequence import expected_rms_m, rms_m
 from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model, inner, solve_scaled, thinned
@@ -138,18 +138,20 @@ def best_wave(data: Data, model: Model) -> Signature | None:
     taken = {a.label for a in model.acting}
     left = part.precision.solve(part.error[:, :, None])[:, :, 0]
     found = [
-        (power, wave)
-        for power, wave in (*_in_series(few, left), *_in_heading(few, part, left))
-        if (LINE, wave.sensor, wave.stage) not in taken
+        one
+        for one in (*_in_series(few, left), *_in_heading(few, part, left))
+        if (LINE, one[1].sensor, one[1].stage) not in taken
     ]
     if not found:
         return None
-    _, wave = max(found, key=lambda one: one[0])
+    _, wave, limit = max(found, key=lambda one: one[0])
     candidate = Candidate(wave.effect, wave.sensor, wave.stage)
     columns = _columns(data, candidate)
-    error = model.error
     weighted = model.precision.solve(columns)
-    values = solve_scaled(inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0])
+    score = inner(weighted, model.error[:, :, None])[:, 0]
+    values = solve_scaled(inner(columns, weighted), score)
+    if 0.5 * float(score @ values) < limit:  # neighbours may be still by chance, too
+        return None
     if rms_m(data, columns @ values) < LEAST_SHARE * expected_rms_m(data):
         return None
     return Signature(candidate, {}, columns)
@@ -170,8 +172,8 @@ def _readings(data: Data) -> Iterator[tuple[Target, int, int, Array]]:
                 yield sensor, stages.index(stage), k, loading[:, :, k]  # type: ignore[misc]
 
 
-def _in_series(data: Data, left: Array) -> Iterator[tuple[float, Wave]]:
-    """Waves over time and over range: (how far they stand out, the wave)."""
+def _in_series(data: Data, left: Array) -> Iterator[tuple[float, Wave, float]]:
+    """Waves over time and over range: (how far they stand out, the wave, nat it has to save)."""
     time_s = data.view.log.time_s
     whole_s = max(float(time_s[-1] - time_s[0]), 1e-9)
     count = min(len(np.unique(time_s)), MOST_WAVES)
@@ -195,7 +197,7 @@ def _outstanding(
     along: Array,
     readings: list[tuple[Target, int, int, Array]],
     scores: Array,
-) -> Iterator[tuple[float, Wave]]:
+) -> Iterator[tuple[float, Wave, float]]:
     """The strongest wave of every reading, where its power is none that neighbours have."""
     power = np.empty((len(readings), cycles.size))
     for part in np.array_split(np.arange(cycles.size), max(cycles.size // 500, 1)):
@@ -211,14 +213,14 @@ def _outstanding(
             near_it = cycles[best] + (cycles[1] - cycles[0]) * np.linspace(-1.0, 1.0, FINER)
             turned = np.exp(2j * math.pi * along[:, None] * near_it)
             peak = float(near_it[int(np.argmax(np.abs(score @ turned)))])
-            yield own[best] / usual, Wave(over, peak, sensor, stage, k)
+            yield own[best] / usual, Wave(over, peak, sensor, stage, k), limit
 
 
-def _in_heading(data: Data, model: Model, left: Array) -> Iterator[tuple[float, Wave]]:
+def _in_heading(data: Data, model: Model, left: Array) -> Iterator[tuple[float, Wave, float]]:
     """Harmonics of the heading in the yaw, by their energy in the model's own noise."""
     limit = math.log(HARMONICS / CHANCE)
     for sensor, stage, k, _ in _readings(data):
-        if (sensor, k) != ("attitude", 2):
+        if (sensor, k) != ("attitude", 2) or heading_is_noise(data.view, stage):
             continue
         for harmonic in range(2, HARMONICS + 1):  # once a turn is hard iron
             wave = Wave("heading", float(harmonic), sensor, stage, k)
@@ -227,4 +229,4 @@ def _in_heading(data: Data, model: Model, left: Array) -> Iterator[tuple[float, 
             normal = inner(columns, model.precision.solve(columns))
             energy = 0.5 * float(score @ solve_scaled(normal, score))
             if energy > limit:
-                yield energy, wave
+                yield energy, wave, limit
