@@ -20,9 +20,11 @@ from syncline_design.comparison.acceptance import NAMES, Acceptance, AssumptionR
 from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_log import by_log
 from syncline_design.comparison.judgement import Judgement, together
+from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.result import BlindSpot, Diagnosis, Informative, Rival
 from syncline_design.diagnosis.run import diagnose
 from syncline_design.effects import registry
+from syncline_design.model.known import EffectEntry
 from syncline_design.report.on_acceptance import render_acceptance
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.case import Case
@@ -209,7 +211,7 @@ def test_clock_logs_against_the_clock_of_the_spec(
     """White offsets of 0.1 ms stay within 1 ms, of 10 ms do not; one session claims nothing."""
     folder = clocked.parent / "logs"
     folder.mkdir()
-    logs = sessions_csv(folder, [sigma_s] * sessions, count=300, step_s=10.0)
+    logs = sessions_csv(folder, [sigma_s] * sessions, count=800, step_s=10.0)
     done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
     result = json.loads(done.stdout)
     assert (done.exit_code, result["verdict"]) == (code, status), done.stdout
@@ -222,7 +224,7 @@ def test_clock_logs_against_the_clock_of_the_spec(
 def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
     folder = clocked.parent / "logs"
     folder.mkdir()
-    logs = sessions_csv(folder, [1e-4] * 20, count=300, step_s=10.0)
+    logs = sessions_csv(folder, [1e-4] * 20, count=800, step_s=10.0)
     given = [part for log in logs for part in ("--assign", f"uav/position={log}")]
     done = run("accept", clocked, *given, "--only", "timing", "-o", "json:-")
     statuses = {row["role"]: row["status"] for row in json.loads(done.stdout)["assumptions"]}
@@ -230,11 +232,66 @@ def test_a_log_of_one_sensor_s_stamps_is_assigned(clocked: Path) -> None:
     assert done.exit_code == 3
 
 
-def stamped(path: Path, fault_s: float) -> Path:
+@pytest.mark.parametrize("latency_s", [1e-3, 4e-3])
+def test_what_turns_the_sync_limit_that_nobody_wrote_turns_the_promise(
+    latency_s: float, tmp_path: Path
+) -> None:
+    """As `check` says of the same spec with the latency listed; its one requirement is ACC-1."""
+    case = load(EXAMPLE)
+    promise = promise_of(case)
+    assert promise is not None
+    entry = EffectEntry("latency", "position", "multirotor", (("latency_s", latency_s),))
+    listed = EXAMPLE.read_text("utf-8") + (
+        "effects: [{effect: latency, sensor: position, stage: multirotor, "
+        f"parameters: {{latency_s: {latency_s} s}}}}]\n"
+    )
+    path = tmp_path / "listed.yaml"
+    path.write_text(listed, "utf-8")
+    verdict = check_loaded(load(path), CheckSettings(monte_carlo=False))
+    assert promise.turned([entry]) == (verdict.verdict != "meets") == (latency_s > 2.7e-3)
+
+
+def test_a_moment_beyond_the_limit_is_no_proof_that_it_is_kept(
+    known: tuple[Case, Diagnosis],
+) -> None:
+    case, found = known
+    speed = replace(found.log.motion["speed"], most=14.1)
+    beyond = replace(found, log=replace(found.log, motion={**found.log.motion, "speed": speed}))
+    row = dict(judged(case, beyond))["platform", "speed"]
+    assert row.status == "not_shown"
+    assert row.measured is not None
+    assert row.measured.value == 14.1
+
+
+@pytest.mark.parametrize(("factor", "status", "code"), [(2, "not_shown", 3), (3, "broken", 1)])
+def test_a_clock_that_steps_beyond_its_bound_now_and_then_is_not_borne_out(
+    clocked: Path, factor: int, status: str, code: int
+) -> None:
+    """5 ms for 4 % of the time: beyond 1 ms for more than 0.27 %, not more than 4.55 % of it."""
+    text = CLOCKED.replace("stages:", f"coverage_factor: {factor}\nstages:")
+    clocked.write_text(text, "utf-8")
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    rng = np.random.default_rng(3)
+    logs = []
+    for k in range(8):
+        time_s = 1.7e9 + 86400.0 * k + 10.0 * np.arange(400)
+        late = 1e-4 * rng.normal(size=400)
+        late[200:216] += 5e-3
+        rows = (f"{t:.1f},{x:.9f}" for t, x in zip(time_s, late, strict=True))
+        path = folder / f"run{k}.csv"
+        path.write_text("\n".join(["time_s,offset_s", *rows]) + "\n", "utf-8")
+        logs.append(path)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert (row["status"], done.exit_code) == (status, code), row
+
+
+def stamped(path: Path, fault_s: float, early_s: float = 0.0) -> Path:
     """Ten minutes at 10 Hz, received with gamma delays of 0.1 ms; the second half moved."""
     rng = np.random.default_rng(7)
     true_s = 1.7e9 + 0.1 * np.arange(6000)
-    stamp_s = true_s + np.where(np.arange(6000) < 3000, 0.0, fault_s)
+    stamp_s = true_s - early_s + np.where(np.arange(6000) < 3000, 0.0, fault_s)
     receive_s = true_s + 1e-4 * rng.gamma(2.0, size=6000)
     rows = (f"{a:.9f},{b:.9f}" for a, b in zip(stamp_s, receive_s, strict=True))
     path.write_text("\n".join(["stamp_s,receive_s", *rows]) + "\n", "utf-8")
@@ -255,6 +312,15 @@ def test_stamps_and_receipts_of_one_sensor(clocked: Path, fault_s: float, status
     assert done.exit_code == {"holds": 3, "broken": 1}[status]
 
 
+def test_stamps_that_may_be_early_by_more_than_tau_are_not_shown(clocked: Path) -> None:
+    """30 ms before every receipt: delay or error, the log cannot say; 2 ms are assumed."""
+    log = stamped(clocked.parent / "uav_position.csv", 0.0, 0.03)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == "not_shown"
+    assert 0.03 < rows["position"]["measured"]["value"] < 0.032
+
+
 def test_what_cannot_be_asked_is_refused(clocked: Path, tmp_path: Path) -> None:
     for arguments, words in (
         (["--only", "colour"], "expected some of timing"),
@@ -268,7 +334,7 @@ def test_what_cannot_be_asked_is_refused(clocked: Path, tmp_path: Path) -> None:
 
 
 def test_a_clock_log_of_several_vehicles_needs_an_owner(tmp_path: Path) -> None:
-    (log,) = sessions_csv(tmp_path, [1e-4], count=300, step_s=10.0)
+    (log,) = sessions_csv(tmp_path, [1e-4], count=800, step_s=10.0)
     with pytest.raises(BadInput, match="several vehicles"):
         accept(load(ROOT / "specs" / "rov_relay.yaml"), [log], AcceptSettings(("clock",)))
 
@@ -277,7 +343,7 @@ def test_a_spec_that_fails_on_paper_is_not_accepted(clocked: Path) -> None:
     clocked.write_text(CLOCKED.replace("0.30 m", "1 mm"), "utf-8")
     folder = clocked.parent / "logs"
     folder.mkdir()
-    logs = sessions_csv(folder, [1e-4] * 20, count=300, step_s=10.0)
+    logs = sessions_csv(folder, [1e-4] * 20, count=800, step_s=10.0)
     done = run("accept", clocked, *logs, "--only", "clock")
     assert done.exit_code == 1
     assert "does not meet its requirements on paper" in done.stdout

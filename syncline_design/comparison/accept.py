@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Final
 
@@ -31,6 +31,7 @@ from syncline_design.diagnosis.run import diagnose
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case
+from syncline_design.verdict.measured import coverage_of
 from syncline_design.verdict.optimise import as_measured
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
@@ -87,7 +88,9 @@ def accept(
 
 
 def _evidence(case: Case, files: EvidenceFiles, settings: AcceptSettings, seed: int) -> _Evidence:
-    studies = {name: study_logs(paths, settings.timing) for name, paths in files.clocks.items()}
+    share = max(settings.timing.coverage, coverage_of(case))
+    timing = replace(settings.timing, coverage=share)
+    studies = {name: study_logs(paths, timing) for name, paths in files.clocks.items()}
     audited = None
     if files.stamps and "timing" in settings.asked:
         audited = held_against(audit(files.stamps), case, seed)
@@ -119,9 +122,9 @@ def _said(
     vehicles = {stage.choice.name: stage.choice.vehicle_name for stage in case.stages}
     vehicle = vehicles[one.stage]
     if one.name == "clock" and vehicle in evidence.clocks:
-        yield by_clock(one, evidence.clocks[vehicle])
+        yield by_clock(one, evidence.clocks[vehicle], coverage_of(case))
     if one.name == "timing" and f"{one.stage}/{one.role}" in evidence.clocks:
-        yield by_clock(one, evidence.clocks[f"{one.stage}/{one.role}"])
+        yield by_clock(one, evidence.clocks[f"{one.stage}/{one.role}"], coverage_of(case))
     stamped = None if evidence.stamps is None else by_stamps(one, evidence.stamps)
     if one.name == "timing" and stamped is not None:
         yield stamped

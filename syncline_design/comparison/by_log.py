@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
-from syncline_design.comparison.acceptance import MeasuredFigure, Status
+from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding
@@ -159,9 +159,13 @@ def _of_platform(one: Assumed, found: Diagnosis, last_stage: str) -> Judgement:
     if motion is None or one.stage != last_stage or one.value is None:
         return Judgement("not_shown", "the log does not tell of it")
     reached = max(abs(motion.low), abs(motion.high)) * unit
-    status: Status = "holds" if reached >= MOVED * one.value else "not_shown"
-    kept = "95 % of the log is below" if status == "holds" else "the log stays far below the limit"
-    return Judgement(status, kept, MeasuredFigure(reached))
+    most = reached if motion.most is None else motion.most * unit
+    if reached < MOVED * one.value:
+        return Judgement("not_shown", "the log stays far below the limit", MeasuredFigure(most))
+    if most > one.value:
+        words = "the log goes beyond the limit for moments, or its readings scatter that far"
+        return Judgement("not_shown", words, MeasuredFigure(most))
+    return Judgement("holds", "the most that the log reaches", MeasuredFigure(most))
 
 
 def _check(checks: Iterable[Check], code: str, stage: str) -> Check | None:

@@ -24,20 +24,23 @@ def by_stamps(one: Assumed, found: Audit) -> Judgement | None:
     faults = [f for f in stream.faults if f.counts and not (one.on_arrival and f.fault == _LATE)]
     late = any(fault.fault == _LATE for fault in stream.faults)
     size = stream.residual_s.as_recorded if late else stream.residual_s.bound
-    figure = None if size is None else MeasuredFigure(size)
     if faults:
+        jumps = [v for f in faults for k, v in f.parameters.items() if k == "seconds"]
+        sizes = [abs(v) for v in jumps if isinstance(v, float)]
+        figure = MeasuredFigure(max(sizes)) if sizes else None
         words = "; ".join(f"{fault.fault}: {fault.evidence}" for fault in faults)
         return Judgement("broken", f"stream {stream.name}: {words}", figure)
     if stream.stamps.secondary is None or size is None:
         return Judgement("not_shown", f"stream {stream.name} has one time a message")
-    return _sound(one.value, stream, size)
+    return _sound(one.value, stream, abs(stream.offset_s or 0.0) + size)
 
 
 def _sound(bound_s: float, stream: StreamAudit, size: float) -> Judgement:
+    """size: the longest time between a stamp and its receipt, which bounds the stamp's error."""
     seen, asked = format_duration(size), format_duration(bound_s)
-    lead = f"stream {stream.name} is sound; receipts scatter by {seen}"
+    lead = f"stream {stream.name} is sound; receipts come within {seen} of their stamps"
     if size <= bound_s:
-        return Judgement("holds", f"{lead}, within the {asked} assumed but for a constant delay",
+        return Judgement("holds", f"{lead}, and {asked} are assumed",
                          MeasuredFigure(size))  # fmt: skip
     return Judgement("not_shown", f"{lead}, transport included: more than the {asked} assumed",
                      MeasuredFigure(size))  # fmt: skip

@@ -26,6 +26,7 @@ from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import System
 from syncline_design.spec.case import Case
 
+IMPLIED_SYNC = 1.0  # tau stays below tau_crit where no requirement says otherwise
 SHARE = 0.2  # of the spec's RMS, from which a finding is material
 RAISED = 0.05  # of the total error
 LEFT_SHARE = 1.0 / 3.0  # of the spec's RMS, from which what is left is material
@@ -88,9 +89,9 @@ def promise_of(case: Case) -> Promise | None:
         return None
     problem, design = found
     design_budget(case, problem, design)
-    wanted = {kind: _limits(case, kind) for kind in ("accuracy", "sync")}
+    accuracy, sync = _limits(case, "accuracy"), _limits(case, "sync") or (IMPLIED_SYNC,)
     per_sensor = case.spec.sync_model == "per_sensor"
-    return Promise(system_of(case, problem, design), wanted["accuracy"], wanted["sync"], per_sensor)
+    return Promise(system_of(case, problem, design), accuracy, sync, per_sensor)
 
 
 def _limits(case: Case, kind: str) -> tuple[float, ...]:

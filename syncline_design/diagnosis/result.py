@@ -290,11 +290,12 @@ class Informative(Record):
 
 @dataclass(frozen=True, slots=True)
 class Motion(Record):
-    """5 and 95 % quantile of one covariate."""
+    """5 and 95 % quantile of one covariate; most: its largest size."""
 
     low: float
     high: float
     unit: str
+    most: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -357,7 +357,7 @@ def _unseen_parts(result: SearchResult) -> tuple[str, ...]:
 def _log_read(log: Log, data: Data) -> LogRead:
     """What was read of a log, and how it moves: every covariate but time and angles."""
     motion = {
-        c.name: Motion(float(low), float(high), c.unit)
+        c.name: Motion(float(low), float(high), c.unit, float(np.max(np.abs(c.values))))
         for c in covariates(data.view)
         if c.name in ("speed", "turn_rate", "range")
         for low, high in [np.quantile(c.values, [0.05, 0.95])]

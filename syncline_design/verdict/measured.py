@@ -15,7 +15,12 @@ from syncline_design.verdict.design_data import UsedEntry
 from syncline_design.verdict.tree import Caution, ClaimShown, MeasuredEntry
 
 # k = 2 is commonly said to be 95 % (it is 95.45 %), k = 3 to be 99.7 % (99.73 %): JCGM 100, G.1.3
-_COMMONLY = 1.12
+COMMONLY = 1.12
+
+
+def coverage_of(case: Case) -> float:
+    """Share of the time for which a spec takes its bounds to hold: P(|z| <= coverage_factor)."""
+    return math.erf(float(case.spec.coverage_factor) / math.sqrt(2.0))
 
 
 def measured(case: Case, entries: Sequence[UsedEntry]) -> tuple[MeasuredEntry, ...] | None:
@@ -83,8 +88,8 @@ def _of_entry(case: Case, used: UsedEntry, claim: MeasuredClaim | None) -> Itera
         yield Caution("measured-claim", message, entry=used.id, key=key)
         return
     k = float(case.spec.coverage_factor)
-    beyond = math.erfc(k / math.sqrt(2.0))
-    if 1.0 - float(claim.coverage) > _COMMONLY * beyond:
+    beyond = 1.0 - coverage_of(case)
+    if 1.0 - float(claim.coverage) > COMMONLY * beyond:
         yield Caution(
             "measured-claim",
             f"{used.id}: its bound was measured to hold for {100.0 * claim.coverage:.4g} % of the "
