@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -145,8 +146,6 @@ def diagnose(
 
     logs: a file or several; none: those that the spec names.
     """
-    from dataclasses import replace
-
     from syncline_design import diagnosis
     from syncline_design.comparison.meaning import meaning, with_design
     from syncline_design.planning.next_drive import next_drive

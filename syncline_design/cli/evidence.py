@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -119,22 +120,13 @@ def diagnose(
     )
     with watched(deadline, targets, quiet=quiet, steps=False), _progress(quiet) as progress:
         case = load(spec)
-        found = diagnose_log(as_measured(case, seed), log or (), settings, progress)
+        pinned = as_measured(case, seed)
+        found = diagnose_log(pinned, log or (), settings, progress)
         means = _meaning(case, found, seed, deadline)
-        found = _with_drive(as_measured(case, seed), found)
+        found = _with_drive(pinned, found)
     whole = with_design(found, means)
-    if write_spec is not None and means is not None:
-        from syncline_design.spec.edit import with_effects_text
-        from syncline_design.spec.edit import write_spec as write_checked
-
-        write_checked(with_effects_text(case, found.effects_entries()), write_spec)
-        say(f"spec with the findings written to {write_spec}")
-    elif write_spec is not None:
-        found_any = bool(found.effects_entries())
-        nothing = (
-            "nothing was found that belongs into a spec" if found.findings else "nothing found"
-        )
-        say(f"{'the time was over' if found_any else nothing}: no spec written")
+    if write_spec is not None:
+        _write_findings(case, found, means, write_spec)
     text = console(on_diagnosis(whole))
     emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
     return found.demanded_exit_code(informative=require_informative)
@@ -155,14 +147,28 @@ def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> Des
         return None
 
 
+def _write_findings(case: Case, found: Diagnosis, means: DesignMeaning | None, path: Path) -> None:
+    """Write the spec with the findings in it, or say why there is none."""
+    entries = found.effects_entries()
+    if means is not None:
+        from syncline_design.spec.edit import with_effects_text, write_spec
+
+        write_spec(with_effects_text(case, entries), path)
+        say(f"spec with the findings written to {path}")
+        return
+    if entries:
+        why = "the time was over"
+    else:
+        why = "nothing was found that belongs into a spec" if found.findings else "nothing found"
+    say(f"{why}: no spec written")
+
+
 def _with_drive(case: Case, found: Diagnosis) -> Diagnosis:
     """The diagnosis with the drive that would tell what its log could not."""
     from syncline_design.machine.deadline import in_force
 
     if in_force().is_over or not any(one.aliases for one in found.findings):
         return found
-    from dataclasses import replace
-
     from syncline_design.planning.next_drive import next_drive
 
     return replace(found, plan=next_drive(case, found))

@@ -229,6 +229,8 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class _Tried:
+    """A trial made: the usual error of the log with the fault undone."""
+
     acting: Acting
     mend: Callable[[Log], Log]
     size_m: float
