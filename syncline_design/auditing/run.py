@@ -23,6 +23,7 @@ from syncline_design.auditing.stream import Examined, examined, is_receipt
 from syncline_design.auditing.together import held_together
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.stream import UNSET, Incomplete, Stream
+from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead, content_of, note_read
 from syncline_design.spec.load import BadInput
@@ -89,8 +90,6 @@ def _open(
 
 
 def _nothing(path: Path) -> BadInput:
-    from syncline_design.logs.refusals import refuse
-
     return refuse(path, "no message in it", expected="at least one message with a stamp")
 
 

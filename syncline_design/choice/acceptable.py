@@ -12,23 +12,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from syncline_design.choice.judged import judgement
 from syncline_design.choice.narrowed import Narrowed, kept
 from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Deadline
 from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import Design, Judgement, Problem
-
-NOTHING_SIMULATED = Judgement()
-
-
-def judgement(problem: Problem, design: Design) -> Judgement:
-    """What simulation says of a design."""
-    return NOTHING_SIMULATED if problem.judge is None else problem.judge.judge(problem, design)
-
-
-def refusals(problem: Problem) -> int:
-    """How often simulation was refused because too many designs had been simulated."""
-    return 0 if problem.judge is None else problem.judge.refusals
 
 
 def iter_acceptable(

@@ -7,11 +7,12 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
 
-from syncline_design.choice.acceptable import iter_acceptable, iter_judged, judgement
+from syncline_design.choice.acceptable import iter_acceptable, iter_judged
 from syncline_design.choice.anytime import in_hand, unproven
 from syncline_design.choice.enumerate import best_by_enumeration
 from syncline_design.choice.evaluate import broken, evaluate, rank
 from syncline_design.choice.front import merged_front
+from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import (
     METHODS,

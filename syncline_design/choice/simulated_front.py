@@ -11,8 +11,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from syncline_design.choice.acceptable import judgement, promising
+from syncline_design.choice.acceptable import promising
 from syncline_design.choice.evaluate import error_key, evaluate
+from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint, Unfinished
 from syncline_design.choice.ranked import iter_best

@@ -14,10 +14,10 @@ from fractions import Fraction
 
 import numpy as np
 
-from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate, pair_bound
+from syncline_design.choice.judged import judgement
 from syncline_design.choice.narrowed import kept
 from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime, Unfinished

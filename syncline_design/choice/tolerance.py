@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
-from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.core import Beside, best_from
 from syncline_design.choice.decide import choose
-from syncline_design.choice.evaluate import Known, chosen_options, evaluate
+from syncline_design.choice.evaluate import Known, broken, chosen_options, evaluate
+from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import RESOURCES
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime
 from syncline_design.choice.problem import build_problem, selection_of, with_everything
@@ -169,8 +169,6 @@ def _least_error(problem: Problem, design: Design, r: int, limit: float) -> Frac
 
 
 def _budgets_broken(problem: Problem, design: Design, plain: Design) -> tuple[str, ...]:
-    from syncline_design.choice.evaluate import broken
-
     return broken(problem, evaluate(problem, Design(plain.options, design.clocks)), accuracy=False)
 
 

@@ -200,15 +200,13 @@ def reproduce(
     deadline = deadline_of(time_limit)
     from syncline_design.paper import reproduce as paper
     from syncline_design.report.formats import REPRODUCE_FORMATS
-    from syncline_design.report.json_out import json_text
     from syncline_design.report.on_paper import on_paper
     from syncline_design.report.render_console import console
-    from syncline_design.report.render_html import html
+    from syncline_design.report.rendered import rendered
 
     targets = output_targets(output, REPRODUCE_FORMATS)
     with watched(deadline, targets, quiet=quiet):
         found = paper.reproduce(seed=seed)
     said = on_paper(found)
-    render = {"json": lambda: json_text(found.to_json()), "html": lambda: html(said)}
-    emit(console(said), targets, lambda name: render[name](), quiet=quiet)
+    emit(console(said), targets, lambda name: rendered(name, found, lambda: said), quiet=quiet)
     return 0 if found.ok else 1

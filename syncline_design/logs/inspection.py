@@ -20,6 +20,7 @@ from syncline_design.logs.run_parts import Known, one_run
 from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
 from syncline_design.machine.records import Json, Named, Record, optional
+from syncline_design.spec.edit import flow_text
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
 
@@ -339,6 +340,4 @@ def _axes(parts: dict[Role, Part], choice: LogChoice) -> Json:
 
 
 def _text(block: Json) -> str:
-    from syncline_design.spec.edit import flow_text
-
     return f"log: {flow_text(block)}" if block else ""

@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from syncline_design.machine.records import Record
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget
@@ -17,6 +19,7 @@ from syncline_design.model.horizon import Horizon
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import NO_ERROR
+from syncline_design.simulation.worst_case import worst_cases
 from syncline_design.spec.catalog import Catalog, SensorEntry
 
 Payload = tuple[str, str, str]  # position, attitude, ranging
@@ -135,10 +138,6 @@ def compare(figure: PaperPlot, points: int = 13, seed: int = 0) -> tuple[Simulat
     """
     if not figure.simulated:
         return ()
-    import numpy as np
-
-    from syncline_design.simulation.worst_case import worst_cases
-
     (curve,) = figure.curves
     if curve.system is None:
         raise ValueError(f"figure {figure.number} has no system to simulate")

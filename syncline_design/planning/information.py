@@ -18,7 +18,13 @@ import numpy as np
 from syncline_design.diagnosis import candidates as effects_of
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import inner
-from syncline_design.diagnosis.noise import NoiseLevel, Structure, as_specified, precision
+from syncline_design.diagnosis.noise import (
+    NoiseLevel,
+    Structure,
+    as_specified,
+    marginal_variance,
+    precision,
+)
 from syncline_design.diagnosis.result import Noise
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
@@ -134,8 +140,6 @@ def rms_per_unit(slopes: Array) -> Array:
 
 def noise_rms_m(structure: Structure, level: NoiseLevel, visible: Array) -> float:
     """RMS [m] that the noise makes, on the components that are known, (n, 3)."""
-    from syncline_design.diagnosis.noise import marginal_variance
-
     variance = marginal_variance(structure, level) * visible
     return float(np.sqrt(np.mean(np.sum(variance, axis=1))))
 

@@ -25,10 +25,8 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.formats import ACCEPT_FORMATS as ACCEPT_FORMATS
 from syncline_design.report.github import github_command, github_notice
-from syncline_design.report.json_out import json_text
 from syncline_design.report.junit import junit_text, suite_of
-from syncline_design.report.render_html import html
-from syncline_design.report.render_markdown import markdown
+from syncline_design.report.rendered import rendered
 from syncline_design.report.sarif import sarif_log
 from syncline_design.report.table import Cell, Table, Tone, table
 
@@ -150,14 +148,10 @@ def acceptance_notices(result: Acceptance) -> list[Notice]:
 def render_acceptance(name: str, result: Acceptance) -> str:
     """The text of one format."""
     match name:
-        case "json":
-            return json_text(result.to_json())
-        case "html":
-            return html(on_acceptance(result))
-        case "markdown":
-            return markdown(on_acceptance(result))
-        case _:
+        case "junit" | "sarif" | "github":
             return _for_ci(name, result)
+        case _:
+            return rendered(name, result, lambda: on_acceptance(result))
 
 
 def _for_ci(name: str, result: Acceptance) -> str:

@@ -24,6 +24,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 
 if TYPE_CHECKING:
@@ -283,14 +284,4 @@ def _evidence(result: Audit) -> Table:
 
 def render_audit(name: str, result: Audit) -> str:
     """The text of one format."""
-    if name == "json":
-        from syncline_design.report.json_out import json_text
-
-        return json_text(result.to_json())
-    if name == "markdown":
-        from syncline_design.report.render_markdown import markdown
-
-        return markdown(on_audit(result))
-    from syncline_design.report.render_html import html
-
-    return html(on_audit(result))
+    return rendered(name, result, lambda: on_audit(result))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.evaluate import chosen_options, evaluate
+from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import ROADS, FrontPoint, PriceStep
 from syncline_design.choice.slack import Slack

@@ -16,9 +16,7 @@ from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.document import Document, Items, Node, section, show
 from syncline_design.report.formats import DIFF_FORMATS as DIFF_FORMATS
-from syncline_design.report.json_out import json_text
-from syncline_design.report.render_html import html
-from syncline_design.report.render_markdown import markdown
+from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import kind_words, status_word
@@ -27,21 +25,13 @@ from syncline_design.report.words import KINDS, OUTCOMES
 
 def render_diff(name: str, data: Difference) -> str:
     """The text of one format."""
-    match name:
-        case "json":
-            return json_text(data.to_json())
-        case "html":
-            return html(on_difference(data))
-        case "markdown":
-            return markdown(on_difference(data))
-        case "github":
-            level = "notice" if data.exit_code == 0 else "error"
-            text = visible(headline(data)).replace("%", "%25")
-            file = visible(data.new.file)
-            place = file.replace("%", "%25").replace(":", "%3A").replace(",", "%2C")
-            return f"::{level} file={place},line=1::{text}\n"
-        case _:
-            raise ValueError(f"unknown format {name}")
+    if name != "github":
+        return rendered(name, data, lambda: on_difference(data))
+    level = "notice" if data.exit_code == 0 else "error"
+    text = visible(headline(data)).replace("%", "%25")
+    file = visible(data.new.file)
+    place = file.replace("%", "%25").replace(":", "%3A").replace(",", "%2C")
+    return f"::{level} file={place},line=1::{text}\n"
 
 
 def on_difference(data: Difference) -> Document:

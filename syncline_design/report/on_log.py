@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Final
 
 from syncline_design.logs.inspection import InspectedStream, LogInspection
@@ -20,6 +20,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, Tone, table
 
 _KINDS: Final = {
@@ -152,13 +153,4 @@ def _notes(result: LogInspection) -> list[Node]:
 
 def render_log(name: str, result: LogInspection) -> str:
     """The inspection in one of the command's formats."""
-    from syncline_design.report.json_out import json_text
-    from syncline_design.report.render_html import html
-    from syncline_design.report.render_markdown import markdown
-
-    renderers: dict[str, Callable[[], str]] = {
-        "json": lambda: json_text(result.to_json()),
-        "html": lambda: html(on_log(result)),
-        "markdown": lambda: markdown(on_log(result)),
-    }
-    return renderers[name]()
+    return rendered(name, result, lambda: on_log(result))

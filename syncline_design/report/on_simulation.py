@@ -22,8 +22,7 @@ from syncline_design.report.document import (
     show,
 )
 from syncline_design.report.formats import SIMULATE_FORMATS as SIMULATE_FORMATS
-from syncline_design.report.json_out import json_text
-from syncline_design.report.render_html import html
+from syncline_design.report.rendered import rendered
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -165,15 +164,9 @@ def _effects(system: System) -> list[Node]:
 
 def render_simulate(name: str, run: SimulatedSpec) -> str:
     """The text of one format; csv holds the comparison over tau."""
-    match name:
-        case "csv":
-            return grid_csv(run.result)
-        case "json":
-            return json_text(run.result.to_json())
-        case "html":
-            return html(on_simulation(run.result, run.system))
-        case _:
-            raise ValueError(f"unknown format {name}")
+    if name == "csv":
+        return grid_csv(run.result)
+    return rendered(name, run.result, lambda: on_simulation(run.result, run.system))
 
 
 def grid_csv(result: Simulation) -> str:

@@ -24,6 +24,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 
 if TYPE_CHECKING:
@@ -354,14 +355,4 @@ def _evidence(result: Timing) -> Table:
 
 def render_timing(name: str, result: TimingAndSpec) -> str:
     """The text of one format."""
-    if name == "json":
-        from syncline_design.report.json_out import json_text
-
-        return json_text(result.to_json())
-    if name == "markdown":
-        from syncline_design.report.render_markdown import markdown
-
-        return markdown(on_timing(result))
-    from syncline_design.report.render_html import html
-
-    return html(on_timing(result))
+    return rendered(name, result, lambda: on_timing(result))

@@ -15,8 +15,7 @@ from syncline_design.planning.telling import PlanRun
 from syncline_design.report.csv_out import plain_csv
 from syncline_design.report.json_out import json_text
 from syncline_design.report.on_plan import on_plan
-from syncline_design.report.render_html import html
-from syncline_design.report.render_markdown import markdown
+from syncline_design.report.rendered import rendered
 from syncline_design.report.text import visible
 
 COLUMNS: Final = (
@@ -39,10 +38,6 @@ LINE_ROWS: Final = 5  # rows from point to point of a drawn line
 def render_plan(name: str, run: PlanRun) -> str:
     """The text of one format."""
     match name:
-        case "json":
-            return json_text(run.result.to_json())
-        case "markdown":
-            return markdown(on_plan(run))
         case "csv":
             return waypoints_csv(run)
         case "kml":
@@ -50,7 +45,7 @@ def render_plan(name: str, run: PlanRun) -> str:
         case "qgc":
             return qgc(run)
         case _:
-            return html(on_plan(run))
+            return rendered(name, run.result, lambda: on_plan(run))
 
 
 def waypoints_csv(run: PlanRun) -> str:

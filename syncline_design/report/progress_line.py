@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import sys
 import time
-from typing import TextIO
+from typing import TYPE_CHECKING, TextIO
 
-from syncline_design.studies.result import Progress
+if TYPE_CHECKING:
+    from syncline_design.studies.result import Progress
 
 ON_TERMINAL_S, IN_LOG_S = 0.2, 10.0
 SILENT_S = 1.0  # nothing is said of what is done within a second

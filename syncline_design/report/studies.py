@@ -7,10 +7,8 @@ from typing import Any
 from syncline_design.report import study_findings
 from syncline_design.report.csv_out import csv_text
 from syncline_design.report.formats import STUDY_FORMATS as STUDY_FORMATS
-from syncline_design.report.json_out import json_text
 from syncline_design.report.on_study import on_study
-from syncline_design.report.render_html import html
-from syncline_design.report.render_markdown import markdown
+from syncline_design.report.rendered import rendered
 from syncline_design.report.text import visible
 from syncline_design.studies.result import StudyResult
 from syncline_design.studies.table import Value, columns, rows, text_columns
@@ -23,14 +21,10 @@ def render_study(name: str, result: StudyResult) -> str | bytes:
             return study_csv(result)
         case "parquet":
             return study_parquet(result)
-        case "json":
-            return json_text(result.to_json())
-        case "html":
-            return html(on_study(result))
-        case "markdown":
-            return markdown(on_study(result))
-        case _:
+        case "junit" | "sarif" | "github":
             return _for_ci(name, result)
+        case _:
+            return rendered(name, result, lambda: on_study(result))
 
 
 def _for_ci(name: str, result: StudyResult) -> str:

@@ -16,6 +16,7 @@ from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.options import Option
 from syncline_design.choice.outcome import Unfinished
 from syncline_design.choice.table import Design, Judge, Judgement, Problem, RoleTable
+from syncline_design.effects import registry
 from syncline_design.machine.input_files import FileContent
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
@@ -172,8 +173,6 @@ class _SpecJudge:
 
     def _noise_is_changed(self) -> bool:
         """Whether a known effect changes the noise of a sensor."""
-        from syncline_design.effects import registry
-
         kinds = [registry()[one.effect].kind for one in self.case.effects]
         return "stochastic" in kinds
 

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-from syncline_design.choice.acceptable import judgement
 from syncline_design.choice.effect_tables import design_budget
+from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem

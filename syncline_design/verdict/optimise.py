@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from syncline_design import __version__
-from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.decide import best
 from syncline_design.choice.explain import explain
 from syncline_design.choice.front import front, staircase
+from syncline_design.choice.judged import refusals
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import (
     Explanation,

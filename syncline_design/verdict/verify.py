@@ -8,8 +8,8 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
-from syncline_design.choice.acceptable import refusals
 from syncline_design.choice.chosen_system import system_of
+from syncline_design.choice.judged import refusals
 from syncline_design.choice.outcome import Proof
 from syncline_design.choice.problem import selection_of, sole_design
 from syncline_design.choice.table import Design, Problem
