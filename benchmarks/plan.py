@@ -146,7 +146,8 @@ def one_plan(number: int, folder: Path, only: str) -> dict[str, object] | None:
     found: dict[str, object] = {
         "number": number, "platform": platform, "asked": names, "separate": separate,
         "reached": run.result.reached, "duration_s": run.result.duration_s,
-        "plan_cpu_s": planned - begun,
+        "plan_cpu_s": planned - begun, "legs": [leg.name for leg in run.result.legs],
+        "lines_s": min((60.0 * s.minutes for s in run.result.standard if s.minutes), default=None),
     }  # fmt: skip
     if not run.result.reached:
         return found

@@ -21,10 +21,15 @@ from typer.testing import CliRunner
 import syncline_design as sd
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
+from syncline_design.planning.drives import whole_drive
 from syncline_design.planning.result import Plan
+from syncline_design.planning.search import lasting_s
+from syncline_design.planning.setup import PlanRequest, Setup
+from syncline_design.planning.standard import MOST_LEGS, Lines, most_within
 from syncline_design.planning.telling import PlanRun
 from syncline_design.report.plans import render_plan
 from syncline_design.report.result_schemas import result_schema
+from syncline_design.spec.load import load
 from tests.world.bound import cramer_rao
 from tests.world.hidden import hidden
 from tests.world.motions import Sensors
@@ -239,6 +244,43 @@ def test_constant_speed_never_tells_a_latency_from_a_lever_arm(pair: PlanRun) ->
         assert correlation is not None
         assert correlation > 0.99
     assert pair.result.after[-1].correlation < known["patch-test lines"].correlation  # type: ignore[operator]
+
+
+def test_line_plans_are_taken_leg_by_leg_with_their_turns() -> None:
+    """Added up one by one: three legs of 20, 30 and 20 s, turns of 5, 7 and 7 s before each."""
+    information = np.array([k * np.eye(2) for k in (1.0, 2.0, 3.0)])
+    lines = Lines("", information, np.array([20.0, 30.0, 20.0]), np.array([5.0, 7.0, 7.0]))
+    total, clock = np.zeros((2, 2)), 0.0
+    for count in range(8):
+        assert np.allclose(lines.told(count), total)
+        assert lines.duration_s(count) == pytest.approx(clock)
+        assert np.allclose(lines.told_in(clock), total)
+        leg, turn = count % 3, (0.0 if count == 0 else lines.turns_s[count % 3])
+        halfway = lines.told_in(clock + turn + 0.5 * lines.lasts_s[leg])
+        assert np.allclose(halfway, total + 0.5 * information[leg])
+        total, clock = total + information[leg], clock + turn + lines.lasts_s[leg]
+    for most in (0, 1, 2, 3, 7, 64, 1000):
+        assert most_within(lambda count, most=most: count <= most) == most  # type: ignore[misc]
+    assert most_within(lambda _: True) == MOST_LEGS
+
+
+def test_no_line_plan_that_tells_as_much_is_much_shorter(run: PlanRun, pair: PlanRun) -> None:
+    """Its lines begin at speed, where the drive has to gain it; a patch test needs three lines."""
+    for one in (run.result, pair.result):
+        known = {line.name: line for line in one.standard}
+        assert (known["patch-test lines"].legs or 3) >= 3
+        minutes = [line.minutes for line in one.standard if line.minutes is not None]
+        assert one.duration_s / 60.0 <= 1.2 * min(minutes, default=math.inf)
+
+
+def test_the_time_of_a_search_is_that_of_the_drive(spec: Path) -> None:
+    """Any legs in any order: as long by their turns as the course that is steered."""
+    setup = Setup.begun(load(spec), PlanRequest())
+    rng = np.random.default_rng(4)
+    for _ in range(5):
+        legs = [setup.told[k] for k in rng.integers(len(setup.told), size=4)]
+        stretches, _ = whole_drive(setup.world, legs)
+        assert lasting_s(legs) == pytest.approx(stretches[-1].to_s, abs=0.2)
 
 
 def test_a_drive_that_is_driven_names_what_was_hidden(pair: PlanRun, spec: Path) -> None:

@@ -137,7 +137,7 @@ class World:
     def _summed(self, leg: Leg, parts: Sequence[tuple[Array, Array, Array]]) -> Told:
         vehicle = self.vehicles[leg.stage]
         path = travelled(vehicle, leg.course)
-        between = transition(vehicle, math.pi).duration_s
+        turns_s = (transition(vehicle, 0.0).duration_s, transition(vehicle, math.pi).duration_s)
         moved = path.position_m[-1, :2] - path.position_m[0, :2]
         now, once, twice = (np.array([p[k] for p in parts]) for k in range(3))
         return Told(
@@ -147,7 +147,7 @@ class World:
             twice,
             (float(moved[0]), float(moved[1])),
             float(path.euler_rad[-1, 2]),
-            leg.duration_s + between,
+            turns_s,
             _box(path),
         )
 
@@ -169,10 +169,10 @@ def _since(time_s: Array, ends: Sequence[int]) -> Array:
 
 
 def held(vehicle: Vehicle, steps: int) -> Course:
-    """What a vehicle does while another one drives: hover, or wide circles at its slowest."""
-    speed = np.full(steps, vehicle.join_mps)
+    """What a vehicle does while another one drives: hover, or wide circles, slowly."""
+    speed = np.full(steps, vehicle.wait_mps)
     zero = np.zeros(steps)
-    return Course(speed, zero, zero, np.full(steps, 0.5 * vehicle.turn_radps(vehicle.join_mps)))
+    return Course(speed, zero, zero, np.full(steps, 0.5 * vehicle.turn_radps(vehicle.wait_mps)))
 
 
 @dataclass(frozen=True, slots=True)

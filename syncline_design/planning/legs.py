@@ -16,6 +16,7 @@ from syncline_design.planning.path import GRAVITY_MPS2, STEP_S, Course
 from syncline_design.planning.vehicle import Vehicle
 
 LINE_S = 20.0
+SHORT_S = 4.0
 SWEEP_S = 12.0
 FULL_RAD = 2.0 * math.pi
 MOST_LEG_S = 300.0
@@ -131,6 +132,15 @@ def _slow_and_fast(v: Vehicle) -> tuple[str, Course] | None:
     return words, _course(ahead, turn=np.concatenate([zeros[0], turn.turn, zeros[1]]))
 
 
+def _speeds(v: Vehicle, hold_s: float) -> tuple[str, Course] | None:
+    """Two speeds on one line: the shortest that a delay and a lever arm do not share."""
+    low = max(v.slowest_mps, 0.25 * v.v_max_mps)
+    if low > 0.9 * v.fast_mps:
+        return None
+    words = f"one line, {hold_s:.0f} s at {_mps(low)} and {hold_s:.0f} s at {_mps(v.fast_mps)}"
+    return words, _course(ramps(v, [(low, hold_s), (v.fast_mps, hold_s)], v.join_mps))
+
+
 def _circle(v: Vehicle, sign: float) -> tuple[str, Course]:
     speed = _turning_speed(v)
     side = "right" if sign > 0 else "left"
@@ -217,6 +227,8 @@ MAKERS: dict[str, Maker] = {
     "slow line": _slow,
     "reciprocal lines": _reciprocal,
     "slow and fast": _slow_and_fast,
+    "two speeds": lambda v: _speeds(v, LINE_S / 2),
+    "two speeds, short": lambda v: _speeds(v, SHORT_S),
     "stop and go": _stop_and_go,
     "right circle": lambda v: _circle(v, 1.0),
     "left circle": lambda v: _circle(v, -1.0),

@@ -60,8 +60,9 @@ class Separated(Record):
 class StandardPlan(Record):
     """A line plan of the field beside the designed one.
 
-    legs, minutes: what it takes to reach what is asked, null where it never does.  sigma: in the
-    time of the designed drive.
+    legs, minutes: what it takes, with the turns between the lines, to reach what is asked and to
+    tell it from all that the designed drive tells it from; null where it never does.  sigma: in
+    the time of the designed drive.
     """
 
     name: str

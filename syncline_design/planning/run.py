@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Final
 
@@ -19,7 +18,7 @@ from syncline_design.planning.search import (
     together,
 )
 from syncline_design.planning.setup import SECONDS, PlanRequest, Setup
-from syncline_design.planning.standard import Round, rounds_needed
+from syncline_design.planning.standard import times_needed
 from syncline_design.planning.telling import PlanRun, Telling, duration_s
 from syncline_design.planning.wanted import (
     PlanError,
@@ -84,19 +83,20 @@ class _Planning:
         for _ in range(3):
             if self.setup.reached(found) or not search.reaches(chosen):
                 break
-            added = self._one_more(search, chosen, most_s - lasting_s(chosen))
+            added = self._one_more(search, chosen, most_s)
             if added is None:
                 break
             chosen = [*chosen, added]
             found = outcome(self.setup.world, chosen)
         return chosen, found
 
-    def _one_more(self, search: Search, chosen: list[Told], left_s: float) -> Told | None:
+    def _one_more(self, search: Search, chosen: list[Told], most_s: float) -> Told | None:
         """The leg that tells most about what is worst."""
-        trials = [t for t in self.setup.told if t.lasts_s <= left_s and search.fits([*chosen, t])]
+        trials = [[*chosen, told] for told in self.setup.told]
+        trials = [trial for trial in trials if lasting_s(trial) <= most_s and search.fits(trial)]
         if not trials:
             return None
-        return min(trials, key=lambda t: search.value([*chosen, t])[1])
+        return min(trials, key=lambda trial: search.value(trial)[1])[-1]
 
     def _least_s(self, found: Outcome, whole: list[Told], most_s: float) -> float | None:
         """The least time that reaches all: this drive's, a longer one's, or so many of its kind."""
@@ -105,6 +105,5 @@ class _Planning:
         search = Search(self.setup.told, self.setup.judge, in_force())
         if search.reaches(whole):
             return max(lasting_s(whole), 1.001 * most_s)
-        again = Round("", together(whole), lasting_s(whole), len(whole))
-        needed = rounds_needed(self.setup.judge, again)
-        return None if needed is None else math.ceil(needed) * again.lasts_s
+        needed = times_needed(self.setup.judge, together(whole))
+        return None if needed is None else needed * lasting_s(whole)

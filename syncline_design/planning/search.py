@@ -31,6 +31,7 @@ from syncline_design.planning.wanted import Goal, PairGoal
 
 NONCENTRALITY: Final = 60.0  # at which a rival fits worse by more than 15 nat nine times in ten
 SAME: Final = 0.99  # correlation above which two effects stay one class
+QUARTER_RAD: Final = 0.5 * math.pi
 MOST_LEGS: Final = 240
 MARGIN: Final = 0.95  # of what is asked that the search aims at, for the joints between legs
 LEAST_GAIN: Final = 1e-4
@@ -48,8 +49,9 @@ class Told:
     """What one leg tells at each of the four headings: G00, G0d + Gd0, Gdd, (4, p + 1, p + 1) each,
     the last row and column what the noise shifts.
 
-    reach_m: displacement of the leg flown northwards, and its net turn [rad]; lasts_s: with the
-    turn to its heading.  box_m: south, north, west and east end of the leg driven northwards.
+    moved_m: displacement of the leg flown northwards; turned_rad: its net turn.  turns_s: time to
+    the next leg straight on, and after a turn about.  box_m: south, north, west and east end of
+    the leg driven northwards.
     """
 
     leg: Leg
@@ -58,8 +60,14 @@ class Told:
     twice: Array
     moved_m: tuple[float, float]
     turned_rad: float
-    lasts_s: float
+    turns_s: tuple[float, float]
     box_m: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+
+    def turn_s(self, angle_rad: float) -> float:
+        """Time of the turn to its heading."""
+        straight, about = self.turns_s
+        share = abs(math.remainder(angle_rad, 2.0 * math.pi)) / math.pi
+        return straight + share * (about - straight)
 
     def at(self, heading: int, start_s: float) -> Array:
         """Information of the leg when it begins so late."""
@@ -71,26 +79,32 @@ class Told:
 
 @dataclass(frozen=True, slots=True)
 class Placed:
-    """A leg in its place: which of the four headings, and when it begins."""
+    """A leg in its place: which of the four headings, and when it begins, its turn done."""
 
     told: Told
     heading: int
     start_s: float
 
+    @property
+    def end_s(self) -> float:
+        """When it ends."""
+        return self.start_s + self.told.leg.duration_s
+
 
 def arranged(sequence: Sequence[Told]) -> tuple[Placed, ...]:
     """Every leg at the heading that ends nearest to the start, the way back first."""
-    place, start, found = np.zeros(2), 0.0, []
-    before = 0
+    place, end_s, found = np.zeros(2), 0.0, []
+    before, heading_rad = 0, 0.0
     for told in sequence:
         ends = [place + _turned(told.moved_m, h) for h in range(4)]
         costs = [
             float(np.hypot(*end)) + 1e-6 * ((h - before - 2) % 4) for h, end in enumerate(ends)
         ]
         heading = int(np.argmin(np.round(costs, 5)))
-        found.append(Placed(told, heading, start))
-        place, before = ends[heading], heading
-        start += told.lasts_s
+        begins_rad = QUARTER_RAD * heading
+        found.append(Placed(told, heading, end_s + told.turn_s(begins_rad - heading_rad)))
+        place, before, end_s = ends[heading], heading, found[-1].end_s
+        heading_rad = begins_rad + told.turned_rad
     return tuple(found)
 
 
@@ -112,7 +126,8 @@ def extent_m(sequence: Sequence[Told]) -> tuple[float, float]:
 
 
 def lasting_s(sequence: Sequence[Told]) -> float:
-    return sum(told.lasts_s for told in sequence)
+    """Of all legs with the turns between them."""
+    return arranged(sequence)[-1].end_s if sequence else 0.0
 
 
 def together(sequence: Sequence[Told]) -> Array:
@@ -280,7 +295,7 @@ class Search:
         plan = list(begun)
         loss, value = self.value(plan) if plan else (math.inf, 0.0)
         while loss > 0.0 and len(plan) < MOST_LEGS and not self.deadline.is_over:
-            found = self._next(plan, value, most_s - lasting_s(plan))
+            found = self._next(plan, value, most_s)
             if found is None:
                 break
             gained = value - found[2]
@@ -290,14 +305,16 @@ class Search:
         return plan
 
     def _next(
-        self, plan: list[Told], value: float, left_s: float
+        self, plan: list[Told], value: float, most_s: float
     ) -> tuple[Told, float, float] | None:
         best: tuple[float, Told, float, float] | None = None
+        begun_s = lasting_s(plan)
         for told in self.legs:
-            if told.lasts_s > left_s or not self.fits([*plan, told]):
+            whole_s = lasting_s([*plan, told])
+            if whole_s > most_s or not self.fits([*plan, told]):
                 continue
             loss, after = self.value([*plan, told])
-            worth = (value - after) / told.lasts_s
+            worth = (value - after) / (whole_s - begun_s)
             if best is None or worth > best[0]:
                 best = (worth, told, loss, after)
         return None if best is None else best[1:]
@@ -346,15 +363,30 @@ class Search:
 
 def best_legs(search: Search, most_s: float, whole_s: float) -> tuple[list[Told], list[Told]]:
     """The plan for at most so much time, and the one that reaches all, however long it takes."""
-    whole = search.grown([], whole_s)
-    if search.reaches(whole):
-        whole = search.shortened(whole)
-        whole = search.bettered(whole, lasting_s(whole) + 1e-6)
-        if lasting_s(whole) <= most_s:
-            return whole, whole
+    whole = _begun_anyhow(search, whole_s)
+    if search.reaches(whole) and lasting_s(whole) <= most_s:
+        return whole, whole
     plan = search.grown([], most_s)
     if not plan:  # not one leg fits: the shortest shows what it would take
-        return [min(search.legs, key=lambda told: told.lasts_s)], whole
+        return [min(search.legs, key=lambda told: lasting_s([told]))], whole
     if not search.reaches(plan):
         plan = search.bettered(plan, most_s)
     return plan, whole
+
+
+def _begun_anyhow(search: Search, most_s: float) -> list[Told]:
+    """The shortest that reaches all of what begins with the leg that tells most for its time, and
+    of what begins with any other: what is best for its time first is not always best together."""
+    best = search.grown([], most_s)
+    if not search.reaches(best):
+        return best
+    best = search.shortened(best)
+    for told in search.legs:
+        if search.deadline.is_over:
+            return best
+        if lasting_s([told]) >= lasting_s(best) or not search.fits([told]):
+            continue
+        found = search.grown([told], lasting_s(best))
+        if search.reaches(found):
+            best = min(best, search.shortened(found), key=lasting_s)
+    return search.bettered(best, lasting_s(best) + 1e-6)

@@ -3,13 +3,13 @@
 Straight lines; reciprocal lines and figure eights (antenna and latency checks of aerial survey);
 strip-adjustment lines: crossing lines; the hydrographic patch test: lines both ways at two speeds,
 and a parallel one (IHO C-13, Manual on Hydrography, ch. 3: latency, pitch, heading, roll).
-What is logged are the lines, with the turns between them where the plan has turns.
+What is logged are the lines; the turns between them count as time alone.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -21,6 +21,7 @@ from syncline_design.planning.path import STEP_S, Course
 from syncline_design.planning.search import Judge, Told
 from syncline_design.planning.vehicle import Vehicle
 
+LEAST_TURN_RAD: Final = math.radians(10.0)  # what lines that do not turn may wander
 LINE, SLOW, ABOUT, EIGHT = "line", "slow line", "line, turn about", "eight"
 # name: legs of one round, each with the quarters of the compass that it is driven to
 ROUNDS: Final[dict[str, tuple[tuple[str, tuple[int, ...]], ...]]] = {
@@ -28,19 +29,46 @@ ROUNDS: Final[dict[str, tuple[tuple[str, tuple[int, ...]], ...]]] = {
     "reciprocal lines": ((ABOUT, (0, 2)),),
     "figure eights": ((EIGHT, (0,)),),
     "strip-adjustment lines": ((LINE, (0, 2, 1, 3)),),
-    "patch-test lines": ((LINE, (0, 2)), (SLOW, (0,)), (LINE, (0,))),
+    "patch-test lines": ((LINE, (0, 2)), (SLOW, (0,)), (LINE, (2,))),
 }
-MOST_ROUNDS: Final = 2.0**14
+MOST_LEGS: Final = 2**16
 
 
 @dataclass(frozen=True, slots=True)
-class Round:
-    """One round of a line plan: its information at no drift, time and legs."""
+class Lines:
+    """A line plan: the legs of one round, again and again until all is reached.
+
+    information: of each leg, at no drift, (n, p + 1, p + 1).  lasts_s: of each leg.  turns_s:
+    between each leg and the one before it; before the first, from the last of the round before.
+    """
 
     name: str
     information: Array
-    lasts_s: float
-    legs: int
+    lasts_s: Array
+    turns_s: Array
+
+    def told(self, legs: int) -> Array:
+        """Information of so many legs."""
+        whole, more = divmod(legs, len(self.lasts_s))
+        found: Array = whole * self.information.sum(axis=0) + self.information[:more].sum(axis=0)
+        return found
+
+    def duration_s(self, legs: int) -> float:
+        """Of so many legs, with the turns between them."""
+        if legs <= 0:
+            return 0.0
+        whole, more = divmod(legs, len(self.lasts_s))
+        each = self.lasts_s + self.turns_s
+        return float(whole * each.sum() + each[:more].sum() - self.turns_s[0])
+
+    def told_in(self, duration_s: float) -> Array:
+        """Information of what fits into a time, of the last leg its share."""
+        legs = most_within(lambda count: self.duration_s(count) <= duration_s)
+        place = legs % len(self.lasts_s)
+        turn_s = float(self.turns_s[place]) if legs else 0.0
+        left = duration_s - self.duration_s(legs) - turn_s
+        share = min(max(left / float(self.lasts_s[place]), 0.0), 1.0)
+        return self.told(legs) + share * np.asarray(self.information[place])
 
 
 def standard_legs(vehicle: Vehicle, stage: int) -> tuple[Leg, ...]:
@@ -83,30 +111,63 @@ def _turned(speed: float, turns: Sequence[Array]) -> Course:
     return Course(np.full(turn.shape, speed), zero, zero, turn)
 
 
-def rounds(told: Sequence[Told]) -> tuple[Round, ...]:
+def line_plans(vehicle: Vehicle, told: Sequence[Told]) -> tuple[Lines, ...]:
     """The line plans of a vehicle."""
     known = {t.leg.name: t for t in told}
+    rate = vehicle.turn_radps(_cornering(vehicle))
     found = []
     for name, parts in ROUNDS.items():
         own = [(known[leg], h) for leg, headings in parts for h in headings]
-        information = np.sum([t.now[h] for t, h in own], axis=0)
-        found.append(Round(name, information, sum(t.leg.duration_s for t, _ in own), len(own)))
+        information = np.array([t.now[h] for t, h in own])
+        lasts = np.array([t.leg.duration_s for t, _ in own])
+        found.append(Lines(name, information, lasts, _turns_s(own, rate)))
     return tuple(found)
 
 
-def rounds_needed(judge: Judge, one: Round) -> float | None:
-    """How many rounds reach what is asked, by bisection; None: none do."""
+def _turns_s(own: Sequence[tuple[Told, int]], rate_radps: float) -> Array:
+    """Time of the turn from the end of one leg to the heading of the next, around the round."""
+    ends = [0.5 * math.pi * heading + told.turned_rad for told, heading in own]
+    begins = [0.5 * math.pi * heading for _, heading in own]
+    angles = [
+        abs(math.remainder(begin - end, FULL_RAD))
+        for begin, end in zip(begins, [ends[-1], *ends[:-1]], strict=True)
+    ]
+    return np.array([angle / rate_radps if angle > LEAST_TURN_RAD else 0.0 for angle in angles])
 
-    def reached(count: float) -> bool:
-        return bool(np.all(judge.ratios(count * one.information, exact=True) <= 1.0))
 
-    high = 1.0
-    while not reached(high):
-        high *= 2.0
-        if high > MOST_ROUNDS:
-            return None
-    low = 0.0
-    while high - low > 1e-3 * high:
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if reached(middle) else (middle, high)
-    return high
+def legs_needed(judge: Judge, lines: Lines, taken: Collection[int]) -> int | None:
+    """The fewest legs of a line plan, in its order, that reach what is asked; None: none do.
+
+    taken: places of the effects that may take it all the same, as in the drive beside it.
+    """
+
+    def enough(count: int) -> bool:
+        information = lines.told(count)
+        return reached(judge, information) and set(judge.confusing(information)) <= set(taken)
+
+    before = most_within(lambda count: not enough(count))
+    return None if before >= MOST_LEGS else before + 1
+
+
+def reached(judge: Judge, information: Array) -> bool:
+    """Whether all that is asked is."""
+    return bool(np.all(judge.ratios(information, exact=True) <= 1.0))
+
+
+def most_within(holds: Callable[[int], bool]) -> int:
+    """The largest count up to MOST_LEGS of which something holds that holds of 0, then ends."""
+    low, high = 0, 1
+    while high < MOST_LEGS and holds(high):
+        low, high = high, 2 * high
+    if high >= MOST_LEGS:
+        return MOST_LEGS
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def times_needed(judge: Judge, information: Array) -> int | None:
+    """How many times a drive has to be driven until all is reached; None: however often."""
+    before = most_within(lambda count: not reached(judge, count * information))
+    return None if before >= MOST_LEGS else before + 1

@@ -41,7 +41,7 @@ from syncline_design.planning.search import (
     pair_ratio,
 )
 from syncline_design.planning.setup import SECONDS, Setup
-from syncline_design.planning.standard import rounds, rounds_needed, standard_legs
+from syncline_design.planning.standard import legs_needed, line_plans, standard_legs
 from syncline_design.planning.wanted import (
     PairGoal,
     PlanError,
@@ -108,7 +108,7 @@ class Telling:
             rate_hz=self.setup.world.rate_hz,
             noise=_noise_words(self.setup.world),
             priors=dict(zip(self.setup.keys, map(float, self.setup.judge.prior), strict=True)),
-            standard=self._standard(duration),
+            standard=self._standard(found),
             targets=_targets(found.driven),
             surveyed=self.setup.world.surveyed is not None,
             assumed=_assumed(self.setup.world),
@@ -203,30 +203,30 @@ class Telling:
         """What the other vehicles of a chain do."""
         held = [
             f"{v.stage} hovers"
-            if v.join_mps == 0.0
-            else f"{v.stage} circles wide at {v.join_mps:.2g} m/s"
+            if v.wait_mps == 0.0
+            else f"{v.stage} circles wide at {v.wait_mps:.2g} m/s"
             for k, v in enumerate(self.setup.world.vehicles)
             if k != stage
         ]
         return f"; meanwhile {' and '.join(held)}" if held else ""
 
-    def _standard(self, duration_s: float) -> tuple[StandardPlan, ...]:
+    def _standard(self, drive: Outcome) -> tuple[StandardPlan, ...]:
         world, wanted = self.setup.world, self.setup.goal.wanted
         stage = world.every[wanted[0]].candidate.stage if wanted else 0
         found = []
-        told = world.looked_at(standard_legs(world.vehicles[stage], stage))
-        for one in rounds(told):
+        vehicle = world.vehicles[stage]
+        taken = self.setup.judge.confusing(drive.after[-1])
+        for one in line_plans(vehicle, world.looked_at(standard_legs(vehicle, stage))):
             in_force().check()
-            needed = rounds_needed(self.setup.judge, one)
-            information = duration_s / one.lasts_s * one.information
-            legs = None if needed is None else math.ceil(one.legs * needed - 1e-9)
+            legs = legs_needed(self.setup.judge, one, taken)
+            information = one.told_in(duration_s(drive))
             found.append(
                 StandardPlan(
                     one.name,
                     legs,
                     self._sigma(information),
                     self._correlation(information),
-                    None if legs is None else legs * one.lasts_s / one.legs / SECONDS,
+                    None if legs is None else one.duration_s(legs) / SECONDS,
                 )
             )
         return tuple(found)

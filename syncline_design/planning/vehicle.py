@@ -17,6 +17,7 @@ from syncline_design.spec.yaml_text import Flaw
 Motion = Literal["multirotor", "fixed_wing", "ground", "surface", "underwater", "level"]
 SHARE: Final = 0.9  # of v_max that a plan asks for: drivers and autopilots need room
 TURN_SHARE: Final = 0.75  # of omega_max, so that roll and pitch fit beside a turn
+ACROSS: Final = 0.8  # of the acceleration, for turns
 SEA_TILT: Final = 3.0  # the horizon's tilt is so many standard deviations of the sea's motion
 SEA_RATE_SHARE: Final = 0.12  # of omega_max that the sea's own turn rate is at most (rms)
 MOST_TILT_RAD: Final = math.radians(30.0)
@@ -79,17 +80,26 @@ class Vehicle:
         return max(SHARE * self.v_max_mps, self.slowest_mps)
 
     @property
+    def wait_mps(self) -> float:
+        """The speed at which it waits while another vehicle drives."""
+        return 0.0 if self.usual.hovers else max(self.slowest_mps, self.fast_mps / 3.0)
+
+    @property
     def join_mps(self) -> float:
-        """The speed at which one leg ends and the next begins."""
+        """The speed at which one leg ends and the next begins: where it turns fastest.
+
+        There radius and acceleration bind alike, v / R = 0.8 a / v.
+        """
         if self.usual.hovers:
             return 0.0
-        return max(self.slowest_mps, self.fast_mps / 3.0)
+        quickest = math.sqrt(ACROSS * self.acceleration_mps2 * self.turn_radius_m)
+        return min(max(self.wait_mps, quickest), self.fast_mps)
 
     def turn_radps(self, speed_mps: float) -> float:
         """Largest turn rate at a speed: omega_max, a lateral acceleration, a radius."""
         limit = TURN_SHARE * self.omega_max_radps
         if speed_mps > 0.0:
-            limit = min(limit, 0.8 * self.acceleration_mps2 / speed_mps)
+            limit = min(limit, ACROSS * self.acceleration_mps2 / speed_mps)
         if self.turn_radius_m > 0.0:
             limit = min(limit, speed_mps / self.turn_radius_m)
         return limit

@@ -197,7 +197,11 @@ def _standard(found: Plan) -> list[Node]:
         for one in found.standard
     ]
     heads = ("Plan", "Until reached #", *(f"{k} #" for k in keys), "Correlation #")
-    note = "Standard uncertainties in the time of this drive; line plans are taken line by line."
+    note = (
+        "Until what is asked is reached, and told from every effect that this drive tells it from. "
+        "Line plans are taken line by line in their order; the turns between lines count as time, "
+        "and are not logged. Standard uncertainties in the time of this drive."
+    )
     return show(table("Beside the standard line plans", heads, rows, note), silent=True)
 
 
