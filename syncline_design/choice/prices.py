@@ -1,4 +1,8 @@
-"""What entries cost, weigh and draw together."""
+"""What entries cost, weigh and draw together.
+
+Money is that of the spec's currency to the cent, halves up, piece by piece, as a price list in that
+currency would have it: fronts, designs and bills of materials then add up alike.
+"""
 
 from __future__ import annotations
 
@@ -35,5 +39,12 @@ def amount_of(case: Case, name: ResourceName, entry: Priced | None) -> Fraction 
         return Fraction(0)
     amount = getattr(entry, name)
     if name == "cost" and isinstance(amount, Quantity):
-        return case.spec.in_currency(amount) if case.spec.can_convert(amount) else None
+        if not case.spec.can_convert(amount):
+            return None
+        return to_the_cent(case.spec.in_currency(amount))
     return None if amount is None else fraction_of(amount)
+
+
+def to_the_cent(amount: Fraction) -> Fraction:
+    """An amount of money as it is charged; half a cent goes up."""
+    return Fraction((100 * amount + Fraction(1, 2)).__floor__(), 100)

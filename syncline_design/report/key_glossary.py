@@ -99,6 +99,7 @@ KEYS: dict[str, str] = {
     "omega_max": "Largest angular rate of the vehicle.",
     "origin": "Zero of the local frame, WGS 84: [latitude, longitude, height above the ellipsoid].",
     "over": "Length that a share of a length refers to: a baseline, a slant range.",
+    "owned": "Sensors, shared hardware, clocks that are there already: at no cost, not massless.",
     "parameters": "Values of the effect; names carry their unit: {latency_s: 0.087}.",
     "platform": "The vehicle: a catalog id, {use: ID} with keys overridden, or all its keys.",
     "platforms": "Vehicles, by id.",

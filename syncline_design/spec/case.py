@@ -8,7 +8,7 @@ looked up anew as it is made, so that what was found never lags behind what was 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Generic, TypeVar
@@ -26,6 +26,7 @@ from syncline_design.spec.catalog import (
     InfrastructureEntry,
     PlatformEntry,
     Primitive,
+    Product,
     SensorEntry,
     TimestampingEntry,
 )
@@ -42,17 +43,22 @@ from syncline_design.spec.spec import Requirement, Spec
 from syncline_design.spec.yaml_text import KeyPath, TextPosition
 
 E = TypeVar("E", bound=Entry)
+P = TypeVar("P", bound=Product)
 Origins = Mapping[tuple[str, str], str]  # (section, id) to file:line:column
 IN_PLACE = "spec"  # origin of what the spec itself gives
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate(Generic[E]):
-    """An entry that a design may use; origin: `file:line:column` that defines it."""
+    """An entry that a design may use; origin: `file:line:column` that defines it.
+
+    owned: it is there already, so that the entry here costs nothing.
+    """
 
     id: str
     entry: E
     origin: str = IN_PLACE
+    owned: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,7 +184,8 @@ def _stage(case: Case, index: int) -> StageCase:
             if (role := choice.role(name)) is not None and not role.is_empty
         ),
         tuple(
-            Candidate(one, catalog.clocks[one], origins.get(("clocks", one), "")) for one in named
+            _bought(case, Candidate(one, catalog.clocks[one], origins.get(("clocks", one), "")))
+            for one in named
         ),
     )
 
@@ -255,19 +262,35 @@ def _sensors(
     case: Case, stage: StageChoice, role: RoleName, choice: RoleChoice
 ) -> tuple[Candidate[SensorEntry], ...]:
     if isinstance(choice.sensor, SensorEntry):  # named by itself, or by stage and role
-        return (Candidate(choice.sensor.name or f"{stage.name}.{role}", choice.sensor),)
+        given = Candidate(choice.sensor.name or f"{stage.name}.{role}", choice.sensor)
+        return (_bought(case, given),)
     listed = case.catalog.sensors
     named: tuple[str, ...]
     if isinstance(choice.sensor, str):
         named = (choice.sensor,)
     elif isinstance(choice.candidates, Query):
         query = choice.candidates
-        named = tuple(n for n, entry in listed.items() if matches(query, entry, role, case.spec))
+        named = tuple(n for n, entry in listed.items() if _answers(case, query, n, entry, role))
     else:
         named = choice.candidates or ()
     return tuple(
-        Candidate(one, listed[one], case.origins.get(("sensors", one), "")) for one in named
+        _bought(case, Candidate(one, listed[one], case.origins.get(("sensors", one), "")))
+        for one in named
     )
+
+
+def _answers(case: Case, query: Query, identity: str, entry: SensorEntry, role: RoleName) -> bool:
+    """Whether a sensor answers a query; what is owned costs nothing."""
+    if identity in case.spec.owned:
+        query = query.model_copy(update={"max_cost": None})
+    return matches(query, entry, role, case.spec)
+
+
+def _bought(case: Case, one: Candidate[P]) -> Candidate[P]:
+    """A candidate as the spec has to pay for it: at no cost where it is owned."""
+    if one.id not in case.spec.owned:
+        return one
+    return replace(one, entry=one.entry.at_no_cost(case.spec.currency), owned=True)
 
 
 def matches(query: Query, entry: SensorEntry, role: RoleName, spec: Spec) -> bool:
@@ -291,7 +314,7 @@ def _hardware(
     required = {name for method in methods for name in method.requires}
     required |= {name for stage in stages for one in stage.clocks for name in one.entry.requires}
     return {
-        name: Candidate(name, entry, case.origins.get(("infrastructure", name), ""))
+        name: _bought(case, Candidate(name, entry, case.origins.get(("infrastructure", name), "")))
         for name, entry in case.catalog.infrastructure.items()
         if name in required
     }

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Annotated, Any, Literal
+from fractions import Fraction
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, PlainValidator, model_validator
 from pydantic_core import PydanticCustomError
@@ -129,6 +130,14 @@ class Entry(FileRecord):
         shared = [name for name in type(self).model_fields if name in Product.model_fields]
         return ((name, getattr(self, name)) for name in (*own, *shared))
 
+    def told_figures(self) -> list[str]:
+        """The figures that it gives."""
+        return [
+            key
+            for key, value in self.told()
+            if key not in _NOT_FIGURES and value not in (None, (), {})
+        ]
+
     def basis_of(self, figure: str) -> str | None:
         """What a figure, or the part of one, stands on; None: on its source."""
         if not isinstance(self.basis, dict):
@@ -138,6 +147,7 @@ class Entry(FileRecord):
 
 
 _ABOUT = frozenset({"name", "source", "basis", "note", "figures", "unusual"})
+_NOT_FIGURES = _ABOUT | {"modality", "type", "timeline", "lifecycle"}
 
 
 class Product(Entry):
@@ -151,6 +161,21 @@ class Product(Entry):
     lifecycle: Lifecycle | None = None
     lead_time: NonNegativeTime | None = None
     temperature: TemperatureInterval | None = None
+
+    def at_no_cost(self, currency: str) -> Self:
+        """The same entry where it is there already; that it costs nothing needs no source."""
+        basis = self.basis
+        if isinstance(basis, str):  # of all of it: of every other figure then
+            basis = dict.fromkeys(self.told_figures(), basis)
+        if basis is not None:
+            basis = {name: kind for name, kind in basis.items() if name != "cost"} or None
+        changes = {
+            "cost": Quantity(Fraction(0), f"0 {currency}", None, currency),
+            "price_class": None,
+            "basis": basis,
+            "figures": {name: one for name, one in self.figures.items() if name != "cost"},
+        }
+        return self.model_copy(update=changes)
 
 
 class PlatformEntry(Entry):

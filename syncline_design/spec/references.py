@@ -22,6 +22,7 @@ _WORDS = {
     "infrastructure": "shared hardware",
     "clocks": "clock",
 }
+_OWNABLE = ("sensors", "infrastructure", "clocks")
 
 
 def unknown_ids(spec: ParsedFile, collection: Collection) -> list[Flaw]:
@@ -31,7 +32,39 @@ def unknown_ids(spec: ParsedFile, collection: Collection) -> list[Flaw]:
         collection.note_families()  # what nothing has asked for yet is known all the same
     unknown = (item for item in named if item[1:] not in collection.origins)
     problems = [_unknown(spec, *item, collection) for item in islice(unknown, MAX_SUGGESTIONS)]
-    return problems + unknown_requirements(collection)
+    return problems + _unknown_owned(spec, collection) + unknown_requirements(collection)
+
+
+def _unknown_owned(spec: ParsedFile, collection: Collection) -> list[Flaw]:
+    """What is owned has to be there: a sensor, a piece of shared hardware, a clock."""
+    named = _at(spec.data, ("owned",))
+    listed = enumerate(named if isinstance(named, tuple) else ())
+    owned = [(index, one) for index, one in listed if isinstance(one, str) and one]
+    if owned:
+        collection.note_families()
+    known = {name for section, name in collection.origins if section in _OWNABLE}
+    known |= set(_given_in_place(spec.data))
+    methods = {name for section, name in collection.origins if section == "timestamping"}
+    wanted = "the id of a sensor, shared hardware or clock"
+    problems = []
+    for index, one in owned:
+        if one not in known:
+            hint = did_you_mean(one, known)
+            if one in methods:
+                hint = f"{one} is a timestamping method, which each sensor that uses it pays for"
+            at: KeyPath = ("owned", index)
+            problems.append(problem_at(spec, at, "nothing to own", wanted, one, hint))
+    return problems[:MAX_SUGGESTIONS]
+
+
+def _given_in_place(data: Any) -> Iterator[str]:
+    """Ids of sensors that the spec itself describes: their name, else stage and role."""
+    stages = _at(data, ("stages",))
+    for stage in stages if isinstance(stages, tuple) else ():
+        for role in ROLES:
+            sensor = _at(stage, (role, "sensor"))
+            if isinstance(sensor, dict):
+                yield str(sensor.get("name") or f"{_at(stage, ('name',))}.{role}")
 
 
 def unknown_requirements(collection: Collection) -> list[Flaw]:

@@ -116,6 +116,7 @@ class Spec(FileRecord):
     coverage_factor: PositiveNumber = 3.0
     strict_facts: YesNo = False  # a fact that is asked for and not told rules out
     allow_discontinued: YesNo = False
+    owned: tuple[Text, ...] = ()  # sensors, shared hardware and clocks that cost nothing
     horizon: HorizonChoice = Field(default_factory=HorizonChoice)
     objective: Literal["cost", "mass", "power", "error"] = "cost"
     monte_carlo: MonteCarloChoice = Field(default_factory=MonteCarloChoice)
@@ -127,6 +128,7 @@ class Spec(FileRecord):
         errors = [
             *_duplicates("requirements", "id", [r.id for r in self.requirements]),
             *_duplicates("stages", "name", [s.name for s in self.stages]),
+            *_owned_twice(self.owned),
             *_rate_errors(self),
             *_stage_errors(self),
             *_spacing_errors(self),
@@ -157,6 +159,15 @@ def _duplicates(section: str, key: str, names: list[str]) -> list[Located]:
             message = f"used twice: {name}, first in {section}[{first[name]}]"
             errors.append(((section, index, key), refusal(message, "each one once")))
     return errors
+
+
+def _owned_twice(owned: tuple[str, ...]) -> list[Located]:
+    """An entry is owned or not: how many pieces there are is not counted."""
+    return [
+        (("owned", index), refusal("owned twice", "each id once", name, "delete it"))
+        for index, name in enumerate(owned)
+        if name in owned[:index]
+    ]
 
 
 def _rate_errors(spec: Spec) -> list[Located]:

@@ -15,6 +15,7 @@ from syncline_design.simulation.statistical import scattering
 from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.verdict.cautions_of_facts import fact_cautions
+from syncline_design.verdict.cautions_of_owned import owned_cautions
 from syncline_design.verdict.tree import Assumption, Caution, ErrorFigures, RequirementResult
 from syncline_design.verdict.verified import Verified
 
@@ -49,6 +50,7 @@ def design_cautions(case: Case, verified: Verified, figures: ErrorFigures) -> tu
         *_coverage(verified),
         *_untyped(case, verified),
         *fact_cautions(case, verified),
+        *owned_cautions(case, verified),
     )
 
 

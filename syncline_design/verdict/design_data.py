@@ -169,7 +169,7 @@ _WEIGHED = frozenset(
 
 def _resting_on(entry: Entry, basis: str) -> list[str]:
     """The figures of an entry that have a basis, in the order in which it names them."""
-    figures = list(entry.basis) if isinstance(entry.basis, Mapping) else _all_figures(entry)
+    figures = list(entry.basis) if isinstance(entry.basis, Mapping) else entry.told_figures()
     return [figure for figure in figures if entry.basis_of(figure) == basis]
 
 
@@ -183,30 +183,6 @@ def _figure_text(entry: Entry, figure: str) -> str:
         value = tuple(value[axis] for axis in AXES[name][part])
         value = value[0] if len(set(value)) == 1 else value
     return figure_text(value)
-
-
-_NOT_FIGURES = frozenset(
-    {
-        "name",
-        "source",
-        "basis",
-        "note",
-        "modality",
-        "type",
-        "timeline",
-        "figures",
-        "unusual",
-        "lifecycle",
-    }
-)
-
-
-def _all_figures(entry: Entry) -> list[str]:
-    return [
-        key
-        for key, value in entry.told()
-        if key not in _NOT_FIGURES and value not in (None, (), {})
-    ]
 
 
 def figure_text(value: Any) -> str:

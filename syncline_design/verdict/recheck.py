@@ -21,15 +21,16 @@ from typing import Any, Literal
 
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import NOTHING_KNOWN, Case, Known, RoleCase, StageCase
+from syncline_design.spec.catalog import SensorEntry
 from syncline_design.spec.selection import RoleSelection, Selection
 from syncline_design.verdict.recheck_facts import impossible, sample_spacing
+from syncline_design.verdict.recheck_sums import BUDGETS, Bought, money, owned_pieces, sum_of
 
 DIGITS = 60
 IMPLIED_SYNC = "SYNC"
 IMPLIED_FACTS = "FACTS"  # fails where a chosen entry cannot work where it stands
 SUMMED = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
 Kind = Literal["accuracy", "sync", "cost", "mass", "power", "sample_spacing", "feasible"]
-BUDGETS: tuple[Literal["cost", "mass", "power"], ...] = ("cost", "mass", "power")
 
 
 class NotADesign(ValueError):  # noqa: N818 - names a state of the input
@@ -73,6 +74,7 @@ class Recheck:
     sync_error_m: Fraction
     total_m: Fraction
     sync_ratio: Fraction
+    owned: tuple[tuple[str, int], ...] = ()  # what is at no cost, with how many pieces it takes
 
     @property
     def passed(self) -> bool:
@@ -85,6 +87,7 @@ class _Chosen:
     """One role's entries: the sensor, its timestamp error, timeline and hardware."""
 
     sensor: Any
+    bought: Bought
     error: Any
     method: Any  # None for an error given in place
     timeline: str  # "utc" or the vehicle whose host clock it is
@@ -119,7 +122,8 @@ def _recheck(case: Case, selection: Selection, known: Known) -> Recheck:
     ratios = [_ratio(rate * tau_sys, sensor_error)]
     for (stage, role), one in chosen.items():
         ratios.append(_ratio(one.tau * _own_rate(role, moves[stage]), errors[stage, role]))
-    amounts = {name: _amount(case, selection, chosen, name) for name in BUDGETS}
+    bought = list(_bought(case, selection, chosen))
+    amounts = {name: sum_of(case, bought, name) for name in BUDGETS}
     found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
     found |= {"accuracy": Fraction(total), "sync": Fraction(max(ratios))}
     found["sample_spacing"], silent = sample_spacing(case, selection)
@@ -134,6 +138,7 @@ def _recheck(case: Case, selection: Selection, known: Known) -> Recheck:
         Fraction(sync_error),
         Fraction(total),
         Fraction(max(ratios)),
+        owned_pieces(case, bought),
     )
 
 
@@ -191,7 +196,12 @@ def _chosen(
     tau = _bound(error, case.spec.coverage_factor)
     tau += Decimal(known.extra_tau_s.get((name, picked.role), 0.0))
     host = stage.choice.vehicle or name
-    return _Chosen(sensor, error, method, "utc" if timeline == "utc" else f"host {host}", tau)
+    given = role.choice.sensor  # an id, or the entry itself
+    listed = given if isinstance(given, SensorEntry) else case.catalog.sensors[picked.sensor]
+    bought = Bought(picked.sensor, listed)
+    return _Chosen(
+        sensor, bought, error, method, "utc" if timeline == "utc" else f"host {host}", tau
+    )
 
 
 def _serves(by_method: Sequence[str], by_sensor: Sequence[str], primitive: str) -> bool:
@@ -320,45 +330,28 @@ def _clock(case: Case, selection: Selection, vehicle: str) -> Any:
     return case.clock(vehicle, picked)
 
 
-def _amount(
-    case: Case,
-    selection: Selection,
-    chosen: Mapping[tuple[str, RoleName], _Chosen],
-    name: Literal["cost", "mass", "power"],
-) -> Fraction | None:
-    """Sum of a resource, exact; shared hardware once per vehicle and full set of channels."""
-    bought: list[tuple[Any, int]] = []
+def _bought(
+    case: Case, selection: Selection, chosen: Mapping[tuple[str, RoleName], _Chosen]
+) -> Iterator[Bought]:
+    """What a design buys: shared hardware once per vehicle and full set of channels."""
     channels: dict[tuple[str, str], int] = {}
     vehicles = {stage.name: stage.vehicle or stage.name for stage in case.spec.stages}
     for (stage, _), one in chosen.items():
-        bought.append((one.sensor, 1))
+        yield one.bought
         if one.method is not None:
-            bought.append((one.method, 1))
+            yield Bought(None, one.method)
             for item, count in one.method.requires.items():
                 key = (vehicles[stage], item)
                 channels[key] = channels.get(key, 0) + count
     for vehicle in dict.fromkeys(vehicles.values()):
-        clock = _clock(case, selection, vehicle)
-        if clock is not None:
-            bought.append((clock, 1))
+        clock, name = _clock(case, selection, vehicle), selection.clock(vehicle)
+        if clock is not None and name is not None:
+            yield Bought(name, case.catalog.clocks[name])
             for item, count in clock.requires.items():
                 channels[vehicle, item] = channels.get((vehicle, item), 0) + count
     for (_, item), count in channels.items():
-        entry = case.hardware[item].entry
-        bought.append((entry, (count + entry.channels - 1) // entry.channels))
-    amounts = [(getattr(entry, name), count) for entry, count in bought]
-    if any(amount is None for amount, _ in amounts):
-        return None
-    return sum((_money(case, amount) * count for amount, count in amounts), Fraction(0))
-
-
-def _money(case: Case, amount: Any) -> Fraction:
-    """An amount as written; money in the spec's currency."""
-    exact = Fraction(getattr(amount, "exact", amount))
-    currency = getattr(amount, "currency", None)
-    if currency in (None, case.spec.currency):
-        return exact
-    return exact * Fraction(getattr(case.spec.exchange_rates[currency], "exact", 0))
+        entry = case.catalog.infrastructure[item]
+        yield Bought(item, entry, (count + entry.channels - 1) // entry.channels)
 
 
 def _requirements(
@@ -372,7 +365,7 @@ def _requirements(
             IMPLIED_SYNC, "sync", value, Fraction(1), _meets("sync", value, Fraction(1)), True
         )
     for one in written:
-        limit = _money(case, one.limit) if one.kind == "cost" else _exact(one.limit)
+        limit = money(case, one.limit) if one.kind == "cost" else _exact(one.limit)
         value = found[one.kind]
         kind: Kind = one.kind  # type: ignore[assignment]  # others are left out above
         met = _meets(one.kind, value, limit)

@@ -29,7 +29,7 @@ from syncline_design.verdict.acceptance import (
     refuse_trajectory,
     simulation_settings,
 )
-from syncline_design.verdict.bill import bill_of_materials, total
+from syncline_design.verdict.bill import bill_of_materials
 from syncline_design.verdict.cautions import cautions
 from syncline_design.verdict.cautions_of_facts import implausible_cautions, lifecycle_cautions
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
@@ -328,8 +328,6 @@ def _verdict(
     told = sources(entries)
     bill = bill_of_materials(case, problem, verified.design)
     shown = named_design(case, problem, verified.design, verified.figures)
-    if shown.cost is not None:
-        shown = replace(shown, cost=total(bill, "cost"))  # to the cent, as its lines
     worked = Worked(verified.system, case.spec.sync_model, shown, figures, told)
     asked = [row for row in verified.requirements if row.id in settings.explain]
     return Verdict(
