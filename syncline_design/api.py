@@ -82,21 +82,27 @@ def _files(logs: str | Path | Sequence[str | Path]) -> list[Path]:
 
 def check(
     spec: SpecOrPath, *, seed: int = 0, method: Road = "auto", time_limit_s: float | None = None,
-    monte_carlo: bool = True, today: date | None = None,
+    monte_carlo: bool = True, today: date | None = None, baseline: str | Path | None = None,
 ) -> Verdict:  # fmt: skip
     """The verdict on a spec.
+
+    baseline: an earlier verdict as JSON; its exit code is then 0 where nothing got worse.
 
     monte_carlo: whether to simulate (a requirement of that kind stays undecided without).  today:
     the day on which waivers are judged; None: the machine's date.
     """
     from syncline_design.choice.outcome import METHODS
+    from syncline_design.comparison.verdict_file import read_verdicts
+    from syncline_design.verdict.baseline import against
     from syncline_design.verdict.verify import CheckSettings, check_loaded
 
     arguments.word("method", method, METHODS)
     arguments.day("today", today)
     settings = CheckSettings(_seed(seed), method, monte_carlo=monte_carlo, today=today)
     with _limited(time_limit_s):
-        return check_loaded(_case(spec), settings)
+        earlier = None if baseline is None else read_verdicts(Path(baseline))
+        verdict = check_loaded(_case(spec), settings)
+    return verdict if earlier is None else against(verdict, earlier, str(baseline))
 
 
 def optimize(

@@ -33,6 +33,19 @@ def test_parse_target() -> None:
     assert parse_target("html:C:/x.html", KNOWN) == Target("html", "C:/x.html")
 
 
+def test_a_page_without_a_path_replaces_only_pages_of_ours(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert parse_target("html", KNOWN, "own-check") == Target("html", "own-check.html", False)
+    page = tmp_path / "own-check.html"
+    page.write_text('<meta name="generator" content="syncline-design">', encoding="utf-8")
+    assert parse_target("html", KNOWN, "own-check").path == "own-check.html"
+    page.write_text("<p>mine</p>", encoding="utf-8")
+    with pytest.raises(OutputError, match=r"no page of syncline-design; name the file"):
+        parse_target("html", KNOWN, "own-check")
+
+
 @pytest.mark.parametrize("text", ["pdf:a.pdf", "html:", "", ":a", "a.html"])
 def test_bad_targets_say_what_is_expected(text: str) -> None:
     with pytest.raises(OutputError, match="expected"):

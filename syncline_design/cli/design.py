@@ -32,7 +32,7 @@ from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:
     from syncline_design.verdict.optimise import Optimised
-    from syncline_design.verdict.tree import Checked
+    from syncline_design.verdict.tree import Checked, Verdict
 
 
 @guarded
@@ -50,9 +50,14 @@ def check(
         list[str] | None,
         typer.Option("--explain", metavar="ID", help="Work a requirement out step by step."),
     ] = None,
+    baseline: Annotated[
+        Path | None,
+        typer.Option(metavar="PATH", help="An earlier JSON: only what got worse since then fails."),
+    ] = None,
 ) -> int:
     """Validate a spec, choose what is open, verify, cross-check by Monte Carlo, say the verdict."""
     deadline = deadline_of(time_limit)
+    from syncline_design.comparison.verdict_file import read_verdicts
     from syncline_design.report.checks import CHECK_FORMATS, render_checks
     from syncline_design.report.on_verdict import on_verdict
     from syncline_design.report.render_console import console
@@ -64,10 +69,14 @@ def check(
 
     with watched(deadline, quiet=quiet):
         found = spec_files(spec, skip_others=skip_others)
-    targets = output_targets(output, CHECK_FORMATS, found.files)
+    given = [] if baseline is None else [baseline]
+    targets = output_targets(output, CHECK_FORMATS, [*found.files, *given])
     settings = CheckSettings(seed=seed, method=road(method), explain=tuple(explain or ()))
     with watched(deadline, targets, quiet=quiet):
+        earlier = None if baseline is None else read_verdicts(baseline)
         verdicts = check_files(found.files, settings)
+    if earlier is not None:
+        verdicts = [_since(one, earlier, str(baseline)) for one in verdicts]
     _demand_known(verdicts, settings.explain)
     refused = [verdict for verdict in verdicts if isinstance(verdict, Refused)]
     for verdict in refused:
@@ -87,6 +96,14 @@ def check(
             raise
         say(f"syncline-design: {error}")  # nothing was computed: that the specs are bad stands
     return max((verdict.exit_code for verdict in verdicts), default=0)
+
+
+def _since(verdict: Checked, earlier: Sequence[Verdict], file: str) -> Checked:
+    """The verdict against its baseline; what could not be read has none."""
+    from syncline_design.verdict.baseline import against
+    from syncline_design.verdict.tree import Verdict
+
+    return against(verdict, earlier, file) if isinstance(verdict, Verdict) else verdict
 
 
 def _demand_known(verdicts: Sequence[Checked], ids: Sequence[str]) -> None:

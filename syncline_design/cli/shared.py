@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
 
@@ -25,6 +26,7 @@ PANIC = "PanicException"  # of a library in Rust; it passes by `except Exception
 DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal error
 
 P = ParamSpec("P")
+_COMMAND: ContextVar[str] = ContextVar("command", default="report")  # that runs
 
 SpecArgument = Annotated[Path, typer.Argument(help="System spec (YAML).", show_default=False)]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of every random number.")]
@@ -47,7 +49,7 @@ def output_option(formats: tuple[str, ...]) -> Any:
         "-o",
         metavar="FORMAT:PATH",
         help=f"Write the result too; formats: {', '.join(formats)}; repeatable; path `-` is "
-        "standard output.",
+        "standard output, no path a file named after the input for html.",
     )
 
 
@@ -80,6 +82,7 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
         from syncline_design.machine.result_files import OutputError
         from syncline_design.spec.load import BadInput
 
+        _COMMAND.set(command.__name__)
         try:
             with noting(), a_command():
                 code = command(*args, **kwargs)
@@ -162,7 +165,7 @@ def output_targets(
 
     specs = [path for path in writes if path is not None]
     try:
-        targets = [parse_target(text, formats) for text in output or ()]
+        targets = [parse_target(text, formats, _stem(reads)) for text in output or ()]
         for path in specs:
             check_writable(path)
             apart(path, targets)
@@ -173,6 +176,11 @@ def output_targets(
     except (OutputError, ReplacedInputError) as error:
         refuse(f"syncline-design: {error}")
     return targets
+
+
+def _stem(reads: Sequence[Path]) -> str:
+    """What a file is called that got no name: after what was read first, and the command."""
+    return "-".join([*(path.stem for path in reads[:1] if path.stem), _COMMAND.get()])
 
 
 def emit(
@@ -187,6 +195,9 @@ def emit(
     if text and not quiet and not any(target.path == STDOUT for target in targets):
         rendered.append((Target("text", STDOUT), without_commands(text)))
     write_outputs(rendered)
+    for target in targets:
+        if not target.named and not quiet:
+            say(f"written to {target.path}")
 
 
 def deadline_of(time_limit_s: float | None) -> Deadline:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
-from syncline_design.machine.records import NotThisResultError, read_as
+from syncline_design.machine.records import NotThisResultError, Record, read_as
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw, StopReadingError, read_bytes
-from syncline_design.verdict.tree import SCHEMA, Verdict
+from syncline_design.verdict.tree import SCHEMA, SEVERAL_SCHEMA, Verdict, Verdicts
+
+R = TypeVar("R", bound=Record)
 
 _WANTED = "a verdict as `check --output json:PATH` writes it, of one spec"
+_SOME = "what `check --output json:PATH` writes"
 _ANEW = "a verdict written by this version; run `check` on its spec again"
 
 
@@ -32,14 +35,30 @@ def read_verdict(path: Path) -> Verdict:
         where = "verdict" if name == SCHEMA else "schema"
         found = word if name == SCHEMA else name or "none"
         _refuse(path, "not a verdict that can be compared", where, _WANTED, found)
+    return _read(path, text, Verdict, _WANTED)
+
+
+def read_verdicts(path: Path) -> tuple[Verdict, ...]:
+    """The verdicts in a JSON file of one or of several; specs that were refused have none."""
+    text = text_of(path)
+    name, word = _is(path, text)
+    if name == SEVERAL_SCHEMA:
+        found = _read(path, text, Verdicts, _SOME).verdicts
+        return tuple(one for one in found if isinstance(one, Verdict))
+    if name != SCHEMA:
+        _refuse(path, "not a verdict that can be a baseline", "schema", _SOME, name or "none")
+    return () if word == "refused" else (_read(path, text, Verdict, _SOME),)
+
+
+def _read(path: Path, text: str, kind: type[R], wanted: str) -> R:
     try:
-        return read_as(Verdict, text)
+        return read_as(kind, text)
     except NotThisResultError as error:
         where, _, what = str(error).partition("\n")[0].partition(": ")
         if what == "Field required":
             what, wanted = "missing; perhaps an earlier syncline-design wrote this verdict", _ANEW
         else:
-            what, wanted = f"not a verdict: {what}", _WANTED
+            what = f"not a verdict: {what}"
         _refuse(path, what, where, wanted)
 
 

@@ -19,7 +19,7 @@ from syncline_design.verdict.tree import (
     Verdict,
 )
 
-Level = Literal["pass", "fail", "undecided", "not_reached", "waived", "warning"]
+Level = Literal["pass", "fail", "undecided", "not_reached", "waived", "known", "warning"]
 
 SILENT: Final = ("pass", "not_reached")  # nothing to annotate
 
@@ -78,7 +78,10 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
     elif level == "undecided" and verdict.design is None:
         level = "not_reached"
     place = (row.line or 1, row.column or 1)
-    return Notice(level, row.kind, row.id, verdict.file, *place, message, waiver_text(row))
+    known, why = verdict.baseline, waiver_text(row)
+    if level in ("fail", "undecided") and known is not None and known.forgives(row.id):
+        level, why = "known", f"no worse than in {known.file}"
+    return Notice(level, row.kind, row.id, verdict.file, *place, message, why)
 
 
 def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:
@@ -128,6 +131,8 @@ def requirement_sentence(row: RequirementResult) -> str:
 
 def _no_design(verdict: Verdict) -> Notice:
     level: Level = "fail" if verdict.verdict == "infeasible" else "undecided"
+    if verdict.baseline is not None and not verdict.baseline.worse:
+        level = "known"
     text = f"{outcome(verdict).word}. {obstacle_sentence(verdict.infeasibility)}{_fixes(verdict)}"
     return Notice(level, verdict.verdict, "", verdict.file, 1, 1, text)
 

@@ -14,7 +14,11 @@ from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import design_sentence, outcome
 from syncline_design.verdict.tree import Checked
 
-_COMMANDS = {"fail": "error", "undecided": "error", "waived": "warning", "warning": "warning"}
+_COMMANDS = {
+    "fail": "error",
+    "undecided": "error",
+    **dict.fromkeys(("waived", "known", "warning"), "warning"),
+}
 
 
 def render_github(verdicts: Sequence[Checked]) -> str:
@@ -29,8 +33,8 @@ def render_github(verdicts: Sequence[Checked]) -> str:
 def github_command(finding: Notice) -> str:
     """One annotation."""
     title = f"{finding.id} {finding.rule}".strip()
-    if finding.level == "waived":
-        title += " (waived)"
+    if finding.level in ("waived", "known"):
+        title += f" ({finding.level})"
     message = finding.message + (f"; {finding.justification}" if finding.justification else "")
     file = PurePath(finding.file).as_posix()
     return (

@@ -12,7 +12,8 @@ from syncline_design.verdict.tree import Checked
 
 
 def render_junit(verdicts: Sequence[Checked]) -> str:
-    """A JUnit document; failures fail, what is undecided errors, what is waived is skipped.
+    """A JUnit document; failures fail, what is undecided errors; skipped is what is
+    waived, not reached, or no worse than in the baseline.
 
     Times are 0 and no timestamp is given: the same verdict gives the same bytes.
     """
@@ -42,7 +43,7 @@ def suite_of(name: str, file: str, found: Sequence[Notice], word: str) -> Elemen
         "tests": len(cases),
         "failures": sum(f.level == "fail" for f in cases),
         "errors": sum(f.level == "undecided" for f in cases),
-        "skipped": sum(f.level in ("waived", "not_reached") for f in cases),
+        "skipped": sum(f.level in ("waived", "known", "not_reached") for f in cases),
     }
     suite = ElementTree.Element("testsuite", {"name": visible(name)})
     for key, value in counts.items():
@@ -77,7 +78,7 @@ def _case(finding: Notice, file: str) -> ElementTree.Element:
     elif finding.level == "undecided":
         error = ElementTree.SubElement(case, "error", {"type": finding.rule, "message": message})
         error.text = f"{place}: {message}"
-    elif finding.level == "waived":
+    elif finding.level in ("waived", "known"):
         reason = f"{visible(finding.justification)}; {message}"
         ElementTree.SubElement(case, "skipped", {"message": reason})
     elif finding.level == "not_reached":

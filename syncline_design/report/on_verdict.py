@@ -72,6 +72,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
                      "Why not"),
             *section("requirements", "Requirements",
                      show(verdict_tables.requirements(verdict), silent=True)),
+            *section("baseline", "Against the baseline", _since(verdict), "Baseline"),
             *section("explained", "Worked out", explained(verdict), "Worked out"),
             *section("figures", "Three figures", error_figures(verdict), "Figures"),
             *section("warnings", "Warnings", verdict_words.warning_nodes(verdict.warnings)),
@@ -90,6 +91,17 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
         ),
         source=verdict.file,
     )  # fmt: skip
+
+
+def _since(verdict: Verdict) -> list[Node]:
+    """What became of the verdict since an earlier one."""
+    baseline = verdict.baseline
+    if baseline is None:
+        return []
+    return [
+        Text((verdict_words.since_sentence(baseline, verdict),)),
+        *show(verdict_tables.since(verdict), silent=True),
+    ]
 
 
 def _on_refused(refused: Refused) -> Document:

@@ -47,11 +47,18 @@ _RULES: Final[dict[str, str]] = {
     "indeterminate": "A verdict could be reached.",
     "spec": "The spec can be read.",
 }
-_LEVELS: Final = {"fail": "error", "waived": "error", "undecided": "warning", "warning": "note"}
+_LEVELS: Final = {
+    "fail": "error",
+    "waived": "error",
+    "known": "error",
+    "undecided": "warning",
+    "warning": "note",
+}
 
 
 def render_sarif(verdicts: Sequence[Checked]) -> str:
-    """A SARIF log with one run; what passes is left out, what is waived is suppressed."""
+    """A SARIF log with one run; what passes is left out, what is waived is suppressed, what is
+    no worse than in the baseline is unchanged."""
     return sarif_log([f for f in all_findings(verdicts) if f.level not in SILENT])
 
 
@@ -96,6 +103,8 @@ def _result(finding: Notice, rules: list[str]) -> dict[str, Any]:
         result["suppressions"] = [
             {"kind": "external", "justification": visible(finding.justification)}
         ]
+    elif finding.level == "known":
+        result["baselineState"] = "unchanged"
     return result
 
 

@@ -12,14 +12,16 @@ from syncline_design.report.verdict_words import (
     relative_margin,
     selection_reason,
     status_of,
+    status_word,
     term_text,
     waiver_text,
 )
-from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SYNC_MODELS, TIMELINES
+from syncline_design.report.words import LEDGER_KINDS, PRIMITIVES, SINCE, SYNC_MODELS, TIMELINES
 from syncline_design.verdict.bill import total
 from syncline_design.verdict.measured import claim_words
 
 if TYPE_CHECKING:
+    from syncline_design.verdict.baseline import Earlier
     from syncline_design.verdict.named import BillLine, NamedDesign
     from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
@@ -43,6 +45,36 @@ def requirements(verdict: Verdict) -> Table:
     heads = ("Requirement", "Status", "Limits", "Value #", "Limit #", "Margin #", "In the spec",
              "Note")  # fmt: skip
     return table("Requirements", heads, rows)
+
+
+def since(verdict: Verdict) -> Table | None:
+    """What became of each requirement since the baseline."""
+    baseline = verdict.baseline
+    if baseline is None or not baseline.requirements:
+        return None
+    now = {row.id: row for row in verdict.requirements}
+    rows = []
+    for one in baseline.requirements:
+        row, was = now.get(one.id), one.was
+        word = None if row is None else status_of(row)
+        then = None if was is None else status_word(was.status, waived=False)
+        rows.append((
+            Cell(one.id),
+            Cell(SINCE[one.change].word, tone=SINCE[one.change].tone),
+            "-" if word is None else word.word,
+            _both(row),
+            "-" if then is None else then.word,
+            _both(was),
+        ))  # fmt: skip
+    heads = ("Requirement", "Since then", "Now", "Value and limit now #", "Then",
+             "Value and limit then #")  # fmt: skip
+    return table("Against the baseline", heads, rows)
+
+
+def _both(row: RequirementResult | Earlier | None) -> str:
+    if row is None:
+        return "-"
+    return f"{numbers.in_unit(row.value, row.unit)} / {numbers.in_unit(row.limit, row.unit)}"
 
 
 def _interval(row: RequirementResult, verdict: Verdict) -> str:

@@ -23,6 +23,7 @@ from syncline_design.report.words import (
 from syncline_design.verdict.obstacle import obstacle_sentence
 
 if TYPE_CHECKING:
+    from syncline_design.verdict.baseline import Baseline
     from syncline_design.verdict.named import NamedRole
     from syncline_design.verdict.optimise import Optimisation
     from syncline_design.verdict.tree import (
@@ -84,6 +85,19 @@ def waiver_text(row: RequirementResult) -> str:
         return ""
     state = "waiver expired on" if waiver.expired else "waived until"
     return f"{state} {waiver.expires}: {waiver.reason}"
+
+
+def since_sentence(baseline: Baseline, verdict: Verdict) -> str:
+    """What counts against a baseline, and what that makes of the exit code."""
+    file = visible(baseline.file)
+    if baseline.verdict is None:
+        return f"{file} holds no verdict on this spec: it is judged as it is."
+    was = f"Then ({file}): {OUTCOMES[baseline.verdict].word}."
+    if verdict.verdict == "meets":
+        return was
+    if baseline.worse:
+        return f"{was} Since then it got worse."
+    return f"{was} Since then nothing got worse: the exit code is 0."
 
 
 def kind_text(row: RequirementResult) -> str:

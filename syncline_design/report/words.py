@@ -23,6 +23,13 @@ STATUSES: Final[dict[str, Outcome]] = {
     "waived": Outcome("warn", "\u25d0", "waived"),
     "indeterminate": Outcome("warn", "?", "no verdict"),
 }
+SINCE: Final[dict[str, Outcome]] = {
+    "worse": Outcome("bad", "\u2717", "worse"),
+    "new": Outcome("warn", "+", "new"),
+    "same": Outcome("good", "=", "no worse"),
+    "better": Outcome("good", "\u2713", "better"),
+    "gone": Outcome("warn", "-", "no longer required"),
+}
 KINDS: Final[dict[str, str]] = {
     "accuracy": "Syncline error",
     "sync": "\u03c4 / \u03c4_crit, largest",

@@ -20,23 +20,24 @@ __all__ = [
 ]  # fmt: skip
 
 STDOUT: Final = "-"
-_KINDS: Final = {"html": "page of HTML", "parquet": "binary table"}
-_EXAMPLES: Final = {"html": "report.html", "parquet": "cases.parquet"}
+_OURS: Final = b'name="generator" content="syncline-design"'
+_HEAD_BYTES: Final = 4096
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One `--output FORMAT:PATH`; path `-` is standard output."""
+    """One `--output FORMAT:PATH`; path `-` is standard output; named: by the user."""
 
     format: str
     path: str
+    named: bool = True
 
 
-def parse_target(argument: str, known: Sequence[str]) -> Target:
+def parse_target(argument: str, known: Sequence[str], stem: str = "report") -> Target:
     """`html:out/report.html` -> Target; OutputError for an unknown format or an empty path.
 
-    A bare format means standard output, as in `--output json`; pages and binary tables want a
-    path (or `-`, said on purpose), since they are of no use on a terminal.
+    A bare format means standard output, as in `--output json`; pages and binary tables, which are
+    of no use on a terminal, go to a file in the working folder named after `stem`.
     """
     name, separator, path = argument.partition(":")
     if name not in known:
@@ -50,11 +51,26 @@ def parse_target(argument: str, known: Sequence[str]) -> Target:
             "for standard output"
         )
     if not separator and name in NOT_FOR_A_TERMINAL:
-        raise OutputError(
-            f"--output {argument}: a {_KINDS[name]} would flood a terminal; give it a path, as in "
-            f"--output {name}:{_EXAMPLES[name]}, or say {name}:- for standard output"
-        )
+        path = f"{stem}.{name}"
+        _keep_others(Path(path), argument)
+        return Target(name, path, named=False)
     return Target(name, STDOUT if not separator or descriptor_of(path) == 1 else path)
+
+
+def _keep_others(path: Path, argument: str) -> None:
+    """Refuse to replace, under a name that nobody gave, what is no page of ours."""
+    try:
+        with path.open("rb") as file:
+            ours = _OURS in file.read(_HEAD_BYTES)
+    except FileNotFoundError:
+        return
+    except OSError:
+        ours = False
+    if not ours:
+        raise OutputError(
+            f"--output {argument}: {path} exists and is no page of syncline-design; "
+            f"name the file, as in --output {argument}:PATH"
+        )
 
 
 def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None:

@@ -17,6 +17,7 @@ from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
+from syncline_design.verdict.baseline import Baseline
 from syncline_design.verdict.named import BillLine, ChoiceResult, ExplainedRequirement, NamedDesign
 
 SCHEMA = "syncline-design/verdict/v1"
@@ -344,6 +345,7 @@ class Verdict(Record):
     measured: tuple[MeasuredEntry, ...] | None = optional()
     explained: tuple[ExplainedRequirement, ...] | None = optional()
     bill_of_materials: tuple[BillLine, ...] | None = optional()
+    baseline: Baseline | None = optional()
 
     @property
     def name(self) -> str:
@@ -357,7 +359,9 @@ class Verdict(Record):
 
     @property
     def exit_code(self) -> int:
-        """0 meets, 1 does not meet, 3 no verdict."""
+        """0 meets, or is no worse than its baseline; 1 does not meet; 3 no verdict."""
+        if self.baseline is not None and not self.baseline.worse:
+            return 0
         return EXIT_CODES[self.verdict]
 
 

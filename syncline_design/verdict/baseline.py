@@ -1,0 +1,136 @@
+"""A verdict against an earlier one of the same spec: only what got worse fails.
+
+Worse is: a requirement passed and no longer does, or was open and fails; it fails by more (value
+over limit, of a simulated one where the two intervals do not meet); it is new and does not pass; or
+the verdict as a whole fell from `meets` to `indeterminate`, `fails`, `infeasible`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Final, Literal
+
+from syncline_design.machine.records import Record
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.tree import RequirementResult, Verdict
+
+Since = Literal["worse", "better", "same", "new", "gone"]
+_OUTCOMES: Final = ("meets", "indeterminate", "fails", "infeasible")  # each worse than the last
+_STATUSES: Final = ("pass", "indeterminate", "fail")
+_ROUNDING = 1e-9  # relative; figures that differ by less are the same
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier(Record):
+    """How a requirement stood in the baseline."""
+
+    status: Literal["pass", "fail", "indeterminate"]
+    value: float | None
+    limit: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementSince(Record):
+    """What became of a requirement; was: None of a new one."""
+
+    id: str
+    change: Since
+    was: Earlier | None
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline(Record):
+    """What became of a spec's verdict; verdict: the earlier one, None where the file has none."""
+
+    file: str
+    verdict: Literal["meets", "fails", "infeasible", "indeterminate"] | None
+    worse: bool  # the exit code is 0 where nothing is
+    requirements: tuple[RequirementSince, ...]
+
+    def forgives(self, requirement: str) -> bool:
+        """Whether a requirement that does not pass did no better before."""
+        return any(
+            row.id == requirement and row.change in ("same", "better") for row in self.requirements
+        )
+
+
+def against(verdict: Verdict, earlier: Sequence[Verdict], file: str) -> Verdict:
+    """A verdict that knows the one of the same spec in a baseline.
+
+    The same spec is the one of that path, else the only one of that name, else, where the file
+    holds a single verdict, that one.
+    """
+    before = _of_same_spec(verdict, earlier)
+    if before is None:
+        found = Baseline(file, None, verdict.verdict != "meets", ())
+        return replace(verdict, baseline=found)
+    rows = tuple(_rows(verdict, before))
+    found = Baseline(file, before.verdict, _fell(verdict, before), rows)
+    missed = [row.id for row in verdict.requirements if _standing(row) > 0]
+    worse = found.worse or any(not found.forgives(one) for one in missed)
+    return replace(verdict, baseline=replace(found, worse=worse))
+
+
+def _of_same_spec(verdict: Verdict, earlier: Sequence[Verdict]) -> Verdict | None:
+    for same in (
+        [one for one in earlier if one.file == verdict.file],
+        [one for one in earlier if one.name == verdict.name],
+        earlier,
+    ):
+        if len(same) == 1:
+            return same[0]
+    return None
+
+
+def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
+    old = {row.id: row for row in before.requirements}
+    for row in verdict.requirements:
+        was = old.pop(row.id, None)
+        if was is None:
+            change: Since = "new"
+        elif None in (verdict.design, before.design):
+            change = _without_design(verdict, before, row)
+        else:
+            change = _since(row, was)
+        yield RequirementSince(row.id, change, None if was is None else _earlier(was))
+    for was in old.values():
+        yield RequirementSince(was.id, "gone", _earlier(was))
+
+
+def _earlier(row: RequirementResult) -> Earlier:
+    return Earlier(row.status, row.value, row.limit, row.unit)
+
+
+def _without_design(verdict: Verdict, before: Verdict, row: RequirementResult) -> Since:
+    """Where one side has no design its rows have no figures: the verdict as a whole decides."""
+    if row.status == "pass" or verdict.verdict == before.verdict:
+        return "same"
+    return "worse" if _fell(verdict, before) else "better"
+
+
+def _fell(verdict: Verdict, before: Verdict) -> bool:
+    return _OUTCOMES.index(verdict.verdict) > _OUTCOMES.index(before.verdict)
+
+
+def _since(now: RequirementResult, then: RequirementResult) -> Since:
+    step = _standing(now) - _standing(then)
+    if step == 0 and now.status == "fail" and now.unit == then.unit:
+        step = _further(now, then) - _further(then, now)
+    return "same" if step == 0 else "worse" if step > 0 else "better"
+
+
+def _standing(row: RequirementResult) -> int:
+    """0 passes or is waived, 1 open, 2 fails."""
+    return 0 if row.is_waived else _STATUSES.index(row.status)
+
+
+def _further(one: RequirementResult, other: RequirementResult) -> bool:
+    """Whether one misses its limit by more than the other does its own, beyond doubt."""
+    least = one.value if one.low is None else one.low
+    most = other.value if other.high is None else other.high
+    if least is None or most is None or one.limit <= 0.0 or other.limit <= 0.0:
+        return False
+    return least / one.limit > most / other.limit * (1.0 + _ROUNDING)

@@ -1,0 +1,215 @@
+"""A verdict against an earlier one: only what got worse fails; figures from limits set by hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from typer.testing import CliRunner
+
+import syncline_design as sd
+from syncline_design.cli.app import app
+from syncline_design.machine.records import read_as
+from syncline_design.report.ci import findings
+from syncline_design.verdict.baseline import against
+from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
+
+ROOT = Path(__file__).parent.parent
+FAILING = (ROOT / "specs" / "usv_wire_missing.yaml").read_text(encoding="utf-8")
+# 447.4 mm of 250 mm, tau / tau_crit 1.734 of 1, 33 357.35 EUR of 36 000 EUR
+ACCURACY, COST = "limit: 0.25 m", "limit: 36000 EUR"
+OPEN = (ROOT / "specs" / "infeasible_example.yaml").read_text(encoding="utf-8")
+PLAIN = CheckSettings(monte_carlo=False)
+
+
+def verdict_of(folder: Path, text: str, name: str = "own.yaml") -> Verdict:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return check_file(path, PLAIN)
+
+
+def changed(text: str, *pairs: tuple[str, str]) -> str:
+    for old, new in pairs:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    return text
+
+
+CASES = {
+    "nothing changed": (FAILING, FAILING, 0, {}),
+    "misses by more": (
+        FAILING,
+        changed(FAILING, (ACCURACY, "limit: 0.24 m")),
+        1,
+        {"ACC-1": "worse"},
+    ),
+    "misses by less": (
+        FAILING,
+        changed(FAILING, (ACCURACY, "limit: 0.3 m")),
+        0,
+        {"ACC-1": "better"},
+    ),
+    "one mended": (FAILING, changed(FAILING, (ACCURACY, "limit: 0.5 m")), 0, {"ACC-1": "better"}),
+    "one more missed": (
+        FAILING,
+        changed(FAILING, (COST, "limit: 30000 EUR")),
+        1,
+        {"COST-1": "worse"},
+    ),
+    "one for another": (
+        FAILING,
+        changed(FAILING, (ACCURACY, "limit: 0.5 m"), (COST, "limit: 30000 EUR")),
+        1,
+        {"ACC-1": "better", "COST-1": "worse"},
+    ),
+    "a passing one comes closer": (
+        FAILING,
+        changed(FAILING, (COST, "limit: 33500 EUR")),
+        0,
+        {"COST-1": "same"},
+    ),
+    "new and missed": (
+        FAILING,
+        changed(
+            FAILING, ("requirements:\n", "requirements:\n  - {id: M, kind: mass, limit: 1 kg}\n")
+        ),
+        1,
+        {"M": "new"},
+    ),
+    "new and kept": (
+        FAILING,
+        changed(
+            FAILING, ("requirements:\n", "requirements:\n  - {id: M, kind: mass, limit: 9 kg}\n")
+        ),
+        0,
+        {"M": "new"},
+    ),
+    "no longer required": (
+        changed(
+            FAILING, ("requirements:\n", "requirements:\n  - {id: M, kind: mass, limit: 1 kg}\n")
+        ),
+        FAILING,
+        0,
+        {"M": "gone"},
+    ),
+    "infeasible before and now": (OPEN, OPEN, 0, {}),
+    "infeasible now": (FAILING, OPEN, 1, {}),
+    "infeasible before": (OPEN, FAILING, 0, {}),
+    "a waiver goes": (
+        changed(FAILING, (ACCURACY, f"{ACCURACY}, waiver: {{reason: trial, expires: 2999-12-31}}")),
+        FAILING,
+        1,
+        {"ACC-1": "worse"},
+    ),
+}
+
+
+@pytest.mark.parametrize(("old", "new", "code", "changes"), CASES.values(), ids=CASES.keys())
+def test_only_what_got_worse_fails(
+    tmp_path: Path, old: str, new: str, code: int, changes: dict[str, str]
+) -> None:
+    before = verdict_of(tmp_path, old)
+    now = against(verdict_of(tmp_path, new), [before], "old.json")
+    assert now.exit_code == code
+    assert now.baseline is not None
+    found = {row.id: row.change for row in now.baseline.requirements}
+    ours = {row.id for row in now.requirements} | {row.id for row in before.requirements}
+    assert set(found) == ours
+    for name, change in changes.items():
+        assert found.pop(name) == change
+    if before.design is not None and now.design is not None:
+        assert set(found.values()) <= {"same"}
+    failing = [n.level for n in findings(now) if n.level in ("fail", "undecided")]
+    assert bool(failing) == (code != 0)
+    assert read_as(Verdict, json.dumps(now.to_json())) == now
+
+
+def test_simulated_figures_are_worse_only_where_their_intervals_do_not_meet(tmp_path: Path) -> None:
+    required = "  - {id: MC-1, kind: monte_carlo, quantile: 0.95, limit: 0.2 m}\n"  # 243 mm
+    text = changed(FAILING, ("requirements:\n", "requirements:\n" + required))
+    path = tmp_path / "own.yaml"
+    path.write_text(text, encoding="utf-8")
+    first, second = sd.check(path, seed=1), sd.check(path, seed=2)
+    row = next(r for r in first.requirements if r.id == "MC-1")
+    assert row.status == "fail"
+    assert row.value != next(r.value for r in second.requirements if r.id == "MC-1")
+    assert against(second, [first], "old.json").exit_code == 0
+    assert against(first, [second], "old.json").exit_code == 0
+    path.write_text(text.replace("limit: 0.2 m", "limit: 0.19 m"), encoding="utf-8")
+    assert against(sd.check(path, seed=2), [first], "old.json").exit_code == 1
+
+
+def test_the_baseline_of_several_specs_is_found_by_path_then_name(tmp_path: Path) -> None:
+    worse = changed(FAILING, (ACCURACY, "limit: 0.1 m"))  # the same name in both
+    good, bad = verdict_of(tmp_path, FAILING, "a.yaml"), verdict_of(tmp_path, worse, "b.yaml")
+    for mine, code in ((good, 0), (bad, 0)):
+        assert against(mine, [bad, good], "all.json").exit_code == code
+    elsewhere = verdict_of(tmp_path, FAILING, "c.yaml")
+    found = against(elsewhere, [bad, good], "all.json")
+    assert found.baseline is not None
+    assert found.baseline.verdict is None
+    assert found.exit_code == 1
+    other = verdict_of(tmp_path, OPEN, "d.yaml")
+    assert against(elsewhere, [good, other], "all.json").exit_code == 0
+
+
+def run(*words: str | Path) -> tuple[int, str]:
+    found = CliRunner().invoke(app, [str(word) for word in words])
+    return found.exit_code, found.stdout + found.stderr
+
+
+def test_check_takes_a_baseline_in_every_format(tmp_path: Path) -> None:
+    spec, old = tmp_path / "own.yaml", tmp_path / "old.json"
+    spec.write_text(FAILING, encoding="utf-8")
+    assert run("check", spec, "-q", "-o", f"json:{old}")[0] == 1
+    code, said = run(
+        "check", spec, "--baseline", old, "-o", f"junit:{tmp_path / 'j.xml'}",
+        "-o", f"sarif:{tmp_path / 's.json'}", "-o", f"html:{tmp_path / 'p.html'}",
+    )  # fmt: skip
+    assert code == 0
+    assert "447.4 mm / 250 mm" in said
+    assert "nothing got worse" in said
+    suite = ElementTree.parse(tmp_path / "j.xml").getroot()
+    assert (suite.get("failures"), suite.get("skipped")) == ("0", "2")
+    results = json.loads((tmp_path / "s.json").read_text(encoding="utf-8"))["runs"][0]["results"]
+    states = {r["ruleId"]: r.get("baselineState") for r in results}
+    assert states["accuracy"] == states["sync"] == "unchanged"
+    assert "Against the baseline" in (tmp_path / "p.html").read_text(encoding="utf-8")
+    _, said = run("check", spec, "--baseline", old, "-o", "github:-")
+    assert "::error" not in said
+    assert "title=ACC-1 accuracy (known)" in said
+
+
+BROKEN = {
+    "no file": (None, "no such file"),
+    "no JSON": ("{", "not JSON"),
+    "another schema": ('{"schema": "syncline-design/diff/v1"}', "baseline"),
+    "half a verdict": ('{"schema": "syncline-design/verdict/v1", "verdict": "meets"}', "missing"),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), BROKEN.values(), ids=BROKEN.keys())
+def test_a_baseline_that_is_none_is_refused(tmp_path: Path, text: str | None, said: str) -> None:
+    spec, old = tmp_path / "own.yaml", tmp_path / "old.json"
+    spec.write_text(FAILING, encoding="utf-8")
+    if text is not None:
+        old.write_text(text, encoding="utf-8")
+    code, words = run("check", spec, "--baseline", old)
+    assert code == 2
+    assert said in words
+    assert str(old) in words
+
+
+def test_a_baseline_is_not_overwritten(tmp_path: Path) -> None:
+    spec, old = tmp_path / "own.yaml", tmp_path / "old.json"
+    spec.write_text(FAILING, encoding="utf-8")
+    run("check", spec, "-q", "-o", f"json:{old}")
+    text = old.read_text(encoding="utf-8")
+    code, said = run("check", spec, "--baseline", old, "-o", f"json:{old}")
+    assert code == 2
+    assert "read by this command" in said
+    assert old.read_text(encoding="utf-8") == text
