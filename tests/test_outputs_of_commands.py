@@ -32,8 +32,8 @@ COMMANDS = {
 }  # fmt: skip
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return commands.run(*arguments, environment={"NO_COLOR": "1", "COLUMNS": "200"})
+def run(*arguments: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    return commands.run(*arguments, cwd=cwd, environment={"NO_COLOR": "1", "COLUMNS": "200"})
 
 
 @pytest.mark.parametrize("command", COMMANDS)
@@ -47,20 +47,35 @@ def test_help_names_the_formats_and_the_options_of_every_command(command: str) -
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_page_without_a_path_is_refused_before_anything_is_computed(command: str) -> None:
-    done = run(command, *COMMANDS[command][0], "-o", "html")
+def test_a_page_without_a_path_never_takes_the_place_of_another_file(
+    tmp_path: Path, command: str
+) -> None:
+    """Its name is that of what is read first, and the command's; before anything is computed."""
+    given = [str(ROOT / word) if "." in word else word for word in COMMANDS[command][0]]
+    page = tmp_path / "-".join([*(Path(word).stem for word in given[:1]), f"{command}.html"])
+    page.write_text("mine", encoding="utf-8")
+    done = run(command, *given, "-o", "html", cwd=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
-    assert "html:report.html" in done.stderr
-    assert "html:-" in done.stderr
+    assert f"{page.name} exists" in done.stderr
+    assert page.read_text(encoding="utf-8") == "mine"
 
 
-def test_text_formats_without_a_path_still_go_to_standard_output() -> None:
+def test_a_page_without_a_path_says_where_it_went(tmp_path: Path) -> None:
+    for _ in range(2):  # the second takes the place of the first
+        done = run("check", str(ROOT / TRACK), "-o", "html", cwd=tmp_path)
+        assert done.returncode == 0
+        assert "written to position_track-check.html" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["position_track-check.html"]
+
+
+def test_text_formats_without_a_path_still_go_to_standard_output(tmp_path: Path) -> None:
     done = run("check", TRACK, "-o", "json")
     assert done.returncode == 0
     assert json.loads(done.stdout)["verdict"] == "meets"
-    table = run("study", "specs/studies/usv_speed.yaml", "-o", "parquet")
+    (tmp_path / "usv_speed-study.parquet").write_bytes(b"mine")
+    table = run("study", str(ROOT / "specs/studies/usv_speed.yaml"), "-o", "parquet", cwd=tmp_path)
     assert table.returncode == 2
-    assert "parquet:cases.parquet" in table.stderr
+    assert "usv_speed-study.parquet exists" in table.stderr
 
 
 class Rows(HTMLParser):
