@@ -164,7 +164,9 @@ def slopes(view: Scene, acting: Sequence[Acting]) -> Array:
     Columns in the order of the effects and their `slopes()`; the sign is that of the error of an
     uncorrected log, so minus the slope of `Scene.error`.
     """
-    asked = tuple((one.label, tuple(sorted(one.values.items()))) for one in acting)
+    asked = tuple(
+        (one.label, one.effect.depart, tuple(sorted(one.values.items()))) for one in acting
+    )
     return view.slopes.of(asked, lambda: _slopes(view, acting))
 
 

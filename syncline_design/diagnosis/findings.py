@@ -25,6 +25,7 @@ from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.sensor_tails import sensor_tails
 from syncline_design.diagnosis.settling import Settled
+from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.model.known import EffectEntry
@@ -166,7 +167,21 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
     named = _finding(final, one.effect, one.label, found, size_m, weights)
     if _at_the_edge(final, one):
         named = replace(named, kind="stand_in")
-    return replace(named, varying=_varying(final, one))
+    return replace(_in_its_part(named, one.effect), varying=_varying(final, one))
+
+
+def _in_its_part(named: Finding, effect: Effect) -> Finding:
+    """The finding with the part of the log that it is cut to.
+
+    What is built in does not come and go: cut to a part it is the word for something else.
+    """
+    span = span_of(effect)
+    if span is None:
+        return named
+    ends = (format_estimate(end, None, "s") for end in (span.from_s, span.to_s))
+    words = named.sentence + ", from {} to {}".format(*ends)
+    kind = named.kind if effect.passing else "stand_in"
+    return replace(named, sentence=words, kind=kind, from_s=span.from_s, to_s=span.to_s)
 
 
 def _at_the_edge(final: Settled, one: Acting) -> bool:

@@ -14,6 +14,7 @@ import numpy as np
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, slopes
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
+from syncline_design.diagnosis.spans import cut_to, cuttable, span_of
 from syncline_design.diagnosis.trials import freedom_of, plausible, with_effect
 from syncline_design.effects.record import Array, Effect
 
@@ -76,6 +77,10 @@ def competed(
     model fitted again, an effect of quite another signature may be the better one by far.  The
     model has to be fitted.
     """
+    span = span_of(effect_of(model, label))
+    if span is not None:  # rivals act in the same part of the log
+        time_s = data.view.log.time_s
+        others = [cut_to(span, s, time_s) for s in others if cuttable(s.candidate.effect)]
     screened, found = _screened(data, model, label, others)
     near = [a for a in screened if a.cosine > NEAR or a.fit < RIVAL_NATS]
     near = sorted(near, key=lambda a: (a.fit, a.candidate.label))[:MOST_REFITTED]

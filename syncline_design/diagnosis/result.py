@@ -98,6 +98,7 @@ class Finding(Record):
     requirements.  probability: posterior odds inside the class with its aliases.
     varying: its one parameter in four quarters of the log, where it is not one value.
     also: other sensors that share it, of a delay of a whole system.
+    from_s, to_s: the stamps between which it acts, where it does so in a part of the log alone.
     """
 
     effect: str
@@ -120,6 +121,8 @@ class Finding(Record):
     probability: float | None = optional()
     varying: tuple[Stretch, ...] | None = optional()
     also: tuple[str, ...] | None = optional()
+    from_s: float | None = optional()
+    to_s: float | None = optional()
 
     @property
     def fits_a_spec(self) -> bool:

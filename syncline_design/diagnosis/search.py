@@ -26,6 +26,7 @@ from syncline_design.diagnosis.candidates import (
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
 from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
+from syncline_design.diagnosis.parts import cut_down, in_a_part, refined
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settling import Settled, settle
 from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, slow_states
@@ -125,7 +126,7 @@ class Search:
             trial = self.best(model, scores, threshold)
             if trial is None:
                 break
-            model = self.exchanged(trial.model, model)
+            model = cut_down(self.states, self.exchanged(trial.model, model))
             in_force().doing("searching beyond " + ", ".join(name for name, *_ in model.labels))
             self.progress(len(model.labels) / self.settings.max_effects)
         return SearchResult(base, self.settled(model))
@@ -156,10 +157,13 @@ class Search:
     def best(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
         """The candidate that best explains what is left, its noise fitted anew; none beats chance.
 
-        Effects that move the mean go first, then waves without a name, then noise.
+        Effects that move the mean go first, in all of the log and then in a part of it, then waves
+        without a name, then noise.
         """
         moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
+        if not kept and (part := self.part_trial(model)) is not None:
+            return part
         if not kept and (wave := self.wave_trial(model)) is not None:
             return wave
         if not kept:
@@ -206,11 +210,23 @@ class Search:
         close = [entry for entry in ranked if entry[0] > ranked[0][0] - reach]
         return [(s, level) for _, s, level in close[:TRIED]]
 
-    def trial(self, model: Model, found: Signature, level: NoiseLevel) -> Trial:
-        """The model with this candidate, fitted by re-simulation."""
+    def trial(
+        self, model: Model, found: Signature, level: NoiseLevel, *, parted: bool = False
+    ) -> Trial:
+        """The model with this candidate, fitted by re-simulation; parted: in a part of the log."""
         fitted = with_effect(self.data, model, found, level)
+        fitted = refined(self.states, fitted) if parted else fitted
         freedom = freedom_of(found.candidate.effect)
         return Trial(found.candidate, fitted, model.nll - fitted.nll, freedom)
+
+    def part_trial(self, model: Model) -> Trial | None:
+        """The model with an effect that acts in a part of the log alone."""
+        free = self.free_signatures(model)
+        limit = self.chance(len({s.candidate.label for s in self.signatures}))
+        found = in_a_part(self.states, model, free, limit, ladder(self.data, model))
+        trials = [self.trial(model, one, model.level, parted=True) for one in found]
+        kept = [t for t in trials if t.gain > WANDER_NATS and plausible(self.data, t.model)]
+        return preferred(kept)
 
     def wave_trial(self, model: Model) -> Trial | None:
         """The model with a wave that stands out of what is left, before any noise takes it up."""

@@ -17,7 +17,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import NoiseLevel, Sensor, white_covariance
+from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 
@@ -35,6 +36,7 @@ Channel = tuple[Sensor, int]
 SURVEY: Sensor = ("", "target")  # channel of the targets' survey errors
 WAVES = 8  # cosines a channel; the constant comes on top
 BLOCKS = 16
+INSIDE = 12  # blocks of a part of the log in which an effect acts alone
 QUARTERS = 4
 FEW = 8, 64  # targets, to be left out one group after the other
 LEAST_BLOCKS = 5
@@ -194,10 +196,14 @@ class States:
         """The model's own effects, all together: one entry for each, marginal over the others."""
         columns = np.nan_to_num(slopes(self.data.view, model.acting))
         none = np.zeros((*columns.shape[:2], 0))
-        [found] = self.judged(model, [columns], none)
+        [whole] = self.judged(model, [columns], none)
         at, result = 0, []
         for one in model.acting:
             part = slice(at, at + len(one.effect.slopes()))
+            found, span = whole, span_of(one.effect)
+            if span is not None:
+                inside = span.mask(self.data.view.log.time_s) > 0.0
+                [found] = self.within(inside, INSIDE).judged(model, [columns], none)
             own = tuple((c[part, part], count) for c, count in found.jackknives)
             values = fitted_of(one) + found.values[part]
             result.append(Judged(values, found.model[part, part], own))
@@ -224,13 +230,30 @@ class States:
         left = sums.score - sums.normal @ (values / scale)
         at, found = 0, []
         for one in model.acting:
-            names = names_of(one)
+            names = [] if span_of(one.effect) else names_of(one)
             weight = sums.normal[:, at, at]
             whole = float(one.values[names[0]]) + values[at] / scale[at] if names else 0.0
             own = whole + left[:, at] / np.where(weight > 0.0, weight, 1.0) if names else weight
             found.append(_course(own, weight) if len(names) == 1 else None)
-            at += len(names)
+            at += len(names_of(one))
         return found
+
+    def sums_of(self, model: Model, columns: Array, width: int) -> tuple[Array, Array, Array]:
+        """X'X (G, m, m) and X'e (G, m) of every block, and the prior precision (m - 1,).
+
+        columns (n, 3, m): one that is judged, `width` in all that are free, then the courses.
+        """
+        (sums, *_), prior = self._sums(model.level, model.error, columns, width)
+        return sums.normal, sums.score, np.concatenate([np.zeros(width - 1), prior])
+
+    def within(self, inside: NDArray[np.bool_], count: int) -> States:
+        """The same with `count` blocks of the rows inside, and one on either side of them."""
+        rows = np.flatnonzero(inside)
+        count = max(min(count, rows.size // LEAST_ROWS), 1)
+        block = np.zeros(inside.shape, dtype=np.int64)
+        block[rows] = 1 + np.arange(rows.size) * count // rows.size
+        block[rows[-1] + 1 :] = count + 1
+        return replace(self, block=block - block[0], seen=None)
 
     def sizes(self, level: NoiseLevel, error: Array) -> dict[Channel, float]:
         """Variance of the slow courses of each sensor's channel over the spec's."""

@@ -59,4 +59,5 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=10,
     breaks="latency",
+    passing=True,
 )

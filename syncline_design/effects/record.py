@@ -281,6 +281,7 @@ class Effect:
     undoing: a discrete one's.
     bounded_by_k: charged with k times its standard deviation, k the coverage factor.
     memory: the parameter that is the time constant of what it remembers, "" of one without memory.
+    passing: may come and go while a system is at work; what is built in acts all along.
     breaks: which assumption on a built system it breaks; `noise`: that the sensor is as its figure.
     sentence: for people, a format string over {sensor} and the parameters.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
@@ -309,6 +310,7 @@ class Effect:
     undoing: Undoing | None = None
     bounded_by_k: bool = False
     memory: str = ""
+    passing: bool = False
     breaks: Promise = "noise"
     brief: tuple[str, ...] = ()
 

@@ -84,4 +84,5 @@ EFFECT = Effect(
     contribute=_contribute,
     applies=_applies,
     rarity=110,
+    passing=True,
 )

@@ -20,6 +20,7 @@ from syncline_design.diagnosis.result import (
     Regime,
     Remaining,
     Rival,
+    Stretch,
 )
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
@@ -261,8 +262,8 @@ def _finding(found: Finding) -> Node:
         Text(f"Evidence: {_full_stop(found.evidence)}"),
     ]
     if found.varying:
-        values = sentence_list([one.text for one in found.varying])
-        nodes.append(Text(f"It varies along the log: {values} in its quarters.", mark="!"))
+        values = sentence_list([_stretch_text(one) for one in found.varying])
+        nodes.append(Text(f"It varies along the log: {values}.", mark="!"))
     if found.aliases:
         names = sentence_list([_alias_text(one) for one in found.aliases])
         apart = f"To separate them: {found.separated_by}."
@@ -275,6 +276,12 @@ def _finding(found: Finding) -> Node:
         names = sentence_list([rival_text(one) for one in found.excluded])
         nodes.append(Text(f"Told apart on this log from {names}.", quiet=True))
     return Group(tuple(nodes), "article")
+
+
+def _stretch_text(one: Stretch) -> str:
+    """`64 ms from 0 s to 43.5 s`."""
+    ends = " to ".join(numbers.si_quantity(end, "s", 3) for end in (one.from_s, one.to_s))
+    return f"{one.text} from {ends}"
 
 
 def _spaced(name: str) -> str:

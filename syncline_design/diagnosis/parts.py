@@ -1,0 +1,242 @@
+"""Effects that act in a part of a log only: a latency under load, a layer of other water.
+
+A candidate is tried in every stretch of a log that some blocks make up, beside the slow states:
+    e = 1[a <= t < b] X b_in + X b_out 1[else] + states + w,
+and in its best one it has to stand up in noise of another kind, like all that moves the mean,
+paid for the number of stretches.  What acts all along and shows no sign of it outside is cut to its
+stretch in the same way.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.diagnosis.candidates import Signature, slopes
+from syncline_design.diagnosis.fitting import Model, fit
+from syncline_design.diagnosis.noise import NoiseLevel, precision
+from syncline_design.diagnosis.slow_states import BLOCKS, INSIDE, LEAST_ROWS, States, fitted_of
+from syncline_design.diagnosis.spans import Span, cut_to, cuttable, span_of
+from syncline_design.effects.acting import Acting
+from syncline_design.effects.record import Array, Effect
+
+LEAST, MOST = 2, 13  # blocks of a stretch, of the states' sixteen
+STRETCHES = sum(BLOCKS - k + 1 for k in range(LEAST, MOST + 1))
+NATS = 4.5  # by which a stretch has to be better than the whole log, beside paying for the search
+EDGES, PLACES, ROUNDS = 1.5, 13, 4  # blocks by which an end may move; places tried; how often
+REFITS = 2
+GONE = 0.25  # of its size inside, which an effect may have outside and still live inside alone
+SURE = 2.0  # standard uncertainties of that
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A stretch in blocks [first, last): nat by which it is better than the whole log."""
+
+    first: int
+    last: int
+    gain: float
+    better: float
+
+
+def best_stretch(states: States, model: Model, column: Array, known: float) -> Found | None:
+    """The stretch in which a column (n, 3, 1) is worth most; `known` of it is taken out already."""
+    if states.count < BLOCKS:
+        return None
+    own = np.nan_to_num(slopes(states.data.view, model.acting))
+    every = np.concatenate([column, own, states.courses], axis=2)
+    return _best(*states.sums_of(model, every, own.shape[2] + 1), known)
+
+
+def _best(normal: Array, score: Array, prior: Array, known: float) -> Found:
+    """Of sums by block (G, m, m), (G, m): the first column in stretches, the rest in all."""
+    score = score + normal[:, :, 0] * known
+    count = normal.shape[0]
+    rest = np.sum(normal[:, 1:, 1:], axis=0) + np.diag(prior)
+    scale = np.sqrt(np.maximum(np.diag(rest), 1e-300))
+    inverse = np.linalg.pinv(rest / scale[:, None] / scale, rcond=1e-12) / scale[:, None] / scale
+    cross = np.concatenate([np.zeros((1, len(prior))), np.cumsum(normal[:, 0, 1:], axis=0)])
+    own = np.concatenate([[0.0], np.cumsum(normal[:, 0, 0])])
+    right = np.concatenate([[0.0], np.cumsum(score[:, 0])])
+    held = inverse @ np.sum(score[:, 1:], axis=0)
+
+    def gain(a: int, b: int) -> float:
+        across = cross[b] - cross[a]
+        left = own[b] - own[a] - across @ inverse @ across
+        if not left > 1e-7 * max(own[-1], 1e-300):
+            return 0.0
+        return 0.5 * float(right[b] - right[a] - across @ held) ** 2 / float(left)
+
+    whole = gain(0, count)
+    tried = [
+        Found(a, b, (g := gain(a, b)), g - whole)
+        for a, b in itertools.combinations(range(count + 1), 2)
+        if LEAST <= b - a <= MOST
+    ]
+    return max(tried, key=lambda one: one.gain)
+
+
+def in_a_part(
+    states: States,
+    model: Model,
+    free: Sequence[Signature],
+    limit: float,
+    levels: Sequence[NoiseLevel],
+) -> list[Signature]:
+    """What acts in a stretch alone, each in its own: of effects that may come and go.
+
+    limit: log p that one of the candidates falls below by chance, a stretch being one of many.
+    levels: noise to look for its ends in; what is fitted while it is missing has swallowed it.
+    """
+    found = []
+    for one in free:
+        if not (one.candidate.effect.passing and cuttable(one.candidate.effect)):
+            continue
+        column = np.nan_to_num(one.columns)
+        best = best_stretch(states, model, column, 0.0)
+        if best is None or best.better < NATS + math.log(STRETCHES):
+            continue
+        log_p, cut = min(
+            (_judged(states, model, one, best, column, level) for level in levels),
+            key=lambda pair: pair[0],
+        )
+        if log_p + math.log(STRETCHES) < limit:
+            found.append(cut)
+    return found
+
+
+def _judged(
+    states: States,
+    model: Model,
+    one: Signature,
+    best: Found,
+    column: Array,
+    level: NoiseLevel,
+) -> tuple[float, Signature]:
+    """(log p of the effect in its stretch as a noise level shows it, its signature there)."""
+    data = states.data
+    by_level = replace(model, precision=precision(data.structure, level))
+    span = _span(states, by_level, one.candidate.effect, column[:, :, 0], best)
+    cut = cut_to(span, one, data.view.log.time_s)
+    (judged,) = _within(states, span).judged(model, [cut.columns])
+    return judged.log_p, cut
+
+
+def cut_down(states: States, model: Model) -> Model:
+    """The model with every effect that shows no sign of itself outside a stretch cut to that."""
+    for one in model.acting:
+        if not cuttable(one.effect):
+            continue
+        rest = replace(model, acting=tuple(a for a in model.acting if a.label != one.label))
+        values = fitted_of(one)
+        shape = np.nan_to_num(slopes(states.data.view, (one,))) @ values
+        best = best_stretch(states, rest, shape[:, :, None], 1.0)
+        if best is None or best.better < NATS + math.log(STRETCHES):
+            continue
+        span = _span(states, model, one.effect, shape, best, 1.0)
+        trial = _exchanged(states, model, one, span)
+        if model.nll - trial.nll > NATS + math.log(STRETCHES) and _alone(states, trial, one, span):
+            model = trial
+    return model
+
+
+def refined(states: States, model: Model) -> Model:
+    """The model with the ends of its newest effect's stretch found anew, in the noise it leaves."""
+    for _ in range(REFITS):
+        one = model.acting[-1]
+        span = span_of(one.effect)
+        if span is None:
+            break
+        whole = replace(one, effect=span.effect)
+        shape = np.nan_to_num(slopes(states.data.view, (whole,))) @ fitted_of(one)
+        known = span.mask(states.data.view.log.time_s)
+        blocks = _blocks(states, span)
+        trial = _exchanged(
+            states, model, one, _span(states, model, span.effect, shape, blocks, known)
+        )
+        if not trial.nll < model.nll:
+            break
+        model = trial
+    return model
+
+
+def _blocks(states: States, span: Span) -> Found:
+    inside = states.block[span.mask(states.data.view.log.time_s) > 0.0]
+    return Found(int(inside[0]), int(inside[-1]) + 1, 0.0, 0.0)
+
+
+def _exchanged(states: States, model: Model, one: Acting, span: Span) -> Model:
+    """The model with an effect cut to a stretch, fitted again."""
+    cut = replace(one, effect=span.cut)
+    acting = tuple(cut if a.label == one.label else a for a in model.acting)
+    return fit(states.data, acting, model.opened, start=model.level)
+
+
+def _alone(states: States, model: Model, one: Acting, span: Span) -> bool:
+    """Whether the effect inside differs from that outside, which is next to nothing."""
+    data = states.data
+    own = next(a for a in model.acting if a.label == one.label)
+    signature = (np.nan_to_num(slopes(data.view, (replace(one, values=own.values),)))
+                 @ fitted_of(own))  # fmt: skip
+    outside = signature * (1.0 - span.mask(data.view.log.time_s))[:, None]
+    if not np.any(outside):
+        return False
+    (judged,) = states.judged(model, [outside[:, :, None]])
+    size, spread = abs(float(judged.values[0])), float(judged.spread[0])
+    sure = 1.0 - size > _coverage(judged.coverage) * spread
+    return sure and size < max(GONE, SURE * spread)
+
+
+def _coverage(of_95: float) -> float:
+    """Standard uncertainties of one chance in a thousand, from those of one in twenty (normal)."""
+    return of_95 * 3.29 / 1.96
+
+
+def _span(
+    states: States,
+    model: Model,
+    effect: Effect,
+    shape: Array,
+    found: Found,
+    known: Array | float = 0.0,
+) -> Span:
+    """The stretch to the row: its ends by turns where the effect (n, 3) saves most, ever finer.
+
+    known (n,): how much of the effect is taken out of each row already.
+    """
+    time_s = states.data.view.log.time_s
+    rows = np.flatnonzero((states.block >= found.first) & (states.block < found.last))
+    ends = [int(rows[0]), int(rows[-1]) + 1]
+    error = model.error + np.broadcast_to(known, time_s.shape)[:, None] * shape
+    weighted = model.precision.solve(error[:, :, None])[:, :, 0]
+    reach = EDGES * len(time_s) / states.count
+    for _ in range(ROUNDS):
+        for end in (0, 1):
+            near = np.unique(np.round(ends[end] + reach * np.linspace(-1.0, 1.0, PLACES)))
+            low, high = ((0, ends[1] - LEAST_ROWS), (ends[0] + LEAST_ROWS, len(time_s)))[end]
+            near = near[(near >= low) & (near <= high)].astype(int)
+            tried = [(int(k), ends[1]) if end == 0 else (ends[0], int(k)) for k in near]
+            if tried:
+                gains = _gains(model, weighted, shape, tried)
+                ends = list(tried[int(np.argmax(gains))])
+        reach = max(2.0 * reach / (PLACES - 1), 1.0)
+    return Span(effect, float(time_s[ends[0]]), float(time_s[ends[1] - 1]))
+
+
+def _gains(model: Model, weighted: Array, shape: Array, tried: list[tuple[int, int]]) -> Array:
+    """nat that the effect saves from one row to before another; weighted: C^-1 e (n, 3)."""
+    row = np.arange(shape.shape[0])
+    masks = np.stack([((row >= a) & (row < b)).astype(float) for a, b in tried], axis=1)
+    columns = shape[:, :, None] * masks[:, None, :]
+    own = np.sum(columns * model.precision.solve(columns), axis=(0, 1))
+    score = np.sum(columns * weighted[:, :, None], axis=(0, 1))
+    gains: Array = 0.5 * score**2 / np.maximum(own, 1e-300)
+    return gains
+
+
+def _within(states: States, span: Span) -> States:
+    return states.within(span.mask(states.data.view.log.time_s) > 0.0, INSIDE)

@@ -1,0 +1,113 @@
+"""Effects in a part of a log: found with their stretch, against plain least squares and the world.
+
+A latency from one moment to another is, in the world, a clock that steps there and back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from syncline_design.diagnosis import Diagnosis, diagnose
+from syncline_design.diagnosis.parts import LEAST, MOST, _best
+from syncline_design.diagnosis.spans import Span, span_of
+from syncline_design.effects import registry
+from syncline_design.report.on_diagnosis import sentence_text
+from tests.world import hidden, make_log, scenario
+
+Array = NDArray[np.float64]
+FROM_S, TO_S, LATE_S = 20.0, 42.0, 0.06
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> Diagnosis:
+    folder = tmp_path_factory.mktemp("parts")
+    steps = [
+        hidden("timestamp_step", "position", step_s=size, time_s=at)
+        for size, at in ((LATE_S, FROM_S), (-LATE_S, TO_S))
+    ]
+    log = make_log(scenario("multirotor_lines", 5, 64.0, 8.0), tuple(steps))
+    spec = folder / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    return diagnose(spec, [log.to_csv(folder / "log.csv")])
+
+
+def test_a_latency_in_a_part_of_the_log_is_said_with_its_interval(found: Diagnosis) -> None:
+    (one,) = found.findings
+    assert (one.effect, one.sensor, one.kind, one.material) == (
+        "latency", "position", "cause", True)  # fmt: skip
+    assert one.from_s == pytest.approx(FROM_S, abs=1.0)
+    assert one.to_s == pytest.approx(TO_S, abs=1.0)
+    low, high = one.parameters["latency_s"].interval95 or (0.0, 0.0)
+    assert low < LATE_S < high < 1.1 * LATE_S
+    assert one.sentence.endswith(f"from {one.from_s:.4g} s to {one.to_s:.4g} s")
+    assert found.verdict == "explained"
+
+
+def test_the_gap_counts_the_effect_where_it_acts_alone(found: Diagnosis) -> None:
+    held = found.gap.held_out
+    assert held is not None
+    assert found.gap.expected_rms_m is not None
+    assert held.after.rms_m < 1.05 * found.gap.expected_rms_m
+    outside = [
+        signature
+        for time_s, signature in zip(
+            found.plots.residuals.time_s,
+            found.plots.residuals.axes["north"].signature,
+            strict=True,
+        )
+        if not FROM_S - 1.0 < time_s < TO_S + 1.0
+    ]
+    assert outside
+    assert not any(outside)
+
+
+def test_the_stretch_that_sums_by_block_say_is_the_best_by_plain_least_squares() -> None:
+    rng = np.random.default_rng(4)
+    blocks, rows = 16, 10
+    column = rng.standard_normal(blocks * rows)
+    others = rng.standard_normal((blocks * rows, 3))
+    error = rng.standard_normal(blocks * rows) + others @ [1.0, -2.0, 0.5]
+    inside = slice(5 * rows, 9 * rows)
+    error[inside] += 1.5 * column[inside]
+    prior = np.array([0.0, 0.0, 0.3])
+    every = np.column_stack([column, others]).reshape(blocks, rows, 4)
+    split = (error - 0.4 * column).reshape(blocks, rows)
+    normal = np.einsum("gri,grj->gij", every, every)
+    score = np.einsum("gri,gr->gi", every, split)
+
+    def cost(a: int, b: int) -> float:
+        cut = np.where(
+            np.repeat((np.arange(blocks) >= a) & (np.arange(blocks) < b), rows), column, 0
+        )
+        stacked = np.vstack([np.column_stack([cut, others]), np.diag([0.0, *np.sqrt(prior)])])
+        wanted = np.concatenate([error, np.zeros(4)])
+        values = np.linalg.lstsq(stacked, wanted, rcond=None)[0]
+        return 0.5 * float(np.sum((wanted - stacked @ values) ** 2))
+
+    tried = {
+        (a, b): cost(a, b)
+        for a in range(blocks)
+        for b in range(a + LEAST, min(a + MOST, blocks) + 1)
+    }
+    best = min(tried, key=lambda pair: tried[pair])
+    found = _best(normal, score, prior, 0.4)
+    assert (found.first, found.last) == best == (5, 9)
+    assert found.better == pytest.approx(cost(0, blocks) - tried[best], rel=1e-6)
+
+
+def test_a_cut_effect_departs_inside_alone_and_keeps_its_name() -> None:
+    effect = registry()["latency"]
+    cut = Span(effect, 2.0, 3.0).cut
+    span = span_of(cut)
+    assert span is not None
+    assert span_of(effect) is None
+    assert cut.name == effect.name
+    inside = span.mask(np.array([1.9, 2.0, 2.5, 3.0, 3.1]))
+    assert inside.tolist() == [0.0, 1.0, 1.0, 1.0, 0.0]
+
+
+def test_the_page_says_when(found: Diagnosis) -> None:
+    text = sentence_text(found)
+    assert f", from {found.findings[0].from_s:.4g} s to" in text
