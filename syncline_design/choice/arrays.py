@@ -32,12 +32,14 @@ class RoleArrays:
     """Options of one role in the order of their names; place: their place in that order.
 
     error: what an option adds to the total [m], its systematic part included; noise: the sensor
-    error alone [m], which the sync requirement is held against.
+    error alone [m], which the sync requirement is held against; nearer: how much smaller it is at
+    the near end of the stage's distances.
     """
 
     place: Indices
     error: Floats
     noise: Floats
+    nearer: Floats
     tau: Floats
     host: Bools
     resources: tuple[Column, ...]  # key resources, the primary one first
@@ -50,6 +52,7 @@ class RoleArrays:
             self.place[rows],
             self.error[rows],
             self.noise[rows],
+            self.nearer[rows],
             self.tau[rows],
             self.host[rows],
             tuple(c[rows] for c in self.resources),
@@ -168,7 +171,8 @@ def _role_arrays(
 
     channels = tuple(options.channels(problem.infrastructure[i].id) for i in tracked)
     return RoleArrays(
-        np.arange(len(options)), options.added, options.error, options.tau, options.host,
+        np.arange(len(options)), options.added, options.error, options.nearer, options.tau,
+        options.host,
         columns(keys), columns(ties), channels,
     )  # fmt: skip
 

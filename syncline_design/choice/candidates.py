@@ -12,7 +12,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
-from typing import overload
+from typing import Any, overload
 
 import numpy as np
 
@@ -69,12 +69,23 @@ NO_WAY = np.array([-1], dtype=np.intp)
 
 @dataclass(frozen=True, slots=True)
 class Motion:
-    """How a stage moves, exactly: v_max [m/s], d [m] (0 without ranging), omega_max [rad/s]."""
+    """How a stage moves, exactly: v_max [m/s], d [m] (0 without ranging), omega_max [rad/s].
+
+    nearest: the other end of its distances [m], where it has several.
+    """
 
     speed: Fraction
     distance: Fraction
     turn: Fraction
     ranges: bool
+    nearest: Fraction | None = None
+
+    @property
+    def near_end(self) -> Motion | None:
+        """The stage at the near end of its distances; None where it has only one."""
+        if self.nearest is None or self.nearest == self.distance:
+            return None
+        return replace(self, distance=self.nearest, nearest=None)
 
     def lets_in(self, role: RoleName) -> bool:
         """Whether a role's noise enters the error: attitude alone does not."""
@@ -103,11 +114,20 @@ def sensor_error(sensor: SensorEntry, role: RoleName, motion: Motion) -> Fractio
     return fraction_of(sensor.sigma_range or 0.0) + bearing
 
 
+def own_rate(role: RoleName, motion: Motion) -> Fraction | None:
+    """What a sensor's own tau_crit is taken against [m/s]; None where motion does not matter."""
+    rate = motion.speed if role == "position" else motion.rate
+    return rate if motion.lets_in(role) and rate > 0 else None
+
+
 def motion_of(stage: StageCase) -> Motion:
     """How the platform of a stage moves."""
     platform, ranges = stage.platform.entry, stage.role("ranging") is not None
     distance = fraction_of(platform.distance) if ranges else Fraction(0)
-    return Motion(fraction_of(platform.v_max), distance, fraction_of(platform.omega_max), ranges)
+    nearest = fraction_of(stage.distances[0]) if stage.choice.distance is not None else None
+    return Motion(
+        fraction_of(platform.v_max), distance, fraction_of(platform.omega_max), ranges, nearest
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,25 +177,33 @@ class Candidates:
         ordered = options.take(options.by_name())
         return RoleTable(
             stage, name, self.role.role, vehicle, ordered, excluded, self.motion.distance,
-            self.motion.speed,
+            self.motion.speed, self.motion.nearest,
         )  # fmt: skip
 
     def moved(self, table: RoleTable, motion: Motion, limits: Limits) -> RoleTable:
         """A table of these candidates where the stage moves in another way."""
         there, pool = replace(self, motion=motion, made={}), table.anywhere()
-        error, added, crit = (figure[pool.sensor] for figure in there._figures())
-        pool = replace(pool, make=there.__call__, error=error, added=added, crit=crit)
-        there_now = replace(table, distance_m=motion.distance, speed_mps=motion.speed)
+        error, added, crit, nearer = (figure[pool.sensor] for figure in there._figures())
+        figures: dict[str, Any] = {"error": error, "added": added, "crit": crit, "nearer": nearer}
+        pool = replace(pool, make=there.__call__, **figures)
+        there_now = replace(
+            table, distance_m=motion.distance, speed_mps=motion.speed, nearest_m=motion.nearest
+        )
         return there_now.settled(pool, limits)
 
     @property
     def _rate(self) -> Fraction | None:
         """What its own tau_crit is taken against [m/s]; None where motion does not matter."""
-        rate = self.motion.speed if self.role.role == "position" else self.motion.rate
-        return rate if self.motion.lets_in(self.role.role) and rate > 0 else None
+        return own_rate(self.role.role, self.motion)
 
-    def _figures(self) -> tuple[Floats, Floats, Floats]:
-        """Of each sensor: its error, what it adds to the total [m] and its own tau_crit [s]."""
+    @property
+    def _near(self) -> Motion | None:
+        """The near end of the stage's distances, where it matters to the role."""
+        return None if self.role.role == "position" else self.motion.near_end
+
+    def _figures(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Of each sensor: its error, what it adds to the total [m], its own tau_crit [s], and how
+        much smaller the error is at the near end [m]."""
         error = self.fixed + self.turned * float(self.motion.distance)
         if not self.motion.lets_in(self.role.role):
             error = np.zeros(len(error))
@@ -185,12 +213,18 @@ class Candidates:
                 added[place] = float(self._error(place) + one.systematic_m)
         rate = self._rate
         crit = np.full(len(error), math.inf) if rate is None else error / float(rate)
-        return error, added, crit
+        nearer, near = np.zeros(len(error)), self._near
+        if near is not None:
+            nearer = self.turned * float(self.motion.distance - near.distance)
+            slower = own_rate(self.role.role, near)
+            if slower is not None:
+                crit = np.minimum(crit, (error - nearer) / float(slower))
+        return error, added, crit, nearer
 
     def _columns(self, rows: Indices) -> Options:
         """Options of some rows as columns."""
         sensors, ways = self.sensor[rows], self.way[rows]
-        error, added, crit = (figure[sensors] for figure in self._figures())
+        error, added, crit, nearer = (figure[sensors] for figure in self._figures())
         extra = np.array([one.tau_s for one in self.effects], dtype=float)
         tau = np.array([float(way.tau) for way in self.ways], dtype=float)
         needs = tuple(dict.fromkeys(way.requires for way in self.ways))
@@ -199,7 +233,7 @@ class Candidates:
         host = np.array([way.timeline == "host" for way in self.ways], dtype=bool)
         return Options(
             self.__call__, rows, self._ranks(rows), sensors, method[ways], error, added,
-            tau[ways] + extra[sensors], crit, self.near[sensors], self.far[sensors],
+            tau[ways] + extra[sensors], crit, nearer, self.near[sensors], self.far[sensors],
             self.rate[sensors], self.sound[sensors], host[ways],
             tuple(self._spent(sensors, ways)), needs, need[ways],
         )  # fmt: skip
@@ -230,14 +264,20 @@ class Candidates:
         """A sensor with one way of stamping, worked out in fractions and rounded once."""
         sensor, effects, rate = self.role.sensors[place], self.effects[place], self._rate
         error, systematic = self._error(place), effects.systematic_m
-        tau = way.tau + Fraction(effects.tau_s)
+        tau, near = way.tau + Fraction(effects.tau_s), self._near
+        crits = [] if rate is None else [error / rate]
+        near_error, near_rate = None, None
+        if near is not None:
+            near_error = sensor_error(sensor.entry, self.role.role, near)
+            near_rate = own_rate(self.role.role, near)
+            crits += [] if near_rate is None else [near_error / near_rate]
         return Option(
             sensor=sensor.id,
             primitive=way.primitive,
             method=way.method,
             sensor_error_m=float(error),
             tau_s=float(tau),
-            tau_crit_s=math.inf if rate is None else float(error / rate),
+            tau_crit_s=float(min(crits)) if crits else math.inf,
             timeline=way.timeline,
             resources=resources_of(self.case, sensor.entry, way.entry),
             requires=way.requires,
@@ -247,6 +287,8 @@ class Candidates:
             exact_systematic_m=systematic if systematic else None,
             noise_systematic_m=effects.noise_m,
             own_rate_mps=rate,
+            near_error_m=near_error,
+            near_rate_mps=near_rate,
             reach_m=(float(self.near[place]), float(self.far[place])),
             rate_hz=_finite(sensor.entry.rate, self.rate[place]),
             sound_mps=_finite(self.stage.choice.sound_speed or SOUND_MPS, self.sound[place]),

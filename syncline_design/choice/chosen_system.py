@@ -78,8 +78,9 @@ def clock_error(entry: ClockEntry) -> timing.TimingError:
 def _stage(stage: StageCase, chosen: dict[RoleName, Option | None]) -> Stage:
     choice, entry = stage.choice, stage.platform.entry
     platform = Platform(
-        float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline)
-    )
+        float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline),
+        None if choice.distance is None else float(stage.distances[0]),
+    )  # fmt: skip
     sensors = {
         name: None
         if option is None or (role := stage.role(name)) is None

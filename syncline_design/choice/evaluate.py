@@ -25,7 +25,11 @@ class Bought:
 
 @dataclass(frozen=True, slots=True)
 class Evaluation:
-    """Sums and errors of a design, exact; a resource is None when a catalog entry lacks it."""
+    """Sums and errors of a design, exact; a resource is None when a catalog entry lacks it.
+
+    tightest: sensor error [m] and sync rate [m/s] at those ends of the stages' distances where
+    tau_crit is least; where there is one distance, they are the sums themselves.
+    """
 
     cost: Fraction | None
     mass: Fraction | None
@@ -36,6 +40,7 @@ class Evaluation:
     sync_error_m: Fraction
     total_m: Fraction
     sync_rate_mps: Fraction
+    tightest: tuple[Fraction, Fraction]
 
     def amount(self, name: ResourceName) -> Fraction | None:
         """One resource."""
@@ -49,10 +54,11 @@ class Evaluation:
     @property
     def sync_ratio(self) -> float:
         """tau_sys / tau_crit of the system, rounded once; 0 where motion does not matter."""
-        caused = self.sync_rate_mps * self.tau_sys_s
+        error, rate = self.tightest
+        caused = rate * self.tau_sys_s
         if caused == 0:
             return 0.0
-        return float(caused / self.sensor_error_m) if self.sensor_error_m > 0 else math.inf
+        return float(caused / error) if error > 0 else math.inf
 
 
 def evaluate(problem: Problem, design: Design) -> Evaluation:
@@ -63,7 +69,34 @@ def evaluate(problem: Problem, design: Design) -> Evaluation:
     units = units_bought(problem, design, options)
     cost, mass, power = (_sum(problem, design, options, units, name) for name in RESOURCES)
     total = sensor_error + sync_error + _systematic(problem, options)
-    return Evaluation(cost, mass, power, units, sensor_error, tau_sys, sync_error, total, rate)
+    tightest = _tightest(problem, options, sensor_error)
+    return Evaluation(
+        cost, mass, power, units, sensor_error, tau_sys, sync_error, total, rate, tightest
+    )
+
+
+def _tightest(
+    problem: Problem, options: list[Option], sensor_error: Fraction
+) -> tuple[Fraction, Fraction]:
+    """Sensor error and sync rate where the first is the smallest share of the second.
+
+    Both are sums of terms a + b d over the stages, so that their ratio is steady in each d: the
+    least lies at an end of every stage's distances.
+    """
+    ends = [(sensor_error, problem.sync_rate())]
+    for near in problem.near_ends():
+        stages = {one.stage for one in near}
+        less = sum(
+            (
+                option.nearer_m()
+                for table, option in zip(problem.roles, options, strict=True)
+                if table.stage in stages
+            ),
+            Fraction(0),
+        )
+        slower = sum((one.slower for one in near), Fraction(0))
+        ends.append((sensor_error - less, problem.sync_rate() - slower))
+    return min(ends, key=lambda end: end[0] / end[1] if end[1] > 0 else math.inf)
 
 
 def _errors(

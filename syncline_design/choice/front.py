@@ -41,7 +41,7 @@ from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indice
 from syncline_design.choice.outcome import Deadline, FrontPoint, PriceStep, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.remaining import Ceiling, lowered
-from syncline_design.choice.table import ClockOption, Design, Problem, is_empty
+from syncline_design.choice.table import ClockOption, Design, Nearer, Problem, is_empty
 from syncline_design.machine.deadline import in_force, within
 
 APART = 3e-11  # errors that differ by a larger share differ in their 12 figures
@@ -130,6 +130,10 @@ def _merged(
     held = relaxed.take(np.flatnonzero(holds))
     if bool(holds.all()):
         return _points(tables, [held]) if len(held.total) else ()
+    if problem.nearer:
+        from syncline_design.choice.searched_front import searched_front
+
+        return tuple(searched_front(problem, resource, accuracy=accuracy, deadline=end))
     if bool(holds.any()):
         ceiling = lowered(ceiling, held.labels, held.total)
     guarded = _merge_all(tables, accuracy, end, guarded=True, ceiling=ceiling)
@@ -231,10 +235,28 @@ def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
         return np.ones(len(labels), dtype=bool)
     caused, allowed = problem.sync_rate_mps * labels.bound, limit * labels.noise
     holds = np.asarray(caused < allowed * (1.0 - MARGIN))
-    close = np.flatnonzero(~holds & (caused <= allowed * (1.0 + MARGIN)))
+    may = np.asarray(caused <= allowed * (1.0 + MARGIN))
+    for near in problem.near_ends():
+        there, allowed = _at_near_ends(tables, labels, near)
+        holds &= there < limit * allowed * (1.0 - MARGIN)
+        may &= there <= limit * allowed * (1.0 + MARGIN)
+    close = np.flatnonzero(~holds & may)
     for row, design in zip(close, _designs(tables, finished, close), strict=True):
         holds[row] = evaluate(problem, design).sync_ratio < limit
     return holds
+
+
+def _at_near_ends(
+    tables: Tables, labels: Labels, near: tuple[Nearer, ...]
+) -> tuple[Floats, Floats]:
+    """Sync error and sensor error [m] of complete designs with some stages at their near end."""
+    stages = {one.stage for one in near}
+    less = np.zeros(len(labels))
+    for r, table in enumerate(tables.problem.roles):
+        if table.stage in stages:
+            less += table.options.nearer[tables.order[r]][labels.choice[:, r]]
+    slower = float(sum((one.slower for one in near), Fraction(0)))
+    return (tables.problem.sync_rate_mps - slower) * labels.bound, labels.noise - less
 
 
 def _designs(tables: Tables, finished: _Finished, rows: Indices) -> list[Design]:

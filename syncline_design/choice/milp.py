@@ -324,14 +324,21 @@ class _Model:
         limit = self.problem.limits.sync
         if math.isinf(limit):
             return
-        for k, ceiling in enumerate(self.ceilings):
-            demand = self.problem.sync_rate_mps * ceiling / limit
-            if demand > 0.0:
-                covered = sum(
-                    np.minimum(role.noise / demand, 1.0) @ self.x[r]
-                    for r, role in enumerate(self.tables.roles)
-                )
-                self.rows.append(covered >= (1.0 - MARGIN) * self.z[k])
+        for near in ((), *self.problem.near_ends()):
+            stages = {one.stage for one in near}
+            rate = self.problem.sync_rate_mps - float(sum(one.slower for one in near))
+            noises = [
+                role.noise - role.nearer if table.stage in stages else role.noise
+                for table, role in zip(self.problem.roles, self.tables.roles, strict=True)
+            ]
+            for k, ceiling in enumerate(self.ceilings):
+                demand = rate * ceiling / limit
+                if demand > 0.0:
+                    covered = sum(
+                        np.minimum(noise / demand, 1.0) @ self.x[r]
+                        for r, noise in enumerate(noises)
+                    )
+                    self.rows.append(covered >= (1.0 - MARGIN) * self.z[k])
 
     def objective(self) -> Any:
         """What is minimised first."""

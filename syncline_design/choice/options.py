@@ -65,6 +65,8 @@ class Option:
     exact_systematic_m: Fraction | None = None
     noise_systematic_m: Fraction = Fraction(0)  # the share of it that is in proportion to the noise
     own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
+    near_error_m: Fraction | None = None  # at the near end of the stage's distances, and
+    near_rate_mps: Fraction | None = None  # what its tau_crit is taken against there
     reach_m: Interval = EVERYWHERE  # distances between which the sensor measures
     rate_hz: Fraction | None = None  # how often it measures; None: not told, or not asked
     sound_mps: Fraction | None = None  # of a sensor that waits for its echo
@@ -85,6 +87,10 @@ class Option:
     def systematic(self) -> Fraction:
         """Known systematic error that comes with this sensor [m], exactly."""
         return exactly(self.systematic_m, self.exact_systematic_m)
+
+    def nearer_m(self) -> Fraction:
+        """How much smaller its sensor error is at the near end of the stage's distances [m]."""
+        return Fraction(0) if self.near_error_m is None else self.error() - self.near_error_m
 
     def spacing_m(self, speed_mps: Fraction, distance_m: Fraction) -> Fraction:
         """Ground between two samples [m], as far as it is told: v max(1 / rate, 2 d / c)."""
@@ -110,8 +116,11 @@ def sync_ratio(option: Option) -> float:
     if option.tau_crit_s == float("inf") or option.tau_s == 0.0:
         return 0.0
     if option.own_rate_mps is not None:
-        caused, error = option.tau() * option.own_rate_mps, option.error()
-        return float(caused / error) if error > 0 else float("inf")
+        ends = [(option.own_rate_mps, option.error())]
+        if option.near_error_m is not None and option.near_rate_mps is not None:
+            ends.append((option.near_rate_mps, option.near_error_m))
+        ratios = [option.tau() * rate / error if error > 0 else None for rate, error in ends]
+        return max(float("inf") if ratio is None else float(ratio) for ratio in ratios)
     return option.tau_s / option.tau_crit_s if option.tau_crit_s > 0.0 else float("inf")
 
 
@@ -200,6 +209,7 @@ class Options(Sequence[Option]):
 
     make: the option at a place of the source; at: that place.  rank: place in the order of names.
     error, added: sensor error alone, and with its systematic part [m]; crit: its own tau_crit [s].
+    nearer: by how much the error is smaller at the near end of the stage's distances [m].
     near, far: distances between which the sensor measures [m]; rate: how often [1/s], sound: its
     speed where a sensor waits for its echo [m/s], both infinite where they delay nothing.
     sensor, method: numbers that tell them apart.  needs: kinds of `requires`; need: which.
@@ -214,6 +224,7 @@ class Options(Sequence[Option]):
     added: Floats
     tau: Floats
     crit: Floats
+    nearer: Floats
     near: Floats
     far: Floats
     rate: Floats
@@ -240,6 +251,7 @@ class Options(Sequence[Option]):
             _floats(o.added_m() for o in options),
             _floats(o.tau_s for o in options),
             _floats(o.tau_crit_s for o in options),
+            _floats(float(o.nearer_m()) for o in options),
             _floats(o.reach_m[0] for o in options),
             _floats(o.reach_m[1] for o in options),
             _floats(float(o.rate_hz) if o.rate_hz else math.inf for o in options),
@@ -365,6 +377,10 @@ class Options(Sequence[Option]):
     def reach(self, near: float, far: float) -> Bools:
         """Which options measure at some distance between two [m]."""
         return np.asarray((self.near <= far) & (near <= self.far))
+
+    def reach_all(self, near: float, far: float) -> Bools:
+        """Which options measure at every distance between two [m]."""
+        return np.asarray((self.near <= near) & (far <= self.far))
 
     def spacing(self, speed_mps: float, distance_m: float) -> Floats:
         """Ground between two samples [m], as far as it is told."""

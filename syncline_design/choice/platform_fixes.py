@@ -57,6 +57,8 @@ def platform_fixes(case: Case, build: Build) -> Iterator[Fix]:
                 asked = _Asked(case, build, index, figure, dimension, float(before), written)
                 after = asked.nearest(end * float(before))
                 if after is not None:
+                    if figure == "distance" and stage.distance is not None:
+                        words = "far end of the distance"
                     text = f"{words} of {stage.name} from {_shown(before, dimension)}"
                     yield Fix(
                         "platform", None, figure, stage.name, float(before), float(after),
@@ -289,6 +291,7 @@ def better_of(one: Problem, other: Problem, moved: Moved | None = None) -> Probl
         exact_sync_rate_mps=rate,
         fixed_error_m=float(fixed),
         exact_fixed_error_m=fixed,
+        nearer=(),  # near ends rule out more; whether they do is asked of each value
         judge=None,
     )
 
@@ -321,6 +324,7 @@ def _better_role(
         added=np.minimum(first.added, second.added),
         tau=np.minimum(first.tau, second.tau),
         crit=np.full(len(first), math.inf),
+        nearer=np.zeros(len(first)),
     )
     return replace(one, options=better.take(keeps), excluded=NOTHING)
 
@@ -343,4 +347,6 @@ def _better_option(one: Option, other: Option) -> Option:
         exact_tau_s=tau,
         tau_crit_s=math.inf,
         own_rate_mps=None,
+        near_error_m=None,
+        near_rate_mps=None,
     )

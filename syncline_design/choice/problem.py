@@ -28,6 +28,7 @@ from syncline_design.choice.table import (
     ExcludedClock,
     Infrastructure,
     Limits,
+    Nearer,
     Pair,
     Problem,
     RoleTable,
@@ -81,7 +82,14 @@ def with_motions(problem: Problem, motions: Sequence[Motion]) -> Problem:
     """The problem with the rates at which its stages move."""
     rate = sum((motion.rate for motion in motions), Fraction(0))
     pairs = _pairs(problem.roles, motions)
-    return replace(problem, pairs=pairs, sync_rate_mps=float(rate), exact_sync_rate_mps=rate)
+    nearer = tuple(
+        Nearer(stage, motion.rate - near.rate)
+        for stage, motion in enumerate(motions)
+        if (near := motion.near_end) is not None
+    )
+    return replace(
+        problem, pairs=pairs, sync_rate_mps=float(rate), exact_sync_rate_mps=rate, nearer=nearer
+    )
 
 
 def selection_of(problem: Problem, design: Design) -> Selection:

@@ -172,8 +172,9 @@ def _tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
     }
     if not others or rate == 0:
         return
-    if math.isfinite(limits.sync):
-        allowed = Fraction(limits.sync) * found.sensor_error_m / rate
+    error, slower = found.tightest
+    if math.isfinite(limits.sync) and slower > 0:
+        allowed = Fraction(limits.sync) * error / slower
         yield min(allowed - other for other in others.values()), "sync"
     if limits.accuracy_m is None:
         return

@@ -7,6 +7,8 @@ these tables from a loaded spec.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal, Protocol
@@ -33,7 +35,8 @@ SyncModel = Literal["syncline", "per_sensor"]
 class RoleTable:
     """Options of one role; no two of them have the same names.
 
-    distance_m, speed_mps: where and how fast its stage is, for what depends on it.
+    distance_m, speed_mps: where and how fast its stage is, for what depends on it; nearest_m: the
+    other end of its distances, where it has several.
     """
 
     stage: int
@@ -44,6 +47,7 @@ class RoleTable:
     excluded: Exclusions = NOTHING
     distance_m: Fraction = Fraction(0)
     speed_mps: Fraction = Fraction(0)
+    nearest_m: Fraction | None = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.options, Options):  # given one by one
@@ -66,8 +70,9 @@ class RoleTable:
 
     def works(self, options: Options, spacing_m: float | None) -> Bools:
         """Which options are in reach here, and take samples close enough."""
-        distance = float(self.distance_m)
-        in_reach = options.reach(distance, distance)
+        far = float(self.distance_m)
+        near = far if self.nearest_m is None else float(self.nearest_m)
+        in_reach = options.reach_all(near, far)
         return in_reach & options.keep_spacing(self.speed_mps, self.distance_m, spacing_m)
 
     def with_pool(self, pool: Options, limit: float, beyond: Options | None = None) -> RoleTable:
@@ -146,6 +151,17 @@ class Pair:
     def rate(self) -> Fraction:
         """Rate [m/s], exactly."""
         return exactly(self.rate_mps, self.exact_rate_mps)
+
+
+@dataclass(frozen=True, slots=True)
+class Nearer:
+    """The near end of a stage's distances: sync is held against it as well.
+
+    slower: by how much the sync rate v_max + d omega_max is smaller there [m/s].
+    """
+
+    stage: int
+    slower: Fraction
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,6 +244,7 @@ class Problem:
     objective: Objective
     exact_sync_rate_mps: Fraction | None = None
     exact_fixed_error_m: Fraction | None = None
+    nearer: tuple[Nearer, ...] = ()  # of stages whose object is at several distances
     judge: Judge | None = field(default=None, compare=False)  # None: sums decide everything
 
     def fixed_error(self) -> Fraction:
@@ -237,6 +254,11 @@ class Problem:
     def sync_rate(self) -> Fraction:
         """Sync rate of the chain [m/s], exactly."""
         return exactly(self.sync_rate_mps, self.exact_sync_rate_mps)
+
+    def near_ends(self) -> Iterator[tuple[Nearer, ...]]:
+        """Every way in which some of these stages are at their near end."""
+        for count in range(1, len(self.nearer) + 1):
+            yield from itertools.combinations(self.nearer, count)
 
     @property
     def combinations(self) -> int:

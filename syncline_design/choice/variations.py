@@ -11,7 +11,7 @@ from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.model.roles import RoleName
-from syncline_design.spec.case import IN_PLACE, Case
+from syncline_design.spec.case import IN_PLACE, Case, ends_of
 from syncline_design.spec.catalog import SensorEntry
 from syncline_design.spec.choices import MethodChoice
 
@@ -47,8 +47,18 @@ def with_stage(case: Case, index: int, **changes: Any) -> Case:
 
 def with_platform_figure(case: Case, stage: int, figure: PlatformFigure, value: Quantity) -> Case:
     """The spec with one figure of a stage's platform changed."""
-    platform = case.spec.stages[stage].platform.model_copy(update={figure: value})
+    choice = case.spec.stages[stage]
+    if figure == "distance" and choice.distance is not None:
+        return with_stage(case, stage, distance=_up_to(ends_of(choice.distance)[0], value))
+    platform = choice.platform.model_copy(update={figure: value})
     return with_stage(case, stage, platform=platform)
+
+
+def _up_to(near: Quantity, far: Quantity) -> Quantity:
+    """Distances up to another far end; the near end gives way to it."""
+    near = min(near, far)
+    middle = (near.exact + far.exact) / 2
+    return Quantity(middle, f"{near.text} .. {far.text}", (near.exact, far.exact))
 
 
 def platform_figure(case: Case, stage: int, figure: PlatformFigure) -> float:

@@ -53,10 +53,13 @@ def of_method(problem: Problem, r: int, place: int) -> Bools:
     return np.asarray(pool.method == pool.method[pool.place_like(problem.roles[r].options, place)])
 
 
-def with_sensor_error(problem: Problem, r: int, rows: Bools, error_m: Fraction) -> Problem:
+def with_sensor_error(
+    problem: Problem, r: int, rows: Bools, error_m: Fraction, near_error_m: Fraction | None = None
+) -> Problem:
     """The problem with the error of one sensor, that of these candidates of a role, set.
 
-    What known effects add in proportion grows with it.
+    What known effects add in proportion grows with it, and its error at the near end of the stage's
+    distances, unless that is told.
     """
     pool = problem.roles[r].pool()
     own = pool[int(np.argmax(rows))]
@@ -67,12 +70,17 @@ def with_sensor_error(problem: Problem, r: int, rows: Bools, error_m: Fraction) 
         ratio = error_m / option.error()
         crit = option.tau_crit_s
         crit = float(Fraction(crit) * ratio) if math.isfinite(crit) else crit
+        near = None if option.near_error_m is None else option.near_error_m * ratio
+        if near is not None and near_error_m is not None:
+            near = near_error_m
+            crit = _crit(option, error_m, near)
         added = option.systematic() + option.noise_systematic_m * (ratio - 1)
         return replace(
             option,
             sensor_error_m=float(error_m),
             exact_error_m=error_m,
             tau_crit_s=crit,
+            near_error_m=near,
             systematic_m=float(added),
             exact_systematic_m=added if added else None,
             noise_systematic_m=option.noise_systematic_m * ratio,
@@ -80,7 +88,14 @@ def with_sensor_error(problem: Problem, r: int, rows: Bools, error_m: Fraction) 
 
     new = grown(own)
     figures = {"error": new.sensor_error_m, "added": new.added_m(), "crit": new.tau_crit_s}
+    figures["nearer"] = float(new.nearer_m())
     return _with_pool(problem, r, pool.changed(rows, grown, **figures))
+
+
+def _crit(option: Option, error: Fraction, near: Fraction) -> float:
+    """A sensor's own tau_crit [s] with these errors at both ends of the distances."""
+    ends = ((error, option.own_rate_mps), (near, option.near_rate_mps))
+    return min((float(one / rate) for one, rate in ends if rate), default=math.inf)
 
 
 def with_method_tau(problem: Problem, r: int, rows: Bools, tau_s: Fraction) -> Problem:
@@ -116,8 +131,12 @@ def with_sheet_figure(
         if number is not None and rows.any():
             entry = candidates_of(case, table)[number].entry
             changed = with_changed(entry, figure, value)
-            error = sensor_error(changed, table.role, motion_of(stage))
-            problem = with_sensor_error(problem, r, rows, error) if error else problem
+            motion = motion_of(stage)
+            error = sensor_error(changed, table.role, motion)
+            near = None
+            if motion.near_end is not None:
+                near = sensor_error(changed, table.role, motion.near_end)
+            problem = with_sensor_error(problem, r, rows, error, near) if error else problem
     return problem
 
 
@@ -212,4 +231,7 @@ def _with_figure(motion: Motion, figure: PlatformFigure, value: Fraction) -> Mot
         return replace(motion, speed=value)
     if figure == "omega_max":
         return replace(motion, turn=value)
-    return replace(motion, distance=value) if motion.ranges else motion
+    if not motion.ranges:
+        return motion
+    nearest = None if motion.nearest is None else min(motion.nearest, value)
+    return replace(motion, distance=value, nearest=nearest)

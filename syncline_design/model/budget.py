@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from syncline_design.model import syncline
+from syncline_design.model.ends import at_ends, stage_ends
 from syncline_design.model.known import NOTHING_KNOWN, Known
 from syncline_design.model.pairing import (
     PairRow,
@@ -147,7 +148,7 @@ def budget(system: System, known: Known = NOTHING_KNOWN) -> Budget:
     systematic_m = math.fsum(value for _, _, value in known.systematic)
     rate = math.fsum(row.sync_rate_mps for row in stages)
     tau = largest(pair.tau_s for pair in pairs)
-    tau_crit = syncline.tau_crit_s(sensor_error, rate)
+    tau_crit = min(syncline.tau_crit_s(*_sums(end)) for end in at_ends(system))
     sync_error = syncline.sync_error_m(tau, rate)
     per_sensor = math.fsum(pair.sync_error_m for pair in pairs)
     error_m = sensor_error + systematic_m
@@ -171,10 +172,18 @@ def budget(system: System, known: Known = NOTHING_KNOWN) -> Budget:
         sync_error_per_sensor_m=per_sensor,
         total_m=error_m + sync_error,
         total_per_sensor_m=error_m + per_sensor,
-        lever_arm=_lever_arm(stages, pairs, sensors, tau, systematic_m),
+        lever_arm=_lever_arm(system, stages, pairs, sensors, tau, systematic_m),
         ledger=ledgers[0],
         ledger_per_sensor=ledgers[1],
     )
+
+
+def _sums(system: System) -> tuple[float, float]:
+    """Sensor error [m] and sync rate [m/s] of a system at one distance a stage."""
+    terms = (_stage_terms(stage) for stage in system.stages)
+    error = math.fsum(value for own in terms for _, value in own)
+    platforms = ((one.platform, distance_m(one)) for one in system.stages)
+    return error, math.fsum(p.v_max_mps + d * p.omega_max_radps for p, d in platforms)
 
 
 def lever_arm_m(stage: Stage, first: bool) -> float:
@@ -245,13 +254,12 @@ def _own_tau_s(system: System, stage: Stage, sensor: Sensor, known: Known) -> fl
 def _sensor_row(stage: Stage, sensor: Sensor, first: bool, tau: float) -> SensorRow:
     """One sensor's row; one that does not enter has no error and no tau_crit to keep (inf)."""
     v, omega = stage.platform.v_max_mps, stage.platform.omega_max_radps
-    d = distance_m(stage)
     moving = syncline.position_rate_mps(v, omega, lever_arm_m(stage, first))
     error = tau_crit = with_lever_arm = math.inf
     if _enters(stage, sensor):
-        error = syncline.sensor_error_m(sensor.role, sensor.sigma, d)
+        error = syncline.sensor_error_m(sensor.role, sensor.sigma, distance_m(stage))
         tau_crit, with_lever_arm = (
-            syncline.tau_crit_s(error, syncline.sensor_rate_mps(sensor.role, speed, omega, d))
+            min(_own_tau_crit_s(sensor, speed, omega, distance_m(end)) for end in stage_ends(stage))
             for speed in (v, moving)
         )
     return SensorRow(
@@ -265,6 +273,12 @@ def _sensor_row(stage: Stage, sensor: Sensor, first: bool, tau: float) -> Sensor
         sensor_error_m=error if _enters(stage, sensor) else 0.0,
         ratio=_ratio(tau, tau_crit),
     )
+
+
+def _own_tau_crit_s(sensor: Sensor, speed: float, omega: float, d: float) -> float:
+    """A sensor's tau_crit [s] at a speed and a distance."""
+    error = syncline.sensor_error_m(sensor.role, sensor.sigma, d)
+    return syncline.tau_crit_s(error, syncline.sensor_rate_mps(sensor.role, speed, omega, d))
 
 
 def _stage_row(stage: Stage, first: bool, pairs: Sequence[PairRow]) -> StageRow:
@@ -282,10 +296,18 @@ def _stage_row(stage: Stage, first: bool, pairs: Sequence[PairRow]) -> StageRow:
         sensor_error_m=error,
         sync_rate_mps=rate,
         tau_s=tau,
-        tau_crit_s=syncline.tau_crit_s(error, rate),
+        tau_crit_s=min(_stage_tau_crit_s(end, own) for end in stage_ends(stage)),
         sync_error_m=syncline.sync_error_m(tau, rate),
         sync_error_per_sensor_m=math.fsum(pair.sync_error_m for pair in own),
     )
+
+
+def _stage_tau_crit_s(stage: Stage, pairs: Sequence[PairRow]) -> float:
+    """tau_crit [s] of a stage at one distance, against the rates of its pairs."""
+    error = math.fsum(value for _, value in _stage_terms(stage))
+    turning = distance_m(stage) * float(stage.platform.omega_max_radps)
+    rates = (turning if pair.role == "attitude" else pair.rate_mps for pair in pairs)
+    return syncline.tau_crit_s(error, math.fsum(rates))
 
 
 def _stage_terms(stage: Stage) -> tuple[tuple[str, float], ...]:
@@ -324,6 +346,7 @@ def _ledger(
 
 
 def _lever_arm(
+    system: System,
     stages: Sequence[StageRow],
     pairs: Sequence[PairRow],
     sensors: Sequence[SensorRow],
@@ -340,10 +363,11 @@ def _lever_arm(
     )
     sensor_error = math.fsum(row.sensor_error_m for row in sensors)
     error_m = sensor_error + systematic_m
-    tau_crit = syncline.tau_crit_s(sensor_error, rate)
+    added, ends = math.fsum(extra.values()), [_sums(end) for end in at_ends(system)]
+    tau_crit = min(syncline.tau_crit_s(error, own + added) for error, own in ends)
     figures = [
         (error_m + tau * paper_rate, error_m + tau * rate),
-        (syncline.tau_crit_s(sensor_error, paper_rate), tau_crit),
+        (min(syncline.tau_crit_s(*end) for end in ends), tau_crit),
         *((row.tau_crit_s, row.tau_crit_lever_arm_s) for row in sensors),
     ]
     return LeverArm(

@@ -21,12 +21,16 @@ class SimulationError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Platform:
-    """How a vehicle moves: v_max [m/s], omega_max [rad/s], range d [m], largest lever arm b [m]."""
+    """How a vehicle moves: v_max [m/s], omega_max [rad/s], range d [m], largest lever arm b [m].
+
+    nearest_m: where its object is at any range from there to d, the least of them [m].
+    """
 
     v_max_mps: float
     omega_max_radps: float
     distance_m: float
     baseline_m: float = 0.0
+    nearest_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -134,4 +134,5 @@ def _stage(stage: StageSituation) -> str:
         x, y, z = stage.look
         azimuth = numbers.angle(math.atan2(y, x))
         look = f" and looks at azimuth {azimuth}, elevation {numbers.angle(-math.asin(z))}"
-    return f"{stage.stage} leans by {numbers.angle(tilt)}{look} (body axes)"
+    away = "" if stage.distance_m is None else f" at {numbers.length(stage.distance_m)}"
+    return f"{stage.stage} leans by {numbers.angle(tilt)}{look} (body axes){away}"

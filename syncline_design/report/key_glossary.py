@@ -33,7 +33,7 @@ KEYS: dict[str, str] = {
     "declared": "What no log shows and the bound includes, by name: {path_asymmetry: 5 us}.",
     "depth": "How deep the stage is under water; at a depth there is no GNSS.",
     "depth_rating": "How deep the housing may go under water.",
-    "distance": "Range d from the ranging sensor to the object it georeferences.",
+    "distance": "Range d to the georeferenced object; of a stage NEAR .. FAR, all of which counts.",
     "distribution": "uniform (low, high), normal (mean, std), constant (value) or empirical.",
     "drift": "Frequency error of a clock on its own; times holdover it adds to the offset.",
     "duration": "How long a mission lasts: drifts are charged up to it; 1 h when not given.",

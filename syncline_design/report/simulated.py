@@ -26,6 +26,9 @@ def simulation_facts(found: MonteCarlo) -> list[tuple[str, str]]:
         ("Motion", ENVELOPES[found.envelope]),
         ("Seed", str(found.seed)),
     ]
+    for stage, distance in (found.distances_m or {}).items():
+        end = f"{numbers.length(distance)}, the end of {stage}'s distances with the larger errors"
+        facts.append(("Distance simulated", end))
     within, worst = found.probability_within_target, found.worst_case
     if within is not None:
         low, high = (numbers.percent(end, 5) for end in (within.low, within.high))

@@ -137,10 +137,12 @@ def pairwise_bounds(
 def _added(system: System, index: int, known: Known) -> Added:
     """The effects of one stage, summed; scattered Euler angles apart from fixed turns.
 
-    What moves the measured object at d moves it by a share sigma_r / d more with range noise.
+    What moves the measured object at d moves it by a share sigma_r / d more with range noise: of
+    several distances the nearest counts for that, the farthest for all else.
     """
     stage = system.stages[index]
     d = distance_m(stage)
+    d = d if stage.platform.nearest_m is None else float(stage.platform.nearest_m)
     stretched = stage.ranging.sigma[0] / d if stage.ranging is not None and d > 0.0 else 0.0
     turn = euler = sight = offset = 0.0
     for one, what in acting_effects.stage_contributions(system, index):

@@ -14,7 +14,7 @@ from syncline_design.machine.records import Record, optional
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.ascent import SYSTEM, chosen
 from syncline_design.simulation.certified import certified_worst_case_m
-from syncline_design.simulation.situations import Situations
+from syncline_design.simulation.situations import Situations, ranges_m
 from syncline_design.simulation.statistical import (
     AXES,
     Wanted,
@@ -60,7 +60,10 @@ class VarianceShare(Record):
 
 @dataclass(frozen=True, slots=True)
 class StageSituation(Record):
-    """One vehicle in a situation; vectors in its body's axes, angles of its attitude."""
+    """One vehicle in a situation; vectors in its body's axes, angles of its attitude.
+
+    distance_m: of its object, where the stage gives several.
+    """
 
     stage: str
     velocity_mps: Vector
@@ -70,6 +73,7 @@ class StageSituation(Record):
     yaw_rad: float
     look: Vector | None = optional()
     position_arm_m: Vector | None = optional()
+    distance_m: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,6 +167,7 @@ def _stage(situations: Situations, index: int, point: Array) -> StageSituation:
         yaw_rad=math.atan2(picked["yaw"][1, 0], picked["yaw"][0, 0]),
         look=_vector(picked["bearing"]) if "bearing" in picked else None,
         position_arm_m=None if arm is None else _vector(stage.platform.baseline_m * arm),
+        distance_m=float(ranges_m(stage, picked, 1)[0]) if "distance" in picked else None,
     )
 
 

@@ -105,7 +105,11 @@ class WorstCase(Record):
 
 @dataclass(frozen=True, slots=True)
 class MonteCarlo(Record):
-    """The probabilistic answer, and the worst case at the system's tau."""
+    """The probabilistic answer, and the worst case at the system's tau.
+
+    distances_m: by stage, the end of its distances that was simulated: the one where errors are
+    largest.
+    """
 
     samples: int
     seed: int
@@ -118,6 +122,7 @@ class MonteCarlo(Record):
     probability_within_target: ProportionEstimate | None
     worst_case: WorstCase
     histogram: Histogram
+    distances_m: Mapping[str, float] | None = optional()
 
     def quantile(self, quantile: float) -> QuantileEstimate:
         """The estimate of one of the quantiles asked for."""

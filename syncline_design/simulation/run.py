@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from syncline_design.model.budget import budget
+from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation import distribution
 from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
@@ -50,20 +51,39 @@ class CrossCheck:
 
     monte_carlo: MonteCarlo
     errors: Values | Binned = field(repr=False, compare=False)
+    system: System  # at one distance a stage
 
 
 def cross_check(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) -> CrossCheck:
     """Quantiles, P(|error| <= limit) and the worst case at the system's own tau.
 
-    Raises SimulationError for a system or settings that cannot be simulated.
+    Where stages give several distances, at those of their ends where the largest of the quantiles
+    is largest.  Raises SimulationError for a system or settings that cannot be simulated.
     """
     demand_simulable(system)
+    ends = list(at_ends(system))
+    if len(ends) == 1:
+        return _cross_check(ends[0], settings)
+    found = [_cross_check(end, settings) for end in ends]
+    last = repr(max(settings.quantiles, default=0.95))
+    worst = max(found, key=lambda one: _value(one.monte_carlo, last))
+    where = distances_of(system, worst.system)
+    return replace(worst, monte_carlo=replace(worst.monte_carlo, distances_m=where))
+
+
+def _value(found: MonteCarlo, quantile: str) -> float:
+    estimate = found.quantiles.get(quantile)
+    return found.worst_case.value_m if estimate is None else estimate.value_m
+
+
+def _cross_check(system: System, settings: SimulationSettings) -> CrossCheck:
+    """The same at one distance a stage."""
     worst = own_worst_case(system, settings.seed)
     errors = error_distribution(system, settings)
     drawn = ensemble_of(
         system, settings.envelope, follows_a_file(settings), excursions(system, settings)
     )
-    return CrossCheck(_monte_carlo(settings, errors, worst, drawn), errors)
+    return CrossCheck(_monte_carlo(settings, errors, worst, drawn), errors, system)
 
 
 @lru_cache(maxsize=64)  # a study asks for the same system at one limit after the other
@@ -172,13 +192,33 @@ def decide(
     Passes when P(|error| <= limit) >= quantile for the whole interval, fails when for none of it.
     Starts with `settings.samples` (those of `first`, when given, are not drawn again) and takes
     four times as many at each further look, up to `cap_samples`.  An error that is not a number
-    counts as beyond the limit.
+    counts as beyond the limit.  Where stages give several distances, the limit has to hold at every
+    end of them, and the decision is that of the worst.
     """
-    from syncline_design.simulation.worker import tally
-
     demand_simulable(system)
     if not 0.0 < quantile < 1.0:
         raise SimulationError(f"quantile: expected a number between 0 and 1, found {quantile}")
+    found: list[Decision] = []
+    for end in at_ends(system):
+        own = first if first is not None and first.system == end else None
+        found.append(_decide(end, settings, quantile, limit_m, cap_samples, own))
+        if found[-1].status == "fail":
+            break
+    order: tuple[Status, ...] = ("pass", "indeterminate", "fail")
+    return max(found, key=lambda one: (order.index(one.status), one.estimate.value_m))
+
+
+def _decide(
+    system: System,
+    settings: SimulationSettings,
+    quantile: float,
+    limit_m: float,
+    cap_samples: int,
+    first: CrossCheck | None,
+) -> Decision:
+    """The same at one distance a stage."""
+    from syncline_design.simulation.worker import tally
+
     sizes = look_sizes(settings.samples, cap_samples)
     look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
     counts, within, drawn = _counted(first, settings, limit_m)

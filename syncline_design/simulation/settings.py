@@ -101,6 +101,10 @@ def _demand_motion(stage: Stage) -> None:
     for name, value in figures:
         path = f"stages.{stage.name}.platform.{name}"
         _demand(0.0 <= value < math.inf, path, "a finite figure of 0 or more", float(value))
+    if platform.nearest_m is not None:
+        path = f"stages.{stage.name}.platform.nearest"
+        wanted = "more than 0, and no farther than the distance"
+        _demand(0.0 < platform.nearest_m <= platform.distance_m, path, wanted, platform.nearest_m)
 
 
 def _demand_roles(stage: Stage, first: bool, chained: bool) -> None:

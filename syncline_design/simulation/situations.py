@@ -125,6 +125,12 @@ class Situations:
         found = [variable.on_lattice(row, count) for row, variable in enumerate(free)]
         return np.array(found).reshape(len(free), count)
 
+    def last_ranges_m(self, point: Array) -> Array:
+        """Distance of the last stage's object [m] at points (p, n): (n,)."""
+        last = len(self.system.stages) - 1
+        picked = chosen(self.blocks, point, last)
+        return ranges_m(self.system.stages[last], picked, point.shape[1])
+
     def steps(self) -> Array:
         """(free variables, 1 + free variables): at their means, then each one deviation off."""
         stds = [self.timing.variables[k].std_s for k in self.free]
@@ -158,6 +164,8 @@ def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
             kinds.append((index, "lever_arm", "sphere", 3))
         if stage.ranging is not None:
             kinds.append((index, "bearing", "sphere", 3))
+            if stage.platform.nearest_m is not None:
+                kinds.append((index, "distance", "ball", 1))
     return stacked(kinds)
 
 
@@ -174,7 +182,7 @@ def _draw(
         sin_yaw=picked["yaw"][1],
         velocity_mps=picked["velocity"] * float(stage.platform.v_max_mps),
         rate_radps=picked["rate"] * float(stage.platform.omega_max_radps),
-        range_m=np.full(count, float(stage.platform.distance_m) if aimed else 0.0),
+        range_m=ranges_m(stage, picked, count) if aimed else np.zeros(count),
         bearing=picked.get("bearing", none),
         antenna_m=antenna,
         ranging_m=ranging,
@@ -183,6 +191,16 @@ def _draw(
         range_noise_m=np.zeros(count),
         **stage_shifts(system, index, shifts, count),
     )
+
+
+def ranges_m(stage: Stage, picked: dict[str, Array], count: int) -> Array:
+    """Distance of the object [m], (count,): the one there is, or as chosen between both ends."""
+    far = float(stage.platform.distance_m)
+    if "distance" not in picked or stage.platform.nearest_m is None:
+        return np.full(count, far)
+    near = float(stage.platform.nearest_m)
+    between: Array = 0.5 * (near + far) + 0.5 * (far - near) * picked["distance"][0]
+    return between
 
 
 def _sigma(stage: Stage) -> SensorSigma:

@@ -41,19 +41,41 @@ _ROUGH, _SETTLED = 1e-4, 1e-6  # gain of an iteration below which ascents end: a
 
 @dataclass(frozen=True, slots=True)
 class Wanted:
-    """A figure of |P e|: its p-quantile, or its root mean square where p is None."""
+    """A figure of |P e|: its p-quantile, or its root mean square where p is None.
+
+    rule: (a [m], b) of a limit sqrt(a^2 + (b d)^2) in the last stage's distance d; the figure is
+    then looked for where it is the largest share of that limit, not where it is largest.
+    """
 
     axis: Axis
     p: float | None = None
+    rule: tuple[float, float] | None = None
+
+    def weight(self, situations: Situations, point: Array) -> Array | float:
+        """Limit at the far end of the last stage's distances over that at each point's (n,)."""
+        stage = situations.system.stages[-1]
+        if self.rule is None or stage.platform.nearest_m is None:
+            return 1.0
+        a, b = self.rule
+        found: Array = math.hypot(a, b * stage.platform.distance_m) / np.hypot(
+            a, b * situations.last_ranges_m(point)
+        )
+        return found
 
 
 @dataclass(frozen=True, slots=True)
 class Worst:
-    """The largest value [m] of a figure, and the situation in which it stands (p,)."""
+    """The largest value [m] of a figure, and the situation in which it stands (p,).
+
+    weighted_m: the value times `Wanted.weight`, what is largest there; distance_m: of the last
+    stage's object there.
+    """
 
     wanted: Wanted
     value_m: float
     point: Array
+    weighted_m: float
+    distance_m: float
 
 
 def statistical_figures(
@@ -70,7 +92,7 @@ def statistical_figures(
     return tuple(
         max(
             (_evaluated(situations, one, point) for point in points.T),
-            key=lambda worst: worst.value_m,
+            key=lambda worst: worst.weighted_m,
         )
         for one, points in zip(wanted, _promising(situations, wanted, found), strict=True)
     )
@@ -99,21 +121,21 @@ def _promising(situations: Situations, wanted: Sequence[Wanted], found: Array) -
     mean, covariance = propagated(situations, found)
     out = []
     for k, one in enumerate(wanted):
-        order = np.argsort(-approximate(mean, covariance, one))
+        order = np.argsort(-approximate(mean, covariance, one) * one.weight(situations, found))
         kept = list(dict.fromkeys([k, *order.tolist()]))[:_CANDIDATES]
         out.append(found[:, kept])
     return tuple(out)
 
 
-def figure_m(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> float:
+def figure(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> Worst:
     """A figure to be held against a limit [m]; near it, the largest of several searches."""
-    value = statistical_figures(system, (wanted,), seed=seed)[0].value_m
+    found = statistical_figures(system, (wanted,), seed=seed)[0]
     near = CLOSE if Situations(system).linear else CLOSE_LONG
-    if abs(value - limit_m) <= near * limit_m:
+    if abs(found.weighted_m - limit_m) <= near * limit_m:
         for more in range(1, _MORE_SEARCHES + 1):
-            again = statistical_figures(system, (wanted,), seed=seed + more)[0].value_m
-            value = max(value, again)
-    return value
+            again = statistical_figures(system, (wanted,), seed=seed + more)[0]
+            found = max(found, again, key=lambda worst: worst.weighted_m)
+    return found
 
 
 def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> bool:
@@ -121,10 +143,11 @@ def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0
     demand_covered(system)
     situations = Situations(system)
     pool = situations.starting_points(seed, _POOL)
-    best = int(np.argmax(approximate(*propagated(situations, pool), wanted)))
-    nodes = situations.nodes(_QUICK_NODES)
-    moments = situations.moments(pool[:, best : best + 1], nodes)
-    least = limit_m * (1.0 + CLOSE)
+    weight = wanted.weight(situations, pool)
+    best = int(np.argmax(approximate(*propagated(situations, pool), wanted) * weight))
+    nodes, point = situations.nodes(_QUICK_NODES), pool[:, best : best + 1]
+    moments = situations.moments(point, nodes)
+    least = float(limit_m * (1.0 + CLOSE) / np.max(wanted.weight(situations, point)))
     if wanted.p is None:
         return exact(moments, wanted, len(situations.free)) > least
     return rays(moments, wanted, len(situations.free)).within(least) < wanted.p
@@ -143,7 +166,10 @@ def _worst_points(situations: Situations, wanted: Sequence[Wanted], seed: int) -
 
     pool = situations.starting_points(seed, _POOL)
     mean, covariance = linear(pool)
-    ranked = [np.argsort(-approximate(mean, covariance, one))[:_STARTS] for one in wanted]
+    ranked = [
+        np.argsort(-approximate(mean, covariance, one) * one.weight(situations, pool))[:_STARTS]
+        for one in wanted
+    ]
     point, of = pool[:, np.concatenate(ranked)], np.repeat(np.arange(count), _STARTS)
     value = _ascent(situations, wanted, linear).ascend(
         point, of, np.full(count, np.inf), _ROUGH, _ITERATIONS
@@ -174,7 +200,8 @@ def _ascent(
         value = np.empty(of.shape)
         for k, one in enumerate(wanted):
             mine = of == k
-            value[mine] = approximate(mean[mine], covariance[mine], one)
+            weight = one.weight(situations, point[:, mine])
+            value[mine] = approximate(mean[mine], covariance[mine], one) * weight
         return value
 
     return Ascent(situations.blocks, objective)
@@ -184,8 +211,9 @@ def _evaluated(situations: Situations, wanted: Wanted, point: Array) -> Worst:
     in_force().check()
     count = POINTS if situations.linear else MANY_POINTS
     moments = situations.moments(point[:, None], situations.nodes(count))
-    skipped = len(situations.free)
-    return Worst(wanted, exact(moments, wanted, skipped), point)
+    value, at = exact(moments, wanted, len(situations.free)), point[:, None]
+    weighted = float(np.max(value * wanted.weight(situations, at)))
+    return Worst(wanted, value, point, weighted, float(situations.last_ranges_m(at)[0]))
 
 
 def propagated(situations: Situations, point: Array) -> tuple[Array, Array]:

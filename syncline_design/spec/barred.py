@@ -27,12 +27,12 @@ from syncline_design.spec.spec import Spec
 
 def surroundings(stage: StageCase, spec: Spec) -> Surroundings:
     """What a stage of a spec asks of its sensors."""
-    choice, distance = stage.choice, stage.platform.entry.distance
+    choice, (near, far) = stage.choice, stage.distances
     asked = (one.limit for one in spec.requirements if one.kind == "sample_spacing")
     return Surroundings(
         choice.name,
-        distance,
-        distance,
+        near,
+        far,
         path_medium(stage),
         choice.look,
         choice.depth,

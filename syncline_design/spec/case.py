@@ -17,7 +17,7 @@ from syncline_design.machine.input_files import FileContent, FileRead
 from syncline_design.model.known import NOTHING_KNOWN as NOTHING_KNOWN
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.known import Known as Known
-from syncline_design.model.quantity import Quantity
+from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.spec.catalog import (
     Catalog,
@@ -95,6 +95,13 @@ class StageCase:
     roles: tuple[RoleCase, ...]
     clocks: tuple[Candidate[ClockEntry], ...]
 
+    @property
+    def distances(self) -> tuple[float, float]:
+        """Nearest and farthest distance of the object [m]; the same where there is only one."""
+        far = self.platform.entry.distance
+        span = self.choice.distance
+        return (far, far) if span is None else ends_of(span)
+
     def role(self, name: RoleName) -> RoleCase | None:
         """One role; None where no sensor takes it."""
         return next((one for one in self.roles if one.role == name), None)
@@ -167,6 +174,19 @@ def _limited(spec: Spec, distance_m: float) -> Spec:
     return spec.model_copy(update={"requirements": requirements})
 
 
+def ends_of(span: Quantity) -> tuple[Quantity, Quantity]:
+    """Both ends of an interval of lengths, each as it is written."""
+    near, far = span.text.split("..")
+    unit = far.split()[-1]
+    texts = (near.strip() if not _is_bare(near) else f"{near.strip()} {unit}", far.strip())
+    first, last = (parse_quantity(text, Dimension.LENGTH) for text in texts)
+    return first, last
+
+
+def _is_bare(text: str) -> bool:
+    return len(text.split()) == 1
+
+
 def _named(candidates: tuple[Candidate[E], ...], identity: str | None) -> E | None:
     return next((one.entry for one in candidates if one.id == identity), None)
 
@@ -198,6 +218,8 @@ def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candida
         for key in (*PLATFORM_FIGURES, "source")
         if (value := getattr(choice, key)) is not None
     }
+    if stage.distance is not None:  # figures of the platform are those at the far end
+        own["distance"] = ends_of(stage.distance)[1]
     if choice.use is None:
         return Candidate(choice.name or stage.name, PlatformEntry.model_validate(own))
     entry = catalog.platforms[choice.use].model_copy(update=own)

@@ -9,7 +9,13 @@ from pydantic import BeforeValidator, PlainValidator, model_validator
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.catalog import DriveArea, ErrorEntry, Motion, Primitive, SensorEntry
 from syncline_design.spec.effects_listed import EffectChoice as EffectChoice
-from syncline_design.spec.facts import FieldOfView, Medium, Reflectivity, TemperatureInterval
+from syncline_design.spec.facts import (
+    DistanceInterval,
+    FieldOfView,
+    Medium,
+    Reflectivity,
+    TemperatureInterval,
+)
 from syncline_design.spec.fields import (
     Acceleration,
     AngularRate,
@@ -58,7 +64,7 @@ class PlatformChoice(FileRecord):
 
     @model_validator(mode="after")
     def _complete_without_use(self) -> PlatformChoice:
-        keys = ("v_max", "omega_max", "distance", "baseline")
+        keys = ("v_max", "omega_max", "baseline")  # the stage looks after the distance
         absent = [key for key in keys if getattr(self, key) is None]
         if self.use is None and absent:
             hint = "or name a catalog platform: {use: ID}"
@@ -213,7 +219,22 @@ class StageChoice(FileRecord):
     reflectivity: Reflectivity | None = None  # of the object
     sound_speed: PositiveSpeed | None = None  # in the water; None: 1500 m/s
     timing_from: Text | None = None  # stage that GNSS time comes from, by a cable
+    distance: DistanceInterval | None = None  # NEAR .. FAR: every distance between counts
     note: str = ""
+
+    @model_validator(mode="after")
+    def _one_distance(self) -> StageChoice:
+        own = self.platform.distance
+        if self.distance is not None and own is not None:
+            error = refusal("distance given twice", "one of them", hint="delete the platform's")
+            raise refusals([(("distance",), error)])
+        if self.distance is not None and (self.ranging is None or self.ranging.is_empty):
+            message = "a distance of a stage that ranges nothing"
+            raise refusals([(("distance",), refusal(message, hint="delete it"))])
+        if self.platform.use is None and self.distance is None and own is None:
+            hint = "or name a catalog platform: {use: ID}"
+            raise refusals([(("platform", "distance"), refusal("missing", hint=hint))])
+        return self
 
     def role(self, name: RoleName) -> RoleChoice | None:
         """The choice of one role."""

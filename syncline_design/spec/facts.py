@@ -58,6 +58,21 @@ def _interval(dimension: Dimension) -> Reader:
 AngleInterval = Annotated[Quantity, _interval(Dimension.ANGLE)]
 TemperatureInterval = Annotated[Quantity, _interval(Dimension.TEMPERATURE)]
 MoneyInterval = Annotated[Quantity, _interval(Dimension.MONEY)]
+
+
+def _read_span(value: Any) -> Quantity:
+    span = read_quantity(value, Dimension.LENGTH, tolerance=True)
+    if ".." not in span.text:
+        hint = "one distance stands in the platform: {use: ID, distance: 60 m}"
+        raise refusal("not an interval", "NEAR .. FAR, with a unit at both", span.text, hint)
+    if not 0.0 < span.low < span.high:
+        raise refusal("out of range", "NEAR .. FAR, both more than 0 and NEAR below FAR", span.text)
+    return span
+
+
+DistanceInterval = Annotated[
+    Quantity, Reader(_read_span, quantity_schema(Dimension.LENGTH, tolerance=True))
+]
 Rate = Annotated[float, figure_of(Dimension.FREQUENCY, 0.0, above=True)]
 
 

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from syncline_design.effects.acting import known_of
 from syncline_design.model import timing
+from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
@@ -260,7 +261,25 @@ def _system(pairs: Sequence[Pair]) -> tuple[ExplainedStep, ExplainedStep]:
 
 
 def _ratios(worked: Worked) -> Iterator[ExplainedStep]:
-    """tau / tau_crit of every sensor and of the system, the largest last."""
+    """tau / tau_crit of every sensor and of the system, the largest last.
+
+    Where stages give several distances, at those of their ends where it is largest.
+    """
+    found = []
+    for end in at_ends(worked.system):
+        steps = list(_ratios_at(replace(worked, system=end)))
+        found.append((steps[-1].value, [*_distances(worked.system, end), *steps]))
+    yield from max(found, key=lambda one: one[0])[1]
+
+
+def _distances(system: System, end: System) -> Iterator[ExplainedStep]:
+    for name, d in distances_of(system, end).items():
+        formula = "the end of its distances where tau / tau_crit is largest"
+        name = f"d_{name}".replace("-", "_").replace(" ", "_")
+        yield ExplainedStep(name, formula, _n(d), d, "m")
+
+
+def _ratios_at(worked: Worked) -> Iterator[ExplainedStep]:
     left_out = ("total", "sync_error", "rate", "tau_sys")
     steps = {one.name: one for one in _error(worked) if one.name not in left_out}
     steps |= {one.name: one for one in _system(list(_pairs(worked)))}

@@ -16,7 +16,7 @@ from syncline_design.verdict.acceptance import (
     simulation_settings,
 )
 from syncline_design.verdict.recheck import Recheck
-from syncline_design.verdict.stated import value_m, wanted_of
+from syncline_design.verdict.stated import stated, wanted_of
 from syncline_design.verdict.tree import (
     UNITS,
     RequirementResult,
@@ -107,16 +107,17 @@ def _stated(
         "axis": requirement.axis or requirement.of,
     }  # fmt: skip
     try:
-        value = value_m(system, wanted_of(requirement), limit, settings.seed)
+        found = stated(system, wanted_of(requirement), limit, settings.seed)
     except OutOfTime:
         note = "the time limit ended the search for its worst situation"
         return decided(status="indeterminate", value=None, note=note, **about)
     except SimulationError as error:
         return decided(status="indeterminate", value=None, note=str(error), **about)
-    distance = float(case.stages[-1].platform.entry.distance)
+    if found.weighted_m > 0.0:  # its limit there, where the limit grows with the distance
+        about["limit"] = limit * (found.value_m / found.weighted_m)
     return decided(
-        status="pass" if value <= limit else "fail", value=finite(value), at_distance_m=distance,
-        **about,
+        status="pass" if found.weighted_m <= limit else "fail", value=finite(found.value_m),
+        at_distance_m=found.distance_m, **about,
     )  # fmt: skip
 
 

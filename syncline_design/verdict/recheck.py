@@ -6,13 +6,15 @@ code with the model, the tables or the solvers.  Formulas (E. R. Jellum et al., 
   sync error    = (v_max + d omega_max) tau_sys, summed over stages         (eq. sync_error_ub)
   tau_crit      = sensor error / (v_max + d omega_max)                      (eq. t_crit)
 tau_sys is the largest bound of any two timestamps that meet: tau_a + tau_ref + offset of their
-timelines; a stage without a ranging sensor meets true time, which is UTC.  A figure is rounded to
-a float once, at the end, and that float is compared with the limit: a printed limit that is met
-exactly passes, one that is missed by 1e-12 does not.
+timelines; a stage without a ranging sensor meets true time, which is UTC.  Where stages give two
+ends of a distance, all of it is computed at every combination of ends, and the largest counts.
+A figure is rounded to a float once, at the end, and that float is compared with the limit: a
+printed limit that is met exactly passes, one that is missed by 1e-12 does not.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Context, Decimal, localcontext
@@ -109,7 +111,52 @@ def recheck(
 
 def _recheck(case: Case, selection: Selection, known: Known) -> Recheck:
     chosen = _all_chosen(case, selection, known)
-    moves = {stage.choice.name: _moves(stage, chosen) for stage in case.stages}
+    names = [stage.choice.name for stage in case.stages]
+    ends = itertools.product(*(_ends(stage, chosen) for stage in case.stages))
+    found_at = [
+        _figures(case, selection, chosen, dict(zip(names, moves, strict=True))) for moves in ends
+    ]
+    worst = max(found_at, key=lambda one: one.sensor_error + one.sync_error)
+    ratio = max(one.ratio for one in found_at)
+    fixed = sum((Decimal(v) for *_, v in known.systematic), Decimal(0))
+    total = worst.sensor_error + worst.sync_error + fixed
+    bought = list(_bought(case, selection, chosen))
+    amounts = {name: sum_of(case, bought, name) for name in BUDGETS}
+    found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
+    found |= {"accuracy": Fraction(total), "sync": Fraction(ratio)}
+    found["sample_spacing"], silent = sample_spacing(case, selection)
+    return Recheck(
+        (*_facts(case, selection), *_requirements(case, found, silent)),
+        amounts["cost"],
+        amounts["mass"],
+        amounts["power"],
+        Fraction(worst.sensor_error),
+        Fraction(worst.rate),
+        Fraction(worst.tau_sys),
+        Fraction(worst.sync_error),
+        Fraction(total),
+        Fraction(ratio),
+        owned_pieces(case, bought),
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Figures:
+    """Sums [m, m/s, s] with every stage's object at one distance, and the largest tau/tau_crit."""
+
+    sensor_error: Decimal
+    rate: Decimal
+    tau_sys: Decimal
+    sync_error: Decimal
+    ratio: Decimal
+
+
+def _figures(
+    case: Case,
+    selection: Selection,
+    chosen: Mapping[tuple[str, RoleName], _Chosen],
+    moves: Mapping[str, Moves],
+) -> _Figures:
     rate = sum((v + turning for v, turning, _ in moves.values()), Decimal(0))
     meets = list(_meetings(case, selection, chosen, moves))
     tau_sys = max((bound for bound, _ in meets), default=Decimal(0))
@@ -118,28 +165,10 @@ def _recheck(case: Case, selection: Selection, known: Known) -> Recheck:
     sync_error = rate * tau_sys
     if case.spec.sync_model == "per_sensor":
         sync_error = sum((bound * speed for bound, speed in meets), Decimal(0))
-    total = sensor_error + sync_error + sum((Decimal(v) for *_, v in known.systematic), Decimal(0))
     ratios = [_ratio(rate * tau_sys, sensor_error)]
     for (stage, role), one in chosen.items():
         ratios.append(_ratio(one.tau * _own_rate(role, moves[stage]), errors[stage, role]))
-    bought = list(_bought(case, selection, chosen))
-    amounts = {name: sum_of(case, bought, name) for name in BUDGETS}
-    found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
-    found |= {"accuracy": Fraction(total), "sync": Fraction(max(ratios))}
-    found["sample_spacing"], silent = sample_spacing(case, selection)
-    return Recheck(
-        (*_facts(case, selection), *_requirements(case, found, silent)),
-        amounts["cost"],
-        amounts["mass"],
-        amounts["power"],
-        Fraction(sensor_error),
-        Fraction(rate),
-        Fraction(tau_sys),
-        Fraction(sync_error),
-        Fraction(total),
-        Fraction(max(ratios)),
-        owned_pieces(case, bought),
-    )
+    return _Figures(sensor_error, rate, tau_sys, sync_error, max(ratios))
 
 
 def _decimal(value: float) -> Decimal:
@@ -238,12 +267,16 @@ _Moment = tuple[str, Decimal]  # timeline of a stamp, bound of its error against
 _TRUE_TIME: _Moment = ("utc", Decimal(0))
 
 
-def _moves(stage: StageCase, chosen: Mapping[tuple[str, RoleName], _Chosen]) -> Moves:
+def _ends(stage: StageCase, chosen: Mapping[tuple[str, RoleName], _Chosen]) -> tuple[Moves, ...]:
+    """How a stage moves at each end of its distances."""
     platform = stage.platform.entry
     if (stage.choice.name, "ranging") not in chosen:
-        return _decimal(platform.v_max), Decimal(0), Decimal(0)
-    distance = _decimal(platform.distance)
-    return _decimal(platform.v_max), distance * _decimal(platform.omega_max), distance
+        return ((_decimal(platform.v_max), Decimal(0), Decimal(0)),)
+    ends = [_decimal(platform.distance)]
+    if stage.choice.distance is not None:
+        ends = [_decimal(end) for end in stage.distances]
+    speed, turn = _decimal(platform.v_max), _decimal(platform.omega_max)
+    return tuple((speed, end * turn, end) for end in ends)
 
 
 def _sensor_error(role: RoleName, one: _Chosen, moves: Moves) -> Decimal:

@@ -172,14 +172,15 @@ def _medium(stage: Any) -> str | None:
 
 
 def _path(stage: Any, name: str, sensor: Any) -> Iterator[str]:
-    where, distance, through = stage.choice.name, stage.platform.entry.distance, _medium(stage)
+    where, through = stage.choice.name, _medium(stage)
+    nearest, distance = stage.distances
     if (sensor.medium, through) in (("air", "water"), ("water", "air")):
         yield f"{name} measures through {sensor.medium}, {where} looks into {through}"
     reach = sensor.reach
     if reach is None:
         return
-    if reach.min is not None and distance < reach.min:
-        yield f"{name} begins at {reach.min:g} m, {where} is {distance:g} m away"
+    if reach.min is not None and nearest < reach.min:
+        yield f"{name} begins at {reach.min:g} m, {where} is {nearest:g} m away"
     known = _told_reach(stage.choice.reflectivity, reach)[1]
     if known is not None and distance > known:
         yield f"{name} ends at {known:g} m, {where} is {distance:g} m away"

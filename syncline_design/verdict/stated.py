@@ -2,42 +2,111 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import math
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from syncline_design.model.system import UTC, Sensor, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.figures import worst_case_m
-from syncline_design.simulation.statistical import Wanted, figure_m, surely_exceeds
-from syncline_design.spec.requirement import Requirement
+from syncline_design.simulation.statistical import Wanted, figure, surely_exceeds
+from syncline_design.spec.requirement import DistanceLimit, Requirement
+
+_GRID, _ZOOMS = 32, 4
 
 
-def wanted_of(requirement: Requirement) -> Wanted | None:
-    """The statistical figure that a requirement limits; None: the certified worst case."""
+@dataclass(frozen=True, slots=True)
+class Certified:
+    """The certified worst case; rule: as of `Wanted`."""
+
+    rule: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Stated:
+    """A figure [m] where it is the largest share of its limit [m], and the distance there [m].
+
+    weighted_m: held against the limit at the far end of the last stage's distances.
+    """
+
+    value_m: float
+    weighted_m: float
+    distance_m: float
+
+
+def wanted_of(requirement: Requirement) -> Wanted | Certified:
+    """The figure that a requirement limits."""
+    rule = _rule(requirement)
     match requirement.kind:
         case "thu":
-            return Wanted("horizontal", requirement.share)
+            return Wanted("horizontal", requirement.share, rule)
         case "tvu":
-            return Wanted("vertical", requirement.share)
+            return Wanted("vertical", requirement.share, rule)
         case "rmse":
-            return Wanted(requirement.axis or "3d")
+            return Wanted(requirement.axis or "3d", None, rule)
         case "quantile":
-            return Wanted(requirement.of or "3d", requirement.share)
+            return Wanted(requirement.of or "3d", requirement.share, rule)
         case "worst_case":
-            return None
+            return Certified(rule)
         case _:
             raise ValueError(f"{requirement.kind} is no figure of the error")
 
 
+def _rule(requirement: Requirement) -> tuple[float, float] | None:
+    """(a [m], b) of a limit that grows with the last stage's distance."""
+    if not isinstance(requirement.limit, DistanceLimit):
+        return None
+    a, b, of = requirement.limit.rule
+    return (float(a), float(b)) if of is None else None
+
+
 @lru_cache(maxsize=256)
-def value_m(system: System, wanted: Wanted | None, limit_m: float, seed: int) -> float:
-    """What a requirement limits [m]; the worst case with sensors at `coverage_factor` sigma."""
-    if wanted is None:
-        return worst_case_m(system, system.coverage_factor)
-    return figure_m(system, wanted, limit_m, seed)
+def stated(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> Stated:
+    """What a requirement limits; the worst case with sensors at `coverage_factor` sigma."""
+    if isinstance(wanted, Certified):
+        return _certified(system, wanted)
+    found = figure(system, wanted, limit_m, seed)
+    return Stated(found.value_m, found.weighted_m, found.distance_m)
 
 
-def keeps(system: System, wanted: Wanted | None, limit_m: float, seed: int) -> bool:
+def value_m(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> float:
+    """The figure [m] that is held against the limit at the far end of the distances."""
+    return stated(system, wanted, limit_m, seed).weighted_m
+
+
+def _certified(system: System, wanted: Certified) -> Stated:
+    """The certified worst case, over the last stage's distances where its limit grows with them.
+
+    It is continuous in the distance, so that a grid finds its largest share of the limit.
+    """
+    platform = system.stages[-1].platform
+    far, near = platform.distance_m, platform.nearest_m
+    if near is None or wanted.rule is None:
+        value = worst_case_m(system, system.coverage_factor)
+        return Stated(value, value, far)
+    a, b = wanted.rule
+
+    def at(d: float) -> Stated:
+        value = worst_case_m(_moved(system, d), system.coverage_factor)
+        return Stated(value, value * math.hypot(a, b * far) / math.hypot(a, b * d), d)
+
+    low, high, best = near, far, at(far)
+    for _ in range(_ZOOMS):
+        step = (high - low) / _GRID
+        found = max((at(low + step * k) for k in range(_GRID + 1)), key=lambda one: one.weighted_m)
+        best = max(best, found, key=lambda one: one.weighted_m)
+        low, high = max(near, best.distance_m - step), min(far, best.distance_m + step)
+    return best
+
+
+def _moved(system: System, distance_m: float) -> System:
+    """The system with the last stage's object at a distance."""
+    last = system.stages[-1]
+    platform = replace(last.platform, distance_m=distance_m, nearest_m=None)
+    return replace(system, stages=(*system.stages[:-1], replace(last, platform=platform)))
+
+
+def keeps(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> bool:
     """Whether a system keeps a limit; what fails at once is not searched any further.
 
     Designs that differ in timestamps alone share the verdict on their noise: independent errors
@@ -45,16 +114,16 @@ def keeps(system: System, wanted: Wanted | None, limit_m: float, seed: int) -> b
     """
     if not system.effects and _noise_fails(_well_timed(system), wanted, limit_m, seed):
         return False
-    if wanted is not None and surely_exceeds(system, wanted, limit_m, seed):
+    if isinstance(wanted, Wanted) and surely_exceeds(system, wanted, limit_m, seed):
         return False
     return value_m(system, wanted, limit_m, seed) <= limit_m
 
 
 @lru_cache(maxsize=1024)
-def _noise_fails(system: System, wanted: Wanted | None, limit_m: float, seed: int) -> bool:
+def _noise_fails(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> bool:
     """Whether noise alone exceeds a limit by more than the search's own scatter."""
-    if wanted is None:
-        return value_m(system, None, limit_m, seed) > limit_m
+    if isinstance(wanted, Certified):
+        return value_m(system, wanted, limit_m, seed) > limit_m
     return surely_exceeds(system, wanted, limit_m, seed)
 
 

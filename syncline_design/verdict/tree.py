@@ -108,7 +108,7 @@ def word_of(results: Iterable[RequirementResult]) -> Word:
 
 @dataclass(frozen=True, slots=True)
 class PlatformFigures(Record):
-    """How a stage may move and how far it looks."""
+    """How a stage may move and how far it looks; nearest_m: the other end of several distances."""
 
     id: str
     name: str
@@ -116,6 +116,7 @@ class PlatformFigures(Record):
     omega_max_radps: float
     distance_m: float
     baseline_m: float
+    nearest_m: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -189,6 +189,7 @@ def _stage_frame(stage: StageCase) -> StageFrame:
             float(platform.omega_max),
             float(platform.distance),
             float(platform.baseline),
+            None if stage.choice.distance is None else float(stage.distances[0]),
         ),
     )
 
