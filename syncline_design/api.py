@@ -74,6 +74,10 @@ def _limited(time_limit_s: float | None) -> AbstractContextManager[object]:
     return within_s(arguments.amount("time_limit_s", time_limit_s, 0.0) if given else None)
 
 
+def _entries(named: str | Sequence[str]) -> tuple[str, ...]:
+    return (named,) if isinstance(named, str) else tuple(dict.fromkeys(named))
+
+
 def _files(logs: str | Path | Sequence[str | Path]) -> list[Path]:
     """One log or several, as paths."""
     named = [logs] if isinstance(logs, str | Path) else logs
@@ -108,12 +112,12 @@ def check(
 def optimize(
     spec: SpecOrPath, *, best: int = 1, every: bool = False, pareto: bool = False,
     resource: ResourceName = "cost", seed: int = 0, method: Road = "auto",
-    time_limit_s: float | None = None,
+    time_limit_s: float | None = None, why_not: str | Sequence[str] = (),
 ) -> Optimisation:  # fmt: skip
     """The best designs of a spec, proven, and what they hinge on.
 
     best: how many designs that differ in a sensor; every: in anything.  pareto: the exact front of
-    `resource` against the error too.
+    `resource` against the error too.  why_not: entries to answer for.
     """
     from syncline_design.choice.options import RESOURCES
     from syncline_design.choice.outcome import METHODS
@@ -123,7 +127,13 @@ def optimize(
     arguments.word("resource", resource, RESOURCES)
     arguments.word("method", method, METHODS)
     settings = optimise.OptimizeSettings(
-        best, pareto, resource, method, seed=_seed(seed), every=every
+        best,
+        pareto,
+        resource,
+        method,
+        seed=_seed(seed),
+        every=every,
+        why_not=_entries(why_not),
     )
     with _limited(time_limit_s):
         return optimise.optimize(_case(spec), settings).result

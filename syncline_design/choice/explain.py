@@ -59,12 +59,12 @@ def _conflict_text(conflict: Conflict, each_suffices: bool) -> str:
     if len(names) == 1:
         return f"{names[0]} alone cannot be met by any combination of the candidates."
     if not conflict.minimal:
-        return f"{_listed(names)} cannot all hold together (a smaller set was not ruled out)."
+        return f"{listed(names)} cannot all hold together (a smaller set was not ruled out)."
     ending = "; without any one of them a design exists" if each_suffices else ""
-    return f"{_listed(names)} cannot hold together{ending}."
+    return f"{listed(names)} cannot hold together{ending}."
 
 
-def _listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
@@ -76,7 +76,7 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
     """
     gaps = tuple(_gap(table, problem.limits.sync) for table in problem.roles if not table.options)
     gaps += tuple(_clock_gap(vehicle) for vehicle in problem.vehicles if not vehicle.clocks)
-    conflict, minimal = _conflict(problem)
+    conflict, minimal = conflict_of(problem)
     further = _further(problem, conflict)
     moves = _proven(lambda: requirement_fixes(case, problem, build))
     fixes = [fix for together in moves if len(together) == 1 for fix in together]
@@ -130,7 +130,7 @@ def _further(problem: Problem, first: tuple[Part, ...]) -> tuple[tuple[Part, ...
     while gone:
         rest = lifted(problem, gone)
         try:
-            conflict = () if is_feasible(rest) else _conflict(rest)[0]
+            conflict = () if is_feasible(rest) else conflict_of(rest)[0]
         except NoVerdict:
             break
         if not conflict:
@@ -170,7 +170,7 @@ def _clock_gap(vehicle: VehicleTable) -> RoleGap:
     return RoleGap(vehicle.name, "clock", None, None, text)
 
 
-def _conflict(problem: Problem) -> tuple[tuple[Part, ...], bool]:
+def conflict_of(problem: Problem) -> tuple[tuple[Part, ...], bool]:
     """A set of requirements that cannot hold together, none of which can be left out."""
     every = parts_of(problem)
     active = list(every)

@@ -9,10 +9,9 @@ from fractions import Fraction
 from typing import Any, NamedTuple
 
 from syncline_design.choice.acceptable import iter_acceptable
-from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import Evaluation, evaluate
+from syncline_design.choice.holding import best_design
 from syncline_design.choice.options import RESOURCES
-from syncline_design.choice.outcome import Choice, Infeasible, TooLarge, Unfinished
 from syncline_design.choice.table import Limits, Objective, Problem, with_limits
 
 KINDS = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
@@ -71,15 +70,8 @@ def moved(problem: Problem, limits: Mapping[Part, Any]) -> Problem:
 
 def solve(problem: Problem) -> Evaluation | None:
     """Sums of the best design that meets every requirement; None when there is none."""
-    try:
-        found: Choice | Infeasible = choose(problem, "front")
-    except TooLarge:
-        found = choose(problem)
-    if isinstance(found, Infeasible):
-        return None
-    if not found.exhausted:
-        raise Unfinished("the search for a design that passes simulation gave up")
-    return evaluate(problem, found.design) if found.accepted else None
+    found = best_design(problem)
+    return None if found is None else evaluate(problem, found)
 
 
 def is_feasible(problem: Problem) -> bool:

@@ -132,6 +132,10 @@ def optimize(
         Literal["cost", "mass", "power"],
         typer.Option("--resource", "--against", help="What the front sets against error."),
     ] = "cost",
+    why_not: Annotated[
+        list[str] | None,
+        typer.Option(metavar="ENTRY", help="Say why a catalog entry is not in it. Repeatable."),
+    ] = None,
     write_design: Annotated[
         Path | None, typer.Option(metavar="PATH", help="Write the spec with the design pinned.")
     ] = None,
@@ -142,19 +146,23 @@ def optimize(
     from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
+    from syncline_design.verdict.admitted import NoSuchEntry
     from syncline_design.verdict.optimise import OptimizeSettings, optimize
 
     targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
     settings = OptimizeSettings(
         best, pareto, resource, road(method), seed=seed,
-        every=every,
+        every=every, why_not=tuple(dict.fromkeys(why_not or ())),
         report=any(target.format == "html" for target in targets),
     )  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
         case = load(spec)
         if write_design is not None:
             _refuse_elsewhere(write_design, case.spec.catalogs)
-        found = optimize(case, settings)
+        try:
+            found = optimize(case, settings)
+        except NoSuchEntry as error:
+            refuse(f"syncline-design: --why-not {error}")
     if write_design is not None and found.result.exit_code == 0:
         _write_design(found, write_design)
     emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet)

@@ -22,6 +22,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import qualification, warning_nodes
 from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
@@ -42,6 +43,7 @@ def on_choice(found: Optimised) -> Document:
         sections=(
             *_why_not(found.result),
             *section("designs", "Best designs", show(designs, silent=True)),
+            *why_not_section(found.result, found.case.spec.currency),
             *section("warnings", "Warnings", warning_nodes(found.result.warnings)),
             *_front(found),
             *section("hinges", "What it hinges on", hinges_nodes(found.result)),
@@ -49,6 +51,11 @@ def on_choice(found: Optimised) -> Document:
         ),
         source=str(found.case.path),
     )
+
+
+def why_not_section(result: Optimisation, currency: str) -> list[Section]:
+    """What `--why-not` asked about."""
+    return section("why-not", "Why not", why_not_nodes(result.why_not, currency))
 
 
 def _items(lines: Sequence[str]) -> list[Node]:

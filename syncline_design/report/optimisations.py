@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from syncline_design.report.choice_csv import optimisation_csv
-from syncline_design.report.document import Node, Text, strong
+from syncline_design.report.document import Heading, Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.report.json_out import json_text
 from syncline_design.report.on_choice import hinges_nodes, incomplete_lines
 from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.render_html import html
 from syncline_design.verdict.optimise import Optimised
 
@@ -20,4 +21,7 @@ def render_optimize(name: str, found: Optimised) -> str:
         return json_text(found.result.to_json())
     assert found.verdict is not None
     more: list[Node] = [Text((strong(line),)) for line in incomplete_lines(found.result)]
+    asked = why_not_nodes(found.result.why_not, found.case.spec.currency)
+    if asked:
+        more += [Heading("Why not"), *asked]
     return html(on_verdict(found.verdict, [*more, *hinges_nodes(found.result)]))

@@ -150,8 +150,12 @@ def ruled_out(problem: Problem) -> tuple[tuple[Exclusion, ...], int]:
     """
     count = sum(len(table.excluded) for table in problem.roles)
     count += sum(len(vehicle.excluded) for vehicle in problem.vehicles)
-    rows = itertools.chain(_excluded_options(problem), _excluded_clocks(problem))
-    return tuple(itertools.islice(rows, MOST_EXCLUDED)), count
+    return tuple(itertools.islice(ruled_out_rows(problem), MOST_EXCLUDED)), count
+
+
+def ruled_out_rows(problem: Problem) -> Iterator[Exclusion]:
+    """All of it, row by row."""
+    return itertools.chain(_excluded_options(problem), _excluded_clocks(problem))
 
 
 def _excluded_options(problem: Problem) -> Iterator[Exclusion]:

@@ -39,6 +39,7 @@ from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
+from syncline_design.verdict.admitted import Kinds, kinds_of, with_whole_catalog
 from syncline_design.verdict.cautions import design_cautions
 from syncline_design.verdict.choice_data import (
     front_designs,
@@ -57,6 +58,7 @@ from syncline_design.verdict.verify import (
     unfinished_verdict,
     verify,
 )
+from syncline_design.verdict.why_not import Answer, Asked, why_not
 
 SCHEMA = "syncline-design/optimization/v1"
 # What stands for the tables where time ended before they were made.
@@ -77,6 +79,9 @@ class OptimizeSettings:
     seed: int = 0
     every: bool = False
     report: bool = False  # the whole verdict too, for a page
+    why_not: tuple[
+        str, ...
+    ] = ()  # entries to answer for; NoSuchEntry for one that is in no catalog
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +102,8 @@ class Optimisation(Record):
     warnings: of the first design, as `check` gives them; cut_short: what the time limit left out
     or incomplete; gave_up: what lacks designs because too many were simulated; message: what ended
     a search that found no design; front: with `--pareto`, `front_left_out` what has no place on
-    it; slack, tolerances, measure_next: of a design that meets, null where that was not worked out.
+    it; slack, tolerances, measure_next: of a design that meets, null where that was not worked out;
+    why_not: of the entries that were asked about.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
@@ -120,6 +126,7 @@ class Optimisation(Record):
     tolerances: ToleranceVerdict | None = optional()
     measure_next: tuple[Measurement, ...] | None = optional()
     infeasibility: Explanation | None = optional()
+    why_not: tuple[Answer, ...] | None = optional()
 
     @property
     def exit_code(self) -> int:
@@ -155,6 +162,7 @@ class Optimised:
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best designs of a spec; pinned roles stay as they are."""
+    questions = _questions(case, settings)
     build = Simulations(settings.seed).problem_of
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
@@ -182,6 +190,9 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         designs = _designs(problem, picked.verified.design, settings, pieces)
         if picked.verified.word == "meets":
             kind, more = Hinged, _hinges((case, problem, designs[0], build), pieces)
+    if settings.why_not:
+        asked = Asked(case, problem, designs[0] if designs else None, build, questions[0])
+        more["why_not"] = tuple(pieces.listed("why not", lambda: why_not(asked, questions[1])))
     result = kind(
         verdict=_word(case, problem, picked),
         **_frame(case, problem, settings, picked.choice.proof),
@@ -197,6 +208,14 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         return found
     of_cost = points if settings.pareto and settings.resource == "cost" else None
     return replace(found, verdict=open_verdict(case, problem, picked, checking, points=of_cost))
+
+
+def _questions(case: Case, settings: OptimizeSettings) -> tuple[Case, Kinds]:
+    """The case with every entry that is asked about, and what kind of entry each is."""
+    if not settings.why_not:
+        return case, {}
+    whole = with_whole_catalog(case)
+    return whole, kinds_of(whole, settings.why_not)
 
 
 def _cautions(

@@ -1,0 +1,98 @@
+"""The best design that holds an entry, and the best that does without a sensor.
+
+A design holds an entry where a role or a vehicle takes it, or something that requires it: each such
+place alone makes a part of the design space, and the best of their best designs is the answer.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Literal
+
+import numpy as np
+
+from syncline_design.choice.decide import choose
+from syncline_design.choice.evaluate import evaluate, rank
+from syncline_design.choice.narrowed import Narrowed, kept, narrowed
+from syncline_design.choice.options import Bools, Options
+from syncline_design.choice.outcome import Choice, Infeasible, TooLarge, Unfinished
+from syncline_design.choice.table import ClockOption, Design, Problem
+
+EntryKind = Literal["sensor", "timestamping", "hardware", "clock"]
+
+
+def best_design(problem: Problem) -> Design | None:
+    """The best design that meets every requirement; None when there is none.
+
+    Raises Unfinished where simulation gave up, NoVerdict where nothing can be proven.
+    """
+    try:
+        found: Choice | Infeasible = choose(problem, "front")
+    except TooLarge:
+        found = choose(problem)
+    if isinstance(found, Infeasible):
+        return None
+    if not found.exhausted:
+        raise Unfinished("the search for a design that passes simulation gave up")
+    return found.design if found.accepted else None
+
+
+def best_in(part: Narrowed) -> Design | None:
+    """The best design of a part, as one of the whole."""
+    found = None if part.is_empty else best_design(part.problem)
+    return None if found is None else part.whole(found)
+
+
+def parts_with(problem: Problem, kind: EntryKind, identity: str) -> Iterator[Narrowed]:
+    """For each role and vehicle that may hold an entry: the designs in which it does."""
+    options = [np.arange(len(table.options)) for table in problem.roles]
+    clocks = [list(range(len(table.clocks))) for table in problem.vehicles]
+    for r, table in enumerate(problem.roles):
+        rows = np.flatnonzero(_hold(table.options, kind, identity))
+        if len(rows):
+            yield narrowed(problem, [*options[:r], rows, *options[r + 1 :]], clocks)
+    for v, vehicle in enumerate(problem.vehicles):
+        mine = [i for i, one in enumerate(vehicle.clocks) if _holds(one, kind, identity)]
+        if mine:
+            yield narrowed(problem, options, [*clocks[:v], mine, *clocks[v + 1 :]])
+
+
+def best_with(problem: Problem, kind: EntryKind, identity: str) -> Design | None:
+    """The first design in the documented order that meets every requirement and holds an entry."""
+    found = [best_in(part) for part in parts_with(problem, kind, identity)]
+    ranked = [
+        (rank(problem, design, evaluate(problem, design)), place, design)
+        for place, design in enumerate(found)
+        if design is not None
+    ]
+    return min(ranked)[2] if ranked else None
+
+
+def best_without(problem: Problem, sensor: str) -> Design | None:
+    """The best design with this sensor in no role."""
+    return best_in(
+        kept(problem, lambda _, options: ~_hold(options, "sensor", sensor), lambda _, clock: True)
+    )
+
+
+def _hold(options: Options, kind: EntryKind, identity: str) -> Bools:
+    """Which options are, use or require an entry."""
+    if kind == "hardware":
+        needing = [any(name == identity for name, _ in needs) for needs in options.needs]
+        return np.array([*needing, False])[options.need]
+    if kind == "clock":
+        return np.zeros(len(options), dtype=bool)
+    numbers = options.sensor if kind == "sensor" else options.method
+    _, first = np.unique(numbers, return_index=True)
+    named = [
+        place
+        for place in first.tolist()
+        if (options[place].sensor if kind == "sensor" else options[place].method) == identity
+    ]
+    return np.isin(numbers, numbers[named])
+
+
+def _holds(clock: ClockOption, kind: EntryKind, identity: str) -> bool:
+    if kind == "hardware":
+        return any(name == identity for name, _ in clock.requires)
+    return kind == "clock" and clock.id == identity

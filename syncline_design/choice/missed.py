@@ -1,0 +1,76 @@
+"""What keeps a set of designs out: a requirement that it misses by least, or several together."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from fractions import Fraction
+
+from syncline_design.choice.explain import conflict_of, listed
+from syncline_design.choice.outcome import NoVerdict
+from syncline_design.choice.parts import FIELDS, SIMULATED, Part, least, parts_of
+from syncline_design.choice.table import Problem
+from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.spec.case import Case
+from syncline_design.spec.requirement import LIMIT_DIMENSIONS
+
+IMPLIED = "the implied sync requirement"
+
+
+@dataclass(frozen=True, slots=True)
+class Missed:
+    """kind: of the requirement, `requirements` of several; value: the least that is reached, with
+    every other requirement met, limit: what is asked; both in SI or the spec's currency."""
+
+    kind: str
+    value: float | None
+    limit: float | None
+    text: str
+
+
+def nearest_miss(case: Case, problems: Iterable[Problem]) -> Missed:
+    """Of problems without a design, the requirement whose limit would have to move least."""
+    every = list(problems)
+    found = [one for problem in every for one in _misses(problem)]
+    if not found:
+        together, minimal = conflict_of(every[0])
+        names = listed([part.id or IMPLIED for part in together])
+        text = f"no such design meets {names}" + (" together" if len(together) > 1 else "")
+        text += "" if minimal else " (a smaller set was not ruled out)"
+        return Missed("requirements", None, None, text)
+    _, part, value, limit = min(found, key=lambda one: (one[0], one[1]))
+    reached, asked = _shown(case, part.kind, value, limit)
+    text = f"{part.id or IMPLIED}: at best {reached}, the limit is {asked}"
+    return Missed(part.kind, float(value), float(limit), text)
+
+
+def _misses(problem: Problem) -> Iterator[tuple[Fraction, Part, Fraction, Fraction]]:
+    """Every requirement that alone stands in the way: value over limit, it, value and limit."""
+    for part in parts_of(problem):
+        limit = _limit_of(problem, part)
+        if part.kind == SIMULATED or not limit:
+            continue
+        with suppress(NoVerdict):  # what cannot be proven is not said
+            value = least(problem, part)
+            if value is not None:
+                yield value / limit, Part(part.kind, part.id or ""), value, limit
+
+
+def _limit_of(problem: Problem, part: Part) -> Fraction | None:
+    limit = getattr(problem.limits, FIELDS.get(part.kind, part.kind), None)
+    return None if limit is None else Fraction(limit)
+
+
+def _shown(case: Case, kind: str, value: Fraction, limit: Fraction) -> tuple[str, str]:
+    """Both figures, in so many digits that they differ."""
+    dimension = LIMIT_DIMENSIONS.get(kind, Dimension.DIMENSIONLESS)
+    texts = ("", "")
+    for digits in range(4, 17):
+        texts = (
+            format_quantity(float(value), dimension, digits, case.spec.currency),
+            format_quantity(float(limit), dimension, digits, case.spec.currency),
+        )
+        if texts[0] != texts[1]:
+            break
+    return texts
