@@ -55,7 +55,7 @@ NAMES = {
 def written(recording: MadeRecording, folder: Path, turn: int) -> list[Path]:
     """The recording as files, the form by turns."""
     small = sum(one.stamp_ns.size for one in recording.streams) <= MOST_MESSAGES
-    fits = all(one.stamp_ns.min() >= 0 and one.stamp_ns.max() < 2**31 * 10**9
+    fits = all(one.stamp_ns.min() >= 0 and one.stamp_ns.max() < 2**31 * 10**9 and one.factor == 1
                for one in recording.streams)  # fmt: skip
     in_order = all((one.receive_ns[1:] >= one.receive_ns[:-1]).all() for one in recording.streams)
     if turn % 4 == 3 and small and fits and in_order:
@@ -70,7 +70,7 @@ def as_csv(one: Made, folder: Path, form: int) -> Path:
     with path.open("w", encoding="utf-8") as file:
         file.write(f"stamp_{unit}{mark}receive_{unit}\n")
         for stamp, receive in zip(one.stamp_ns.tolist(), one.receive_ns.tolist(), strict=True):
-            cells = [_cell(value, form) for value in (stamp, receive)]
+            cells = [_cell(value, form) for value in (stamp * one.factor, receive)]
             file.write(mark.join(cells) + "\n")
     return path
 
@@ -173,7 +173,7 @@ def peers(folder: Path, seed: int, each: int, sound: int) -> dict[str, PeerScore
             if len(recording.streams) > 1 or recording.streams[0].stamp_ns.size > MOST_MESSAGES:
                 continue
             one = recording.streams[0]
-            if one.stamp_ns.min() < 0 or one.stamp_ns.max() >= 2**31 * 10**9:
+            if one.stamp_ns.min() < 0 or one.stamp_ns.max() >= 2**31 * 10**9 or one.factor != 1:
                 continue
             path = as_mcap(recording, Path(name) / f"{recording.name}.mcap")
             ours = audit([path]).streams[0]

@@ -33,6 +33,7 @@ class Made:
     sizes: dict[str, float] = field(default_factory=dict)
     bound_s: float | None = None  # largest minus smallest delay; None: not comparable
     sound_as: str = ""
+    factor: int = 1  # by which the file's stamps are larger than stamp_ns: another unit
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ class Draft:
     keep: NDArray[np.bool_] | None = None
     whole_ns: Callable[[Whole], Whole] | None = None  # last change, on the whole stamps
     comparable: bool = True
+    factor: int = 1
+    disorder: float = 0.0  # share of receipts noted out of order
     spoiled: NDArray[np.bool_] | None = None  # messages whose delay is not in the bound
 
 
@@ -114,6 +117,12 @@ LAWS = (
 
 def finish(d: Draft, name: str, sound_as: str = "") -> Made:
     receive = np.maximum.accumulate(d.true + d.delay)
+    if d.disorder:  # two threads: a receipt is noted less than a millisecond before the one before
+        at = np.flatnonzero(d.rng.uniform(size=receive.size) < d.disorder)
+        at = at[at > 0]
+        late = receive[at - 1] - d.rng.uniform(5e-5, 9e-4, at.size)
+        near = np.abs(late - receive[at]) < 2.0 * d.theta
+        receive[at[near]] = late[near]
     stamp_ns = d.start_ns + np.round(d.stamp * 1e9).astype(np.int64)
     receive_ns = d.start_ns + np.round(receive * 1e9).astype(np.int64)
     if d.whole_ns is not None:
@@ -123,14 +132,17 @@ def finish(d: Draft, name: str, sound_as: str = "") -> Made:
         stamp_ns, receive_ns = stamp_ns[d.keep], receive_ns[d.keep]
         used = (receive - d.true)[d.keep]
     bound = float(used.max() - used.min()) if d.comparable else None
-    return Made(name, stamp_ns, receive_ns, tuple(d.planted), d.sizes, bound, sound_as)
+    return Made(
+        name, stamp_ns, receive_ns, tuple(d.planted), d.sizes, bound, sound_as, d.factor
+    )  # fmt: skip
 
 
 # ---- faults ---------------------------------------------------------------------------------
 
 
 def epoch_offset(d: Draft) -> None:
-    kind = d.rng.choice(["tai", "gps", "tai_gps", "boot", "zone", "week", "gps_epoch", "unit"])
+    kind = d.rng.choice(["tai", "gps", "tai_gps", "boot", "zone", "week", "gps_epoch", "unit",
+                         "behind", "day", "unix unit"])  # fmt: skip
     start_s = d.start_ns // 10**9
     if kind in ("tai", "gps", "tai_gps"):
         d.stamp = d.stamp + {"tai": 37.0, "gps": 18.0, "tai_gps": 19.0}[kind] * d.rng.choice(
@@ -145,6 +157,13 @@ def epoch_offset(d: Draft) -> None:
         gps_ns = d.start_ns - 315_964_800 * 10**9 + 18 * 10**9
         week = gps_ns // (604_800 * 10**9) * (604_800 * 10**9)
         d.whole_ns = lambda s: s - 315_964_800 * 10**9 + 18 * 10**9 - week
+    elif kind == "behind":  # no whole second, no epoch that is known
+        d.stamp = d.stamp - float(d.rng.choice([0.7, 1.5, 2.5, 5.5, 12.3, 23.0, 36.0]))
+    elif kind == "day":  # of whichever weekday it is
+        midnight = start_s // 86_400 * 86_400 * 10**9
+        d.whole_ns = lambda s: s - midnight
+    elif kind == "unix unit":  # milli-, micro-, nanoseconds since 1970 as if seconds
+        d.factor = int(d.rng.choice([10**3, 10**6, 10**9]))
     elif kind == "gps_epoch":
         d.whole_ns = lambda s: s - 315_964_800 * 10**9 + 18 * 10**9
     else:
@@ -169,6 +188,12 @@ def whole_second_slip(d: Draft) -> None:
     d.sizes |= {"seconds": seconds, "from_s": begin}
 
 
+def whole_second_late(d: Draft) -> None:
+    """The pulse of another second from the first message to the last."""
+    d.stamp = d.stamp - float(d.rng.choice([1.0, 2.0, 3.0]))
+    d.planted.append("whole_second_slip")
+
+
 def step(d: Draft) -> None:
     at = d.rng.uniform(18, 57)
     smallest = VISIBLE[min(VISIBLE, key=lambda r: abs(r - d.rate))]
@@ -188,8 +213,11 @@ def drift(d: Draft) -> None:
 
 
 def counter_wrap(d: Draft) -> None:
-    wrap = int(d.rng.choice([2**32 * 1000, 2**32, 2**31 * 1000, 2**16 * 10**6, 2**32 * 10**6,
-                             2**24 * 1000]))  # fmt: skip
+    wrap = int(d.rng.choice([
+        2**32 * 1000, 2**32, 2**31 * 1000, 2**16 * 10**6, 2**32 * 10**6, 2**24 * 1000, 10**9,
+        2**24 * 100, 2**15 * 10**5, 2**16 * 10**5, 2**16 * 10**4, 60 * 10**9, 25 * 10**9, 10**10,
+    ]))  # fmt: skip
+    wrap = max(wrap, int(8e9 / d.rate))  # several messages between two of them
     at = int(d.rng.uniform(10, 60) * 1e9) if wrap > 75e9 else int(d.rng.integers(0, wrap))
     d.whole_ns = lambda s: (s - d.start_ns - at) % wrap
     d.planted.append("counter_wrap")
@@ -213,6 +241,20 @@ def packetised(d: Draft) -> None:
         arrival = arrival + d.rng.gamma(2.0, 30e-6, arrival.size)
     d.stamp = np.maximum.accumulate(arrival)
     d.delay = d.stamp - d.true + d.delay * 0.05
+    d.planted.append("packetised")
+    d.comparable = False
+
+
+def whole_packets(d: Draft) -> None:
+    """Packets that hold the same number of messages every time."""
+    each = int(d.rng.choice([2, 4, 5, 8]))
+    tick = each / d.rate
+    d.true = (np.arange(d.true.size) + d.rng.uniform(0.05, 0.95)) / d.rate
+    d.stamp = np.ceil(d.true / tick) * tick
+    if d.rng.uniform() < 0.5:
+        d.delay = d.stamp - d.true + np.maximum.accumulate(d.delay * 0.05)
+    else:
+        d.delay = tick + d.delay
     d.planted.append("packetised")
     d.comparable = False
 
@@ -287,15 +329,17 @@ FAULTS: dict[str, Callable[[Draft], None]] = {
     f.__name__: f
     for f in (epoch_offset, whole_second_slip, step, drift, counter_wrap, relock, packetised,
               truncated_stamps, stamped_on_arrival, duplicates, backward_jump, gap, lost_messages,
-              unset_stamps, ahead_of_receipt)
+              unset_stamps, ahead_of_receipt, whole_second_late, whole_packets)
 }  # fmt: skip
 PAIRS = (
     ("epoch_offset", "drift"), ("epoch_offset", "whole_second_slip"), ("step", "gap"),
     ("drift", "lost_messages"), ("drift", "duplicates"), ("whole_second_slip", "drift"),
     ("relock", "gap"), ("step", "duplicates"), ("whole_second_slip", "lost_messages"),
     ("backward_jump", "drift"), ("step", "drift"), ("ahead_of_receipt", "gap"),
+    ("packetised", "whole_second_slip"),
 )  # fmt: skip
 _RATE_OF = {
+    "whole_packets": (50.0, 100.0, 200.0),
     "packetised": (25.0, 50.0, 100.0, 200.0, 400.0),
     "truncated_stamps": (23.0, 30.0, 130.0),
 }
@@ -363,9 +407,35 @@ def wandering_sampling(d: Draft) -> None:
     d.stamp = d.true.copy()
 
 
+def breathing(d: Draft) -> None:
+    """Latency that goes up and down, slowly."""
+    period = d.rng.uniform(15.0, 80.0)
+    size = float(10 ** d.rng.uniform(-2.5, -1.2))
+    turn = 2 * np.pi * (d.true / period + d.rng.uniform())
+    shape = np.sin(turn) if d.rng.uniform() < 0.6 else 2 / np.pi * np.arcsin(np.sin(turn))
+    d.delay = d.delay + size * (1.0 + shape)
+
+
+def wandering_transport(d: Draft) -> None:
+    """Latency that walks, or climbs while a queue fills and falls when it is emptied."""
+    n = d.true.size
+    size = float(10 ** d.rng.uniform(-2.5, -1.2))
+    if d.rng.uniform() < 0.5:
+        walk = np.cumsum(d.rng.normal(0.0, 1.0, n)) / np.sqrt(n)
+        d.delay = d.delay + size * 2.0 * (walk - walk.min())
+    else:
+        length = d.rng.uniform(10.0, 30.0)
+        d.delay = d.delay + size * 2.0 * ((d.true / length + d.rng.uniform()) % 1.0)
+
+
+def noted_out_of_order(d: Draft) -> None:
+    d.disorder = float(d.rng.choice([0.0005, 0.01, 0.1]))
+
+
 SOUND: dict[str, Callable[[Draft], None]] = {
     f.__name__: f for f in (plain, scheduling_batches, load_episodes, host_stalls, exact_epochs,
-                            triggered, wandering_sampling)
+                            triggered, wandering_sampling, breathing, wandering_transport,
+                            noted_out_of_order)
 }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import Array, Series, seconds, spread
+from syncline_design.auditing.series import Array, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import PointTimes
 
 _TIGHT: Final = 0.2  # scatter of receipt minus stamp against that of the stamps' rhythm
@@ -37,8 +37,8 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
         return None
     return StampFault(
         "stamped_on_arrival", {"seconds": own}, None, None,
-        f"stamps scatter by {own * 1e3:.3g} ms about the sensor's rhythm, late rather than early, "
-        f"while receipts follow within {transport * 1e3:.3g} ms: they say when messages came",
+        f"stamps scatter by {in_words(own)} about the sensor's rhythm, late rather than early, "
+        f"while receipts follow within {in_words(transport)}: they say when messages came",
     )  # fmt: skip
 
 
@@ -73,7 +73,7 @@ def ahead(series: Series, known_s: float, resolution_s: float) -> StampFault | N
     return StampFault(
         "ahead_of_receipt", {"seconds": largest, "count": float(count)},
         None if whole else float(times[0]), None if whole else float(times[-1]),
-        f"{count} of {late.size} stamps lie after their receipt, by up to {largest * 1e3:.4g} ms: "
+        f"{count} of {late.size} stamps lie after their receipt, by up to {in_words(largest)}: "
         "no message comes before it was measured",
     )  # fmt: skip
 

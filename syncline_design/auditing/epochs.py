@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, UNIX_S, Series, seconds
+from syncline_design.auditing.series import NS, UNIX_S, Array, Series, in_words, seconds
 
 GPS_EPOCH_S: Final = 315_964_800.0  # 1980-01-06 since 1970
 LEAP_S: Final = 18.0  # GPS minus UTC since 2017
@@ -37,11 +37,24 @@ _EPOCHS: Final = (
     ),
     (-2048 * WEEK_S, "week_rollover", "stamps are 2048 GPS weeks back"),
 )
+DAY_S: Final = 86_400.0
+_QUARTER_S: Final = 900.0  # zones are multiples of it
+# what is counted from, on the clock of UTC or of GPS (a week begins on Sunday, 1970 on a Thursday)
 _COUNTED: Final = (
-    (WEEK_S, "week_seconds", "stamps are seconds of the GPS week"),
-    (86_400.0, "day_seconds", "stamps are seconds of the day"),
-    (3600.0, "hour_seconds", "stamps are seconds of the hour"),
+    (WEEK_S, ("gps",), "week_seconds", "stamps are seconds of the GPS week"),
+    (DAY_S, ("utc", "gps"), "day_seconds", "stamps are seconds of the day"),
+    (3600.0, ("utc", "gps"), "hour_seconds", "stamps are seconds of the hour"),
 )
+_FEW_FALLS: Final = 3
+_SLOWEST, _FASTEST = 0.98, 1.02  # no clock runs so: counts of another unit
+_STEADY: Final = 0.005  # how alike the rates of short and long stretches are
+# ticks that are taken for others: 1/1024 s, 2^-20 s, hundredths, ten thousandths, minutes
+_FACTORS: Final = tuple(sorted({
+    one for value in (1.024, 2.0**20 / 1e6, 2.0**30 / 1e9, 10.0, 100.0, 1e4, 1e5, 1e7, 60.0, 3600.0)
+    for one in (value, 1.0 / value)
+}))  # fmt: skip
+LARGE_SLIP_S: Final = 15.0  # from here on another epoch, no pulse of the wrong second
+_WHOLE_LATENCY_S: Final = 0.1  # of a stream that is whole seconds off
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,59 +67,111 @@ class InSeconds:
     rate: float | None  # of stamps against receipts, once in one unit
 
 
-def in_one_unit(series: Series) -> InSeconds:
-    """Stamps that run a power of a thousand too fast or too slow, in their right unit."""
+def in_one_unit(series: Series, known: float = 1.0) -> InSeconds:
+    """Stamps that run a power of a thousand too fast or too slow, in their right unit.
+
+    known: a factor that the reader divided by, as 64 bits did not hold the figures.  Stamps that
+    run some per cent too fast count something else than seconds as well: no clock drifts so far.
+    """
     ratio = _rate(series)
-    if ratio is None or ratio <= 0.0:
+    factor = 1.0 if ratio is None or ratio <= 0.0 else _factor(series, ratio)
+    if factor == 1.0 and known == 1.0:
         return InSeconds(series, None, 1.0, ratio)
-    power = round(math.log10(ratio) / 3.0)
-    if power == 0 or abs(power) > 3 or abs(math.log10(ratio) - 3 * power) > 0.05:
-        return InSeconds(series, None, 1.0, ratio)
-    factor = 10.0 ** (3 * power)
     good = series.good
     stamp = series.stamp.copy()
-    if power > 0:
+    if factor >= 10.0 and float(factor).is_integer():
         stamp[good] = stamp[good] // round(factor)
-    else:
+    elif factor <= 0.1 and abs(1.0 / factor - round(1.0 / factor)) < 1e-9:
         stamp[good] = stamp[good] * round(1.0 / factor)
+    elif factor != 1.0:
+        stamp[good] = np.round(stamp[good].astype(np.longdouble) / factor).astype(np.int64)
+    whole = factor * known
+    runs = f"{(ratio or 1.0) * known:.7g}"
     fault = StampFault(
-        "epoch_offset", {"kind": "unit", "factor": factor}, None, None,
-        f"stamps run {ratio:.6g} times as fast as receipts: {_unit_words(power)}",
+        "epoch_offset", {"kind": "unit", "factor": whole}, None, None,
+        f"stamps run {runs} times as fast as receipts: {_unit_words(whole)}",
     )  # fmt: skip
-    return InSeconds(
-        replace(series, stamp=stamp), fault, max(1.0, float(round(1.0 / factor))), ratio / factor
-    )
+    rate = None if ratio is None else ratio / factor
+    return InSeconds(replace(series, stamp=stamp), fault, max(1.0, float(round(1.0 / whole))), rate)
 
 
-def _unit_words(power: int) -> str:
+def _factor(series: Series, ratio: float) -> float:
+    """What stamps are to be divided by so that they run like receipts; 1 where they do."""
+    power = round(math.log10(ratio) / 3.0)
+    if power and abs(power) <= 3 and abs(math.log10(ratio) - 3 * power) < 0.05:
+        return float(10.0 ** (3 * power))
+    if _SLOWEST < ratio < _FASTEST or not 1e-10 < ratio < 1e10:
+        return 1.0
+    rates = _rates(series)
+    if len(rates) < 2 or max(rates) > (1.0 + _STEADY) * min(rates):
+        return 1.0
+    if min(rates) < _FASTEST and max(rates) > _SLOWEST:
+        return 1.0
+    near = [one for one in _FACTORS if abs(rates[-1] / one - 1.0) < _STEADY]
+    return near[0] if near else float(f"{rates[-1]:.5g}")
+
+
+def _unit_words(factor: float) -> str:
+    power = math.log10(factor) / 3.0
+    if abs(power - round(power)) > 1e-6:
+        return "they count another unit than the one that was read"
     names = {-3: "seconds read as nanoseconds", -2: "milliseconds read as nanoseconds, or the like",
              -1: "a unit a thousand times too small was read"}  # fmt: skip
-    return names.get(power, f"a unit 1e{3 * power} too large was read")
+    return names.get(round(power), f"a unit {factor:.0e} times too large was read".replace("+", ""))
 
 
 def _rate(series: Series) -> float | None:
     """How fast stamps run against receipts: median over pairs about a second, else half a log."""
-    if series.receive is None:
+    if series.receive is None or series.good.sum() < 4:
         return None
-    places = series.places()
-    if places.size < 4:
-        return None
-    stamp, receive = series.stamp[places], series.receive[places]
-    whole = float(receive[-1] - receive[0])
-    if whole <= 0.0:
-        return None
-    near = max(1, int(places.size * min(0.5, NS / whole)))
     best: float | None = None
-    for lag in (near, places.size // 2):
-        passed = (receive[lag:] - receive[:-lag]).astype(np.float64)
-        counted = (stamp[lag:] - stamp[:-lag]).astype(np.float64)
-        use = passed > 0
-        if not use.any():
+    size = int(series.good.sum())
+    for lag in (_lag_of(series, 1.0), size // 2):
+        pairs = _pairs(series, lag)
+        if pairs is None:
             continue
-        best = float(np.median(counted[use] / passed[use]))
-        if abs(float(np.median(counted[use]))) >= 50.0 and passed[use].max() > 2e8:
+        counted, passed = pairs
+        best = float(np.median(counted / passed))
+        if abs(float(np.median(counted))) >= 50.0 and passed.max() > 2e8:
             return best
     return best
+
+
+def _rates(series: Series) -> list[float]:
+    """The same over stretches of a second, of five, of a quarter and of half of the log."""
+    size = int(series.good.sum())
+    lags = {_lag_of(series, 1.0), _lag_of(series, 5.0), size // 4, size // 2}
+    found = [pairs for lag in sorted(lags) if (pairs := _pairs(series, lag)) is not None]
+    return [float(np.median(counted / passed)) for counted, passed in found]
+
+
+def _lag_of(series: Series, stretch_s: float) -> int:
+    """Messages of so many seconds; fewer where stamps fall all the time, as a counter's do."""
+    places = series.places()
+    assert series.receive is not None
+    whole = float(series.receive[places[-1]] - series.receive[places[0]])
+    lag = int(places.size * min(0.5, stretch_s * NS / whole)) if whole > 0.0 else 1
+    falls = int(np.sum(np.diff(series.stamp[places]) < 0))
+    return max(1, min(lag, places.size // (2 * falls + 2)) if falls > _FEW_FALLS else lag)
+
+
+def _pairs(series: Series, lag: int) -> tuple[Array, Array] | None:
+    """(counted by stamps, passed by receipts) [ns] of messages so far apart, stamps never falling
+    between them; None where these are few."""
+    places = series.places()
+    assert series.receive is not None
+    stamp, receive = series.stamp[places], series.receive[places]
+    if not 0 < lag < places.size:
+        return None
+    falls = np.concatenate([[0], np.cumsum(np.diff(stamp) < 0)])
+    passed = (receive[lag:] - receive[:-lag]).astype(np.float64)
+    use = (passed > 0) & (falls[lag:] == falls[:-lag])
+    if use.sum() < max(1, 0.05 * use.size):
+        use = passed > 0
+    if not use.any():
+        return None
+    counted = (stamp[lag:] - stamp[:-lag]).astype(np.float64)
+    return counted[use], passed[use]
 
 
 def epoch_fault(series: Series) -> StampFault | None:
@@ -121,7 +186,39 @@ def epoch_fault(series: Series) -> StampFault | None:
         return None
     shift, kind, words = found
     return StampFault("epoch_offset", {"seconds": shift, "kind": kind}, None, None,
-                      f"stamps are {middle:.9g} s from their receipts: {words}")  # fmt: skip
+                      f"stamps are {_spoken(middle)} their receipts: {words}")  # fmt: skip
+
+
+def _spoken(ahead_s: float) -> str:
+    """`37.004 s behind`, never with an exponent."""
+    return f"{in_words(abs(ahead_s))} {'before' if ahead_s < 0 else 'after'}"
+
+
+def constant_fault(series: Series, known_s: float) -> StampFault | None:
+    """A constant lag or lead that no transport has and no epoch explains.
+
+    Whole seconds below 15, with a latency below 0.1 s beside: the pulse of another second.  Else a
+    lag beyond 0.6 s is a clock of its own, or a latency that `diagnose` tells from it.
+    """
+    if series.receive is None or not series.good.any():
+        return None
+    late = seconds((series.receive - series.stamp)[series.good]) + known_s
+    least = float(np.percentile(late, 1.0))
+    whole = math.floor(least + 1e-4)
+    apart = in_words(abs(least - whole))
+    if 0 < abs(whole) < LARGE_SLIP_S and least - whole < _WHOLE_LATENCY_S:
+        side = "before" if whole > 0 else "after"
+        return StampFault(
+            "whole_second_slip", {"seconds": float(-whole), "count": float(late.size)}, None, None,
+            f"every stamp lies {abs(whole)} s {side} its receipt, but for {apart}",
+        )  # fmt: skip
+    if least <= MOST_LATENCY_S:
+        return None
+    return StampFault(
+        "epoch_offset", {"seconds": -least, "kind": "unknown"}, None, None,
+        f"even the fastest receipts come {in_words(least)} after their stamps: more than transport "
+        "takes, a clock that was set wrong or a latency to be known",
+    )  # fmt: skip
 
 
 def _fits(middle: float, shift: float, late: float = MOST_LATENCY_S) -> bool:
@@ -170,12 +267,24 @@ def _far(
 
 
 def _counted(stamp: np.ndarray, receive: np.ndarray) -> tuple[str, str] | None:
-    since = (seconds(receive) - GPS_EPOCH_S + LEAP_S, seconds(receive))
-    for period, kind, words in _COUNTED:
+    since = {"gps": seconds(receive) - GPS_EPOCH_S + LEAP_S, "utc": seconds(receive)}
+    for period, clocks, kind, words in _COUNTED:
         if float(stamp.max()) / NS >= 1.2 * period or stamp.min() < 0:
             continue
-        for clock in since:
-            off = (seconds(stamp) - clock + period / 2) % period - period / 2
+        for clock in clocks:
+            off = (seconds(stamp) - since[clock] + period / 2) % period - period / 2
             if _fits(float(np.median(off)), 0.0, 1.0):
                 return kind, words
-    return None
+    return _local_day(stamp, receive)
+
+
+def _local_day(stamp: np.ndarray, receive: np.ndarray) -> tuple[str, str] | None:
+    """Seconds of the day of a time zone."""
+    if float(stamp.max()) / NS >= 1.2 * DAY_S or stamp.min() < 0:
+        return None
+    off = float(np.median((seconds(stamp) - seconds(receive)) % DAY_S))
+    quarters = round((off + 0.5 * MOST_LATENCY_S) / _QUARTER_S)
+    if not _fits(off, quarters * _QUARTER_S):
+        return None
+    hours = (quarters / 4 + 12.0) % 24.0 - 12.0
+    return "day_seconds", f"stamps are seconds of the day of a time zone, {hours:+g} h from UTC"

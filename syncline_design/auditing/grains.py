@@ -22,6 +22,7 @@ _FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _MOST_MOMENTS: Final = 200_000
 _LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
 _COHERENT: Final = 0.75
+_COARSE_STEPS: Final = 3.0
 _EVENLY: Final = 0.25  # scatter of the distance between skips
 _BUNCHED: Final = 0.25  # share of neighbours that come together
 _TOGETHER: Final = 0.1  # of the mean interval
@@ -52,21 +53,25 @@ def truncated(series: Series, pace: Cadence, file_step_ns: float) -> Grain | Non
         rest = np.minimum(rest, grain - rest)
         if float(np.mean(rest <= ROUNDING_NS)) < 0.995:
             continue
-        if not _alternates(stamp, grain) or _ticks(stamp, grain) or _epochs(series, pace, grain):
+        if not _alternates(series, pace, grain) or _ticks(stamp, grain):
+            return None
+        if _in_bunches(series, pace, grain):
             return None
         return _grain(series, pace, grain)
     return None
 
 
-def _epochs(series: Series, pace: Cadence, grain: int) -> bool:
-    """Whether messages of one coarse stamp also come together: several of one epoch."""
+def _in_bunches(series: Series, pace: Cadence, grain: int) -> bool:
+    """Whether messages of one coarse stamp also come together, and others apart: packets, or
+    several messages of one epoch."""
     same = np.diff(series.stamp[pace.places]) == 0
-    if grain <= _FINE or float(np.mean(same)) < 0.2:
+    if float(np.mean(same)) < 0.2:
         return False
     if series.receive is None:
-        return True
+        return grain > _FINE
     passed = np.diff(series.receive[pace.places])
-    return float(np.median(passed[same])) < 0.3 * float(passed.mean())
+    together = float(np.median(passed[same])) < 0.3 * float(passed.mean())
+    return together and (grain > _FINE or float(np.median(passed[~same])) > 0.5 * grain)
 
 
 def _ticks(stamp: np.ndarray, grain: int) -> bool:
@@ -75,8 +80,10 @@ def _ticks(stamp: np.ndarray, grain: int) -> bool:
     return any(t > grain and not np.any((stamp - stamp[0]) % t) for t in timers)
 
 
-def _alternates(stamp: np.ndarray, grain: int) -> bool:
-    counts = np.round(np.diff(stamp) / grain)
+def _alternates(series: Series, pace: Cadence, grain: int) -> bool:
+    """Whether intervals of neighbours lie on both sides of a rhythm that is not the grid's."""
+    counts = np.round(np.diff(series.stamp[pace.places]) / grain)
+    counts = counts[np.diff(pace.places) == 1]  # over messages that were left out none is odd
     if np.count_nonzero(counts) < _LEAST_STEPS:
         return False
     values, often = np.unique(counts, return_counts=True)
@@ -85,8 +92,27 @@ def _alternates(stamp: np.ndarray, grain: int) -> bool:
         return True
     near = (np.abs(counts - usual) <= 1) & (counts != usual)
     if usual == 1:  # of 0 and 2 grains beside 1: duplicates and losses, unless they come evenly
-        return skips_evenly(counts) or (grain <= _FINE and _evenly(np.flatnonzero(counts == 0)))
+        slower = skips_evenly(counts) and not _lost(series, pace, counts, grain)
+        return slower or (grain <= _FINE and _evenly(np.flatnonzero(counts == 0)))
     return int(np.sum(near & (counts % usual != 0))) >= 3
+
+
+def _lost(series: Series, pace: Cadence, counts: Array, grain: int) -> bool:
+    """Whether ticks are left out because messages are missing, not because the sensor is slower.
+
+    The stamps of a slower sensor lie ever further before its receipts until a tick is left out;
+    where messages are lost, those around the hole are as late as all others.
+    """
+    if series.receive is None or counts.size != pace.places.size - 1:
+        return False
+    late = (series.receive - series.stamp)[pace.places]
+    skips = np.flatnonzero(counts == 2)
+    skips = skips[(skips > 1) & (skips < counts.size - 2)]
+    if not skips.size:
+        return False
+    before = np.minimum(late[skips], late[skips - 1])
+    after = np.minimum(late[skips + 1], late[skips + 2])
+    return abs(float(np.median(before - after))) < 0.4 * grain
 
 
 def skips_evenly(counts: Array) -> bool:
@@ -120,7 +146,7 @@ def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
     return Grain(fault, size, same > 0)
 
 
-def packetised(series: Series, pace: Cadence) -> Grain | None:
+def packetised(series: Series, pace: Cadence, file_step_ns: float = 1.0) -> Grain | None:
     """Stamps that come in bunches, or on the grid of a timer with a phase of its own.
 
     Without receipts only of the one timer that no scheduler has: a task of a flight controller
@@ -130,6 +156,8 @@ def packetised(series: Series, pace: Cadence) -> Grain | None:
     if stamp.size < 40:
         return None
     found = _packetised(series, pace, stamp)
+    if found is not None and found.size_s * NS < _COARSE_STEPS * file_step_ns:
+        return None  # ticks of what the file keeps
     known = found is not None and found.size_s == FTDI_S
     return found if series.receive is not None or known else None
 
@@ -160,8 +188,10 @@ def _bunches(
     timer = best_timer(heads)
     if timer is None and (sizes.mean() < 1.8 or spread(apart) > 0.5 * np.median(apart)):
         return None  # messages that wait for one another
-    if constant and int(size[int(np.argmax(often))]) > 1 and timer not in (0.016, 0.008, 0.004):
-        return None  # several messages of one epoch, as designed
+    usual = int(size[int(np.argmax(often))])
+    alike = float(np.mean(interval[together] == 0.0)) > 0.9
+    if constant and usual == 2 and not alike and timer not in (0.016, 0.008, 0.004):
+        return None  # pairs, as designed
     grid = timer if timer is not None else float(np.median(apart))
     return _packets(series, interval, grid, timer is not None, float(sizes.mean()), pace)
 
@@ -169,11 +199,12 @@ def _bunches(
 def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain | None:
     """A slow stream: every stamp is a tick of the timer, its intervals alternate."""
     about = about_rhythm(when)
-    if about is None:
-        return None
+    neighbours = interval[np.diff(pace.places) == 1]
+    if about is None or np.ptp(neighbours) < 0.25 * min(TIMERS):
+        return None  # of one length: no sensor that a timer delays
     usual = float(np.median(interval[interval > 0.0]))
     period = float(interval[interval < 2.5 * usual].mean())
-    beat = _beat(interval)
+    beat = _beat(pace, interval)
     if beat is not None:
         return _packets(series, interval, beat, True, 1.0, pace)
     uneven = float(np.percentile(about, 95) - np.percentile(about, 5))
@@ -185,8 +216,9 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
     return _packets(series, interval, timer, True, 1.0, pace)
 
 
-def _beat(interval: Array) -> float | None:
+def _beat(pace: Cadence, interval: Array) -> float | None:
     """The timer of a sensor that is a little slower than it: now and then a tick stays empty."""
+    interval = interval[np.diff(pace.places) == 1]
     for timer in TIMERS:
         counts = np.round(interval / timer)
         one = interval[counts == 1]

@@ -31,6 +31,7 @@ _PENALTY: Final = {
 _EXTRA: Final = 0.004  # of what a shape explains: its freedom also fits what is nearly right
 _STEP_SHARE: Final = 0.25  # of the delays' spread: smaller steps are not named
 _DRIFT_SHARE: Final = 0.4  # of the delays' spread, over the whole log
+_LEAST_RUN_S: Final = 2e-5  # over the log: hosts that are disciplined wander by as much
 _KNOTS: Final = 36
 _SETTLINGS: Final = (0.01, 0.02, 0.04, 0.08, 0.16)  # of the log
 
@@ -113,6 +114,7 @@ def shapes_of(blocks: Blocks, *, least_s: float = 0.0) -> tuple[Shape, ...]:
 
 def _believed(shape: Shape, blocks: Blocks, least_s: float) -> bool:
     share = _DRIFT_SHARE if shape.kind == "drift" else _STEP_SHARE
+    least_s = max(least_s, _LEAST_RUN_S if shape.kind in ("drift", "bend") else 0.0)
     floor = max(share * blocks.spread_s, least_s, SURE * shape.sigma_s)
     return abs(shape.size_s) > floor and (
         shape.kind in ("drift", "bend", "step") or _seen(shape, blocks)
@@ -297,6 +299,8 @@ def polished(
     curved = [k for k, s in enumerate(shapes) if s.kind in ("relock", "holdover")]
     use = blocks.usable & ~_straddling(shapes, blocks.time_s, within * blocks.length_s)
     time_s, low = blocks.time_s[use], blocks.low_s[use]
+    if time_s.size < len(shapes) + 3:
+        return shapes
     if not curved:
         return _fitted(time_s, low, shapes, blocks)
     start, scale = _free(shapes, fixed, blocks)
@@ -371,5 +375,5 @@ def smallest(blocks: Blocks) -> tuple[float, float]:
     over = _fitted(time_s, 0.0 * time_s, (drift,), blocks)[0].sigma_s
     return (
         max(SURE * step, _STEP_SHARE * blocks.spread_s),
-        max(SURE * over, _DRIFT_SHARE * blocks.spread_s),
+        max(SURE * over, _DRIFT_SHARE * blocks.spread_s, _LEAST_RUN_S),
     )

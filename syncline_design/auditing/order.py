@@ -10,19 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.auditing.result import Consequence, StampFault
-from syncline_design.auditing.series import NS, Mask, Series, seconds
+from syncline_design.auditing.series import NS, Mask, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import UNSET
 
-# where counters of devices begin anew [ns]: 16, 24, 31 and 32 bits of ns, us, ms and 10 us
-_BITS: Final = tuple(
-    2**bits * unit for bits in (16, 24, 31, 32) for unit in (1, 1000, 10_000, 1_000_000)
-)
-_CALENDAR: Final = tuple(int(s * NS) for s in (60, 3600, 43_200, 86_400, 604_800))
-WRAPS: Final = tuple(sorted(w for w in {*_BITS, *_CALENDAR} if w > 100_000_000))
 WEEK_NS: Final = 604_800 * 10**9
-BACK_NS: Final = 100_000  # receipts of several threads may be written out of order by less
-MOST_SETS: Final = 20  # times that a clock is set in a log; more are another disorder
+BACK_NS: Final = 100_000  # no clock is set by less
+LARGE_SET_NS: Final = 5 * 10**8  # told without messages to compare
+MOST_SETS: Final = 20  # times that a clock is set in a log
+MOST_TRIED: Final = 2000  # falls of receipts that are looked at one by one
+MOST_MOVED: Final = 50  # messages that one may be written too late by
 LONGEST_SPIKE: Final = 5  # messages that go back and return
+LEAST_SLIP: Final = 3  # messages
 MOST_SPIKES: Final = 100_000
 
 
@@ -77,119 +75,113 @@ def _runs_of(mask: Mask) -> Iterator[tuple[int, int]]:
     return ((int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True))
 
 
+def in_order_of_receipt(series: Series) -> Series:
+    """Messages that were written out of order, with both their times, put in order again."""
+    if series.receive is None or not np.any(np.diff(series.receive) < 0):
+        return series
+    known = np.where(series.receive == UNSET, np.maximum.accumulate(series.receive), series.receive)
+    order = np.argsort(known, kind="stable")
+    before, after = (
+        _falls(series.stamp[series.good]),
+        _falls(series.stamp[order][series.good[order]]),
+    )
+    if after >= before or _largest_move(order) > MOST_MOVED:
+        return series
+    return replace(series, stamp=series.stamp[order], receive=series.receive[order],
+                   good=series.good[order])  # fmt: skip
+
+
+def _falls(stamp: NDArray[np.int64]) -> int:
+    return int(np.sum(np.diff(stamp) < 0))
+
+
+def _largest_move(order: NDArray[np.intp]) -> int:
+    return int(np.max(np.abs(order - np.arange(order.size))))
+
+
 def with_receipts_forward(series: Series) -> Repaired:
-    """Receipts that go back: the recorder's clock was set back, for every message from there on."""
+    """Receipts that go back.
+
+    Where all later ones stay back the recorder's clock was set.  Else some were noted out of order,
+    as several threads do: no fault, they count as received no earlier than the one before.
+    """
     if series.receive is None or series.receive.size < 3:
         return Repaired(series)
     change = np.diff(series.receive)
-    falls = np.flatnonzero((change < -BACK_NS) & series.good[1:] & series.good[:-1])
-    if not falls.size or falls.size > MOST_SETS:
+    falls = np.flatnonzero((change < 0) & series.good[1:] & series.good[:-1])
+    if not falls.size:
         return Repaired(series)
+    moved, faults = _sets(series, change, falls) if falls.size <= MOST_TRIED else (0, [])
+    put_back = replace(series, receive=series.receive + moved)
+    return Repaired(_without_disorder(put_back), tuple(faults))
+
+
+def _sets(
+    series: Series, change: NDArray[np.int64], falls: NDArray[np.intp]
+) -> tuple[NDArray[np.int64], list[StampFault]]:
+    """By how much receipts are behind after their clock was set back, and each time it was."""
     usual = int(np.median(change))
-    moved = np.zeros(series.receive.size, np.int64)
-    faults = []
+    moved = np.zeros(series.stamp.size, np.int64)
+    faults: list[StampFault] = []
     times = series.seconds
-    for fall in falls:
+    for fall in falls[change[falls] < -BACK_NS]:
         size = _set_back(series, int(fall), usual - int(change[fall]))
+        if size is None or len(faults) >= MOST_SETS:
+            continue
         moved[fall + 1 :] += size
         faults.append(StampFault(
             "recorder_clock", {"seconds": size / NS, "kind": "step"}, float(times[fall]),
             float(times[-1]),
-            f"receipts go back by {-int(change[fall]) / NS:.6g} s: the recorder's clock was set",
+            f"receipts go back by {in_words(-int(change[fall]) / NS)} and stay behind: the "
+            "recorder's clock was set",
         ))  # fmt: skip
-    return Repaired(replace(series, receive=series.receive + moved), tuple(faults))
+    return moved, faults
 
 
-def _set_back(series: Series, fall: int, about: int) -> int:
-    """By how much [ns]: the medians of receipt minus stamp before and after, where they agree."""
+def _set_back(series: Series, fall: int, about: int) -> int | None:
+    """By how much [ns], as messages before and after differ in lateness; None where it passes.
+
+    about: the fall itself and the usual interval; single delays are in it.
+    """
     assert series.receive is not None
     late = series.receive - series.stamp
-    before = late[max(0, fall - 60) : fall + 1][series.good[max(0, fall - 60) : fall + 1]]
-    after = late[fall + 1 : fall + 61][series.good[fall + 1 : fall + 61]]
-    if before.size < 10 or after.size < 10:
-        return about
-    size = int(np.median(before) - np.median(after))
-    return size if abs(size - about) < 0.2 * about else about
+    sizes = []
+    for around in (60, 300):
+        low, high = max(0, fall - around + 1), fall + 1 + around
+        before = late[low : fall + 1][series.good[low : fall + 1]]
+        after = late[fall + 1 : high][series.good[fall + 1 : high]]
+        if min(before.size, after.size) < 4:
+            return about if about > LARGE_SET_NS else None
+        scattered = max(spread(before.astype(np.float64)), spread(after.astype(np.float64)))
+        size = float(np.median(before) - np.median(after))
+        sure = 5.0 * scattered / np.sqrt(min(before.size, after.size))
+        if size < max(0.5 * about - scattered, sure, 0.2 * about):
+            return None
+        sizes.append(size)
+    return round(sizes[0])
 
 
-def unwrapped(series: Series) -> Repaired:
-    """Counters made continuous.
-
-    A wrap: the stamp falls by the counter's range (known, or the same at every fall) against the
-    receipt, and stays inside that range.
-    """
+def _without_disorder(series: Series) -> Series:
+    """Receipts that never fall; a message that would have come before all others of its time,
+    measured by how late it is, is left out."""
+    assert series.receive is not None
     places = series.places()
-    stamp = series.stamp[places]
-    change = np.diff(stamp)
-    falls = np.flatnonzero(change < 0)
+    receive = series.receive[places]
+    falls = np.flatnonzero(np.diff(receive) < 0)
     if not falls.size:
-        return Repaired(series)
-    expected = _expected(series, places)
-    fallen = (expected - change)[falls]
-    tolerance = _tolerance(change - expected)
-    found = _range(fallen, tolerance, stamp)
-    if found is None:
-        return Repaired(series)
-    wrap, matching = found
-    turns = np.zeros(stamp.size, np.int64)
-    turns[falls[matching] + 1] = 1
-    whole = series.stamp.copy()
-    whole[places] = stamp + np.cumsum(turns) * wrap
-    times = series.seconds[places]
-    at = times[falls[matching] + 1]
-    count = int(matching.sum())
-    said = "once" if count == 1 else f"{count} times, each time"
-    back = Consequence("backward_jump", {"count": float(count), "seconds": -wrap / NS},
-                       "the stamp goes back where the counter begins anew")  # fmt: skip
-    fault = StampFault(
-        "counter_wrap", {"wrap_s": wrap / NS, "count": float(count)}, float(at[0]), float(at[-1]),
-        f"stamps fall by {wrap / NS:.9g} s {said} while receipts go on"
-        + (f": {_words(wrap)}" if _words(wrap) else ""),
-        (back,),
-    )  # fmt: skip
-    return Repaired(replace(series, stamp=whole), (fault,))
-
-
-def _expected(series: Series, places: NDArray[np.intp]) -> NDArray[np.int64]:
-    """How far each stamp should be from the one before: as receipts, else the median interval."""
-    if series.receive is not None:
-        return np.diff(series.receive[places])
-    change = np.diff(series.stamp[places])
-    return np.full(change.size, int(np.median(change)), np.int64)
-
-
-def _tolerance(excess: NDArray[np.int64]) -> float:
-    usual = np.abs(excess[np.abs(excess) < np.quantile(np.abs(excess), 0.98) + 1])
-    return max(1e6, 4.0 * float(usual.max(initial=0)))
-
-
-def _range(
-    fallen: NDArray[np.int64], tolerance: float, stamp: NDArray[np.int64]
-) -> tuple[int, Mask] | None:
-    """The range of a counter whose falls these are, and which of the falls are its wraps."""
-    for wrap in WRAPS:
-        matching = np.abs(fallen - wrap) < min(tolerance, 0.05 * wrap)
-        inside = bool(np.all((stamp >= 0) & (stamp < wrap)))
-        odd = wrap not in _CALENDAR and wrap > 4 * NS and bool(matching.all())
-        if matching.any() and (inside or odd):
-            return wrap, matching
-    size = int(np.median(fallen))
-    same = np.abs(fallen - size) < max(1e3, 1e-6 * size)
-    inside = bool(np.all((stamp >= 0) & (stamp <= size)))
-    if fallen.size > 1 and same.all() and inside and size > 0:
-        return size, same
-    return None
-
-
-def _words(wrap: int) -> str:
-    units = ((1, "ns"), (1000, "us"), (10_000, "10 us"), (1_000_000, "ms"))
-    for bits in (16, 24, 31, 32):
-        for unit, name in units:
-            if 2**bits * unit == wrap:
-                return f"{bits} bits of {name}"
-    names = {60: "a minute", 3600: "an hour", 43_200: "half a day", 86_400: "a day",
-             604_800: "a week"}  # fmt: skip
-    return names.get(round(wrap / NS), "") if wrap in _CALENDAR else ""
+        return series
+    late = receive - series.stamp[places]
+    good = series.good.copy()
+    for fall in falls[:MOST_SPIKES]:
+        around = np.concatenate([late[max(0, fall - 60) : fall], late[fall + 2 : fall + 61]])
+        if around.size >= 8:
+            low, middle = np.percentile(around, [0.0, 50.0])
+            if late[fall + 1] < low - 0.5 * (middle - low):
+                good[places[fall + 1]] = False
+    whole = series.receive.copy()
+    left = np.flatnonzero(good)
+    whole[left] = np.maximum.accumulate(whole[left])
+    return replace(series, receive=whole, good=good)
 
 
 def without_duplicates(series: Series) -> Repaired:
@@ -232,7 +224,7 @@ def without_spikes(series: Series) -> Repaired:
     count, deepest = 0, 0
     for fall in falls[:MOST_SPIKES]:
         span = _spike(stamp, int(fall), out)
-        if span is None or not _returns(late, span):
+        if span is None or not _returns(late, span) or _is_whole(late, span):
             continue
         span = _with_partner(late, span)
         count += 1
@@ -284,6 +276,18 @@ def _returns(late: NDArray[np.float64], span: slice) -> bool:
         return True
     away = abs(float(np.median(late[span])) - float(np.median(before)))
     return abs(float(np.median(after)) - float(np.median(before))) < 0.5 * away
+
+
+def _is_whole(late: NDArray[np.float64], span: slice) -> bool:
+    """Whether some messages in a row are whole seconds off, all by the same: a slip."""
+    around = np.concatenate(
+        [late[max(0, span.start - 8) : span.start], late[span.stop : span.stop + 8]]
+    )
+    if span.stop - span.start < LEAST_SLIP or not around.size:
+        return False
+    away = late[span] - float(np.median(around))
+    whole = round(float(np.median(away)))
+    return whole != 0 and float(np.max(np.abs(away - whole))) < max(0.05, 3.0 * spread(around))
 
 
 def _with_partner(late: NDArray[np.float64], span: slice) -> slice:

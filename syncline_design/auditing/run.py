@@ -19,6 +19,7 @@ from syncline_design.auditing.result import (
     StampNames,
     StreamAudit,
 )
+from syncline_design.auditing.series import in_words
 from syncline_design.auditing.stream import Examined, examined, is_receipt
 from syncline_design.auditing.together import held_together
 from syncline_design.logs.readers import open_recording
@@ -188,7 +189,7 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
     if names & {"stamped_on_arrival", "packetised"}:
         said.append("how long the data were on their way before they were stamped")
     elif one.constant_s is not None and one.constant_s > 0.0:
-        apart = f"{one.constant_s * 1e3:.4g} ms"
+        apart = in_words(one.constant_s)
         said.append(f"its constant latency: the fastest receipts come {apart} after their stamps, "
                     "which is latency or a clock's offset")  # fmt: skip
     else:

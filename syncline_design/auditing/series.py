@@ -56,6 +56,16 @@ def seconds(whole: Nanoseconds) -> Array:
     return whole / NS
 
 
+def in_words(length_s: float) -> str:
+    """A length of time without exponents: `12.5 us`, `4.2 ms`, `1760000000.014 s`."""
+    size = abs(length_s)
+    for unit, factor in (("ns", 1e9), ("us", 1e6), ("ms", 1e3)):
+        if size * factor < 999.95 and (size > 0.0 or unit == "ms"):
+            return f"{length_s * factor:.4g} {unit}"
+    digits = 3 if size >= 10.0 else 4
+    return f"{length_s:.{digits}f}".rstrip("0").rstrip(".") + " s"
+
+
 def spread(values: Array) -> float:
     """Interquartile range; 0 of nothing."""
     if not values.size:

@@ -9,18 +9,19 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
+from syncline_design.auditing import witness
 from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
 from syncline_design.auditing.grains import best_timer
 from syncline_design.auditing.levels import Shape, course, polished, shapes_of
 from syncline_design.auditing.result import Consequence, StampFault
-from syncline_design.auditing.series import NS, Array, Series, seconds, spread
+from syncline_design.auditing.series import NS, Array, Series, in_words, seconds, spread
+from syncline_design.auditing.witness import Side
 
-Side = Literal["stamp", "receipt", "unknown"]
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip
 _TRANSPORT_S: Final = 0.05
@@ -192,11 +193,12 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
         judged = [(shape, side) for shape, side in judged if side == "stamp"]
     found, sides = tuple(shape for shape, _ in judged), [side for _, side in judged]
     found = polished(found, [side == "stamp" for side in sides], blocks)
-    wander = float(np.ptp(course(tuple(s for s in found if s.kind in ("drift", "bend")), time_s)))
-    own = tuple(
-        s for s, side in zip(found, sides, strict=True)
-        if side == "stamp" or (side == "unknown" and not _may_be_wander(s, wander))
-    )  # fmt: skip
+    count = witness.witness_of(series, pace, blocks)
+    sides = witness.sides(count, found, sides)
+    own = _own(found, sides, time_s, late, blocks)
+    if len(own) < len(found):  # without what is transport, sizes are others
+        own = polished(own, [True] * len(own), blocks)
+    own = witness.simplest(count, own, blocks)
     whole = series.stamp.copy()
     whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
     faults = tuple(_all_named(own, time_s))
@@ -205,6 +207,26 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
         for s, side in zip(found, sides, strict=True) if s.kind in ("step", "episode")
     )  # fmt: skip
     return Shifts(replace(series, stamp=whole), faults, shifts, blocks)
+
+
+def _own(
+    found: tuple[Shape, ...], sides: Sequence[Side], time_s: Array, late: Array, blocks: Blocks
+) -> tuple[Shape, ...]:
+    """What is the stamps' own: seen in their rhythm, or such as no transport does."""
+    if not found:
+        return ()
+    drift, bends = witness.drifts(found, sides, blocks)
+    wander = float(np.ptp(course(tuple(s for s in found if s.kind in ("drift", "bend")), time_s)))
+    kept = []
+    for shape, side in zip(found, sides, strict=True):
+        if side == "stamp":
+            kept.append(shape)
+        elif shape.kind == "drift" or shape.kind == "bend":
+            kept += [shape] if (drift if shape.kind == "drift" else bends) else []
+        elif side == "unknown" and shape.kind in ("step", "episode"):
+            level = witness.sharp(shape, time_s, late)
+            kept += [shape] if level and not _may_be_wander(shape, wander) else []
+    return tuple(kept)
 
 
 def _placed(shape: Shape, time_s: Array, late: Array, blocks: Blocks) -> Shape:
@@ -340,8 +362,8 @@ def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
         parameters |= {"kind": "wandering", "ppm_low": float(rate.min()),
                        "ppm_high": float(rate.max())}  # fmt: skip
         words += f" in the mean, between {rate.min():+.3g} and {rate.max():+.3g} ppm"
-    span = float(np.ptp(moved)) * 1e3
-    words += f": {span:.4g} ms over the log, {sure:.3g} times its uncertainty"
+    span = in_words(float(np.ptp(moved)))
+    words += f": {span} over the log, {sure:.3g} times its uncertainty"
     return StampFault("drift", parameters, None, None, words)
 
 
@@ -354,14 +376,18 @@ def _named(shape: Shape, time_s: Array) -> StampFault:
         lasts = "and stay so" if shape.kind == "step" else f"until {stop:.4g} s"
         return StampFault(
             "step", {"seconds": size}, shape.begin_s, stop,
-            f"stamps move by {size * 1e3:+.4g} ms against receipts {lasts}, {sure}",
+            f"stamps move by {_signed(size)} against receipts {lasts}, {sure}",
         )  # fmt: skip
     away = "drift away and settle" if shape.kind == "holdover" else "jump and settle"
     stop = min(end, shape.end_s + 5.0 * shape.settle_s)
     return StampFault(
         "relock", {"seconds": size, "settling_s": shape.settle_s}, shape.begin_s, stop,
-        f"stamps {away} again: {size * 1e3:+.4g} ms, time constant {shape.settle_s:.3g} s",
+        f"stamps {away} again: {_signed(size)}, time constant {shape.settle_s:.3g} s",
     )  # fmt: skip
+
+
+def _signed(size_s: float) -> str:
+    return f"{'+' if size_s >= 0 else '-'}{in_words(abs(size_s))}"
 
 
 def common(shifts: Sequence[Shift]) -> float:

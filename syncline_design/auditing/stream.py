@@ -10,12 +10,14 @@ import numpy as np
 from syncline_design.auditing import arrival, grains, order
 from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import Cadence, cadence, level_scatter, missing
+from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.envelope import above_floor
-from syncline_design.auditing.epochs import epoch_fault, in_one_unit
+from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
 from syncline_design.auditing.levels import smallest
 from syncline_design.auditing.result import (
     Consequence,
     EnvelopePoint,
+    FaultName,
     ResidualTime,
     SmallestSeen,
     StampFault,
@@ -27,7 +29,6 @@ from syncline_design.machine.deadline import in_force
 
 RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
 _SAMPLE: Final = 100_000  # messages that tell a resolution
-LARGE_SLIP_S: Final = 15.0  # from here on another epoch, no pulse of the wrong second
 EDGE_S: Final = 1.5  # how near to the end of a shift a repeated stamp is its own
 TRACE_POINTS: Final = 240
 _NONE: Final = Stamps("", None, np.zeros(0, np.int64))
@@ -58,9 +59,9 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     in_force().check()
     stamps = stream.stamps
     assert stamps is not None
-    raw = series_of(stamps.primary_ns, _receipts(stamps), start)
+    raw = order.in_order_of_receipt(series_of(stamps.primary_ns, _receipts(stamps), start))
     found: list[StampFault] = []
-    series, unit, step_ns = _ordered(raw, found)
+    series, unit, step_ns = _ordered(raw, found, stamps.primary_factor)
     grain = _grain(series, step_ns, found)
     arrived = None if grain else arrival.stamped_on_arrival(series, cadence(series))
     if arrived is not None:
@@ -99,15 +100,18 @@ def is_receipt(name: str | None) -> bool:
     return name is not None and name.replace("_", " ").lower().startswith(RECEIVED)
 
 
-def _ordered(raw: Series, found: list[StampFault]) -> tuple[Series, StampFault | None, float]:
+def _ordered(
+    raw: Series, found: list[StampFault], factor: float
+) -> tuple[Series, StampFault | None, float]:
     """Unset stamps left out, one unit, counters continuous."""
     series = _take(order.without_unset(raw), found)
     series = _take(order.with_receipts_forward(series), found)
-    unit = in_one_unit(series)
+    unit = in_one_unit(series, factor)
     if unit.fault is not None:
         found.append(unit.fault)
-    series = _take(order.unwrapped(unit.series), found)
-    return series, unit.fault, unit.step_ns
+    whole = unwrapped(unit.series)
+    found += whole.faults
+    return whole.series, unit.fault, unit.step_ns
 
 
 def _take(repaired: order.Repaired, found: list[StampFault]) -> Series:
@@ -116,8 +120,9 @@ def _take(repaired: order.Repaired, found: list[StampFault]) -> Series:
 
 
 def _grain(series: Series, step_ns: float, found: list[StampFault]) -> grains.Grain | None:
+    series = without_slips(series, None).series  # whole seconds are no whole number of ticks
     pace = cadence(series)
-    grain = grains.truncated(series, pace, step_ns) or grains.packetised(series, pace)
+    grain = grains.truncated(series, pace, step_ns) or grains.packetised(series, pace, step_ns)
     if grain is not None:
         found.append(grain.fault)
     return grain
@@ -242,15 +247,7 @@ def _last(
         arrived = arrival.stamped_on_arrival(series, pace)
         found += [arrived] if arrived is not None else []
     if known is not None:
-        ahead = arrival.ahead(series, known, grain.size_s if grain else _coarse(series))
-        moves = names & {
-            "drift",
-            "step",
-            "relock",
-            "recorder_clock",
-        }  # where these begin is not known to the last us
-        if ahead is not None and (not moves or ahead.from_s is None):
-            found.append(_as_slip(ahead, series, known))
+        found += _constant(series, known, grain.size_s if grain else _coarse(series), names)
     explained = names & {"whole_second_slip", "counter_wrap", "step", "relock"}
     fall = None if explained else order.remaining_falls(series)
     found += [fall] if fall is not None and "backward_jump" not in names else []
@@ -258,19 +255,17 @@ def _last(
     found += [scan] if scan is not None else []
 
 
-def _as_slip(ahead: StampFault, series: Series, known: float) -> StampFault:
-    """A whole log that is stamped one or two whole seconds late is a slip of its own."""
-    if series.receive is None or ahead.from_s is not None:
-        return ahead
-    late = seconds((series.receive - series.stamp)[series.good]) + known
-    least = float(np.percentile(late, 1.0))
-    slip = round(least - 0.02)
-    if slip not in (-1, -2) or not -1e-4 < least - slip < 0.1:
-        return ahead
-    return StampFault(
-        "whole_second_slip", {"seconds": float(-slip), "count": float(late.size)}, None, None,
-        f"every stamp lies {-slip} s after its receipt, but for {(least - slip) * 1e3:.3g} ms",
-    )  # fmt: skip
+def _constant(
+    series: Series, known: float, resolution_s: float, names: set[FaultName]
+) -> list[StampFault]:  # fmt: skip
+    """A constant without a name, or stamps after their receipts."""
+    constant = constant_fault(series, known)
+    if constant is not None:
+        return [constant]
+    ahead = arrival.ahead(series, known, resolution_s)
+    # where these begin is not known to the last us
+    moves = names & {"drift", "step", "relock", "recorder_clock"}
+    return [ahead] if ahead is not None and (not moves or ahead.from_s is None) else []
 
 
 def _summed(

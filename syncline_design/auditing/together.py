@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import NS, Array, Series
+from syncline_design.auditing.series import NS, Array, Series, in_words
 from syncline_design.auditing.shifts import Shift, common
 from syncline_design.auditing.stream import Examined, without_clock_step
 
@@ -98,7 +98,7 @@ def _with_clock_step(one: Examined, at_s: float, size_s: float, among: int) -> E
     end = float(one.series.seconds[-1])
     fault = StampFault(
         "recorder_clock", {"seconds": -size_s, "kind": "step"}, at_s, end,
-        f"receipts of {among} streams shift by {size_s * 1e3:+.4g} ms at the same time, while "
+        f"receipts of {among} streams shift by {in_words(size_s)} at the same time, while "
         "stamps keep their rhythm: the recorder's clock was set",
     )  # fmt: skip
     return replace(one, faults=(*kept, fault))

@@ -150,4 +150,5 @@ def _stamps(several: Sequence[Stamps | None]) -> Stamps | None:
         known[0].secondary,
         np.concatenate([one.primary_ns for one in known]),
         np.concatenate(seconds) if len(seconds) == len(known) else None,
+        known[0].primary_factor,
     )

@@ -55,6 +55,7 @@ class Facts:
     frame: Frame = "unknown"
     timeline: Timeline = "unknown"
     primary: str = ""
+    primary_factor: float = 1.0
     secondary: str | None = None
     notes: tuple[str, ...] = ()
     of_times: tuple[str, ...] = ()  # notes that only a stream with times needs
@@ -145,7 +146,9 @@ class BatchRecording(ABC):
             whole = len(tally.secondary) == len(tally.primary)
             second = tally.secondary.values() if whole and facts.secondary else None
             label = facts.secondary if second is not None else None
-            stamps = Stamps(facts.primary, label, tally.primary.values(), second)
+            stamps = Stamps(
+                facts.primary, label, tally.primary.values(), second, facts.primary_factor
+            )
         return Stream(
             name=name,
             quantity=facts.quantity,

@@ -21,6 +21,7 @@ from syncline_design.logs.cells import (
 from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts, scaled
 from syncline_design.logs.readers.csv_names import Layout, TimeColumn, layout_of, time_columns
 from syncline_design.logs.readers.decimal_stamps import column as exact_stamps
+from syncline_design.logs.readers.decimal_stamps import power_of
 from syncline_design.logs.readers.epochs import WEEK_NS, WEEK_SECONDS, week_start_ns
 from syncline_design.logs.readers.reader import NO, Head, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, Timeline
@@ -51,6 +52,7 @@ class CsvRecording(BatchRecording):
         self._text: set[int] = set()  # places of columns that hold names, not figures
         self._first_line = -1  # of the first row
         self._calendar = False
+        self._powers: dict[int, int] = {}  # of a thousand, by which a column of times is divided
         self._seen: Nanoseconds = np.zeros(0, dtype=np.int64)
 
     def _demand_times(self) -> None:
@@ -111,7 +113,10 @@ class CsvRecording(BatchRecording):
                 stamps, _ = iso_times(text)
                 found: Nanoseconds = np.where(stamps == NO_TIME, UNSET, stamps)
                 return found
-            return exact_stamps(text, column.unit or self._refuse_bare(column))
+            unit = column.unit or self._refuse_bare(column)
+            if column.place not in self._powers:  # the first block tells
+                self._powers[column.place] = power_of(text, unit)
+            return exact_stamps(text, unit, self._powers[column.place])
         except BadCellError as bad:
             raise self._bad(block, column.place, bad) from None
 
@@ -201,11 +206,24 @@ class CsvRecording(BatchRecording):
             frame=layout.frame,
             timeline=timeline,
             primary=label,
+            primary_factor=1000.0 ** self._power(layout.primary),
             secondary=layout.secondary.name if layout.secondary else None,
-            notes=notes,
+            notes=(*notes, *self._too_large()),
             body="frd" if "attitude" in layout.quantity or "rate" in layout.quantity else "unknown",
             kind="CSV",
         )
+
+    def _power(self, column: TimeColumn | None) -> int:
+        return self._powers.get(column.place, 0) if column is not None else 0
+
+    def _too_large(self) -> tuple[str, ...]:
+        """Columns whose figures are too large for their unit, and what they were divided by."""
+        columns = (self._layout.primary, self._layout.secondary)
+        return tuple(
+            f"{c.name} holds figures too large for times in {c.unit}: read as if a unit 1e"
+            f"{3 * power} smaller"
+            for c in columns if c is not None and (power := self._power(c))
+        )  # fmt: skip
 
     def _timeline(self) -> tuple[Timeline, str, tuple[str, ...]]:
         """Of the names of the columns, else of the size of the stamps."""

@@ -21,10 +21,12 @@ if TYPE_CHECKING:
 PLAIN = r"^\+?(-?)(\d{1,18})(?:[.,](\d{0,9})(\d*))?$"
 DIGITS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 MOST = 2**63
+_LOOKED_AT = 200  # figures that tell a column's unit
+MOST_POWER = 3  # of a thousand: nanoseconds in a column of seconds
 
 
-def nanoseconds(text: str | bytes, unit: str = "s") -> int:
-    """One figure as nanoseconds, rounded half to even; ValueError where it is none.
+def nanoseconds(text: str | bytes, unit: str = "s", power: int = 0) -> int:
+    """One figure as nanoseconds over 1000^power, rounded half to even; ValueError where it is none.
 
     What 64 bits do not hold, and what is not finite, is `UNSET`.
     """
@@ -35,19 +37,45 @@ def nanoseconds(text: str | bytes, unit: str = "s") -> int:
         figure = Decimal(written.replace(",", "."))
     except InvalidOperation:
         raise ValueError(f"not a time: {written!r}") from None
-    if not figure.is_finite() or figure.adjusted() > 20:
+    if not figure.is_finite() or figure.adjusted() > 30:
         return UNSET
-    found = int((figure.scaleb(DIGITS[unit])).to_integral_value())
+    found = int((figure.scaleb(DIGITS[unit] - 3 * power)).to_integral_value())
     return found if -MOST <= found < MOST else UNSET
 
 
-def column(text: pl.Series, unit: str) -> Nanoseconds:
-    """A column of figures; empty cells are `UNSET`.  BadCellError where one is no figure."""
+def power_of(text: pl.Series, unit: str) -> int:
+    """By how many thousands most figures have to be divided so that 64 bits hold them.
+
+    0 of times in the unit that the column names; 1 where a column of seconds holds milliseconds
+    since 1970, and so on.  Figures that no unit explains are left to `column`.
+    """
+    given = text.drop_nulls()
+    told = given.filter(given.str.contains("[1-9]"))[:_LOOKED_AT].to_list()  # zeros tell nothing
+    for power in range(MOST_POWER + 1):
+        if 2 * sum(_fits(str(cell), unit, power) for cell in told) > len(told):
+            return power
+    return 0
+
+
+def _fits(cell: str, unit: str, power: int) -> bool:
+    try:
+        return nanoseconds(cell, unit, power) != UNSET
+    except ValueError:
+        return True  # said with its place when the column is read
+
+
+def column(text: pl.Series, unit: str, power: int = 0) -> Nanoseconds:
+    """A column of figures; empty cells are `UNSET`.  BadCellError where one is no figure.
+
+    power: of a thousand, by which all are divided (`power_of`).
+    """
     import polars as pl
 
     parts = text.str.extract_groups(PLAIN).struct.unnest()
     minus, whole, fraction = (parts.to_series(k) for k in range(3))
-    digits = DIGITS[unit]
+    digits = DIGITS[unit] - 3 * power
+    if digits < 0:
+        return _one_by_one(text, unit, power, np.full(len(text), UNSET, np.int64), text.is_null())
     usual = whole.is_not_null() & (whole.str.len_bytes() <= 18 - digits)
     padded = fraction.fill_null("").str.pad_end(9, "0")
     usual &= padded.str.slice(digits).str.replace_all("0", "") == ""
@@ -59,9 +87,16 @@ def column(text: pl.Series, unit: str) -> Nanoseconds:
     found: Nanoseconds = np.where(known, high, 0) * scale + np.where(known, low, 0)
     found = np.where((minus == "-").fill_null(False).to_numpy(), -found, found)
     found = np.where(known, found, np.int64(UNSET))
-    for row in np.flatnonzero(~known & text.is_not_null().to_numpy()):
+    return _one_by_one(text, unit, power, found, pl.Series(known) | text.is_null())
+
+
+def _one_by_one(
+    text: pl.Series, unit: str, power: int, found: Nanoseconds, done: pl.Series
+) -> Nanoseconds:
+    """The figures that are written in another way, or hold more digits than 64 bits."""
+    for row in np.flatnonzero(~done.to_numpy()):
         try:
-            found[row] = nanoseconds(str(text[int(row)]), unit)
+            found[row] = nanoseconds(str(text[int(row)]), unit, power)
         except ValueError:
             expected = "a time in decimals, or nothing"
             raise BadCellError(int(row), str(text[int(row)]), expected) from None

@@ -52,12 +52,15 @@ class Stamps:
 
     primary: what the message says of itself (`header.stamp`), or the recorder's time where it says
     nothing.  secondary: when it arrived (`log time`), None where the file tells one time only.
+    primary_factor: the file's figures, in the unit that it names, are so many times primary_ns;
+    not 1 where 64 bits of nanoseconds do not hold them (milliseconds since 1970 as seconds).
     """
 
     primary: str
     secondary: str | None
     primary_ns: Nanoseconds
     secondary_ns: Nanoseconds | None = None
+    primary_factor: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
