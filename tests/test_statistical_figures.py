@@ -272,7 +272,7 @@ def test_figures_of_a_situation_against_sampling(seed: int) -> None:
         length = np.linalg.norm(rows, axis=0)
         square = math.sqrt(np.mean(length**2))
         sampled = square if wanted.p is None else float(np.quantile(length, wanted.p))
-        found = exact(moments, wanted, len(situations.free))
+        found = exact(moments, wanted, situations.dimensions)
         assert found == pytest.approx(sampled, rel=0.015)
 
 
@@ -287,7 +287,7 @@ def test_no_random_situation_is_worse(seed: int) -> None:
     for k in range(points.shape[1]):
         moments = situations.moments(points[:, k : k + 1], nodes)
         for one in worst:
-            value = exact(moments, one.wanted, len(situations.free))
+            value = exact(moments, one.wanted, situations.dimensions)
             assert value <= one.value_m * 1.01
 
 

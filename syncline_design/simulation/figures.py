@@ -9,11 +9,14 @@ from functools import lru_cache
 
 import numpy as np
 
+from syncline_design.effects import registry
 from syncline_design.effects.record import Array
 from syncline_design.machine.records import Record, optional
+from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.ascent import SYSTEM, chosen
 from syncline_design.simulation.certified import certified_worst_case_m
+from syncline_design.simulation.lattice import POINTS
 from syncline_design.simulation.situations import Situations, ranges_m
 from syncline_design.simulation.statistical import (
     AXES,
@@ -114,7 +117,20 @@ def error_statistics(system: System, seed: int = 0) -> Statistics:
 def worst_case_m(system: System, sensors: float) -> float:
     """Certified worst case [m] with every sensor at so many standard deviations."""
     stages = tuple(_scaled(stage, sensors) for stage in system.stages)
-    return certified_worst_case_m(replace(system, stages=stages))
+    effects = tuple(_wider(one, sensors) for one in system.effects)
+    return certified_worst_case_m(replace(system, stages=stages, effects=effects))
+
+
+def _wider(entry: EffectEntry, factor: float) -> EffectEntry:
+    """An effect that is noise of its own with its standard deviation times a factor."""
+    effect = registry().get(entry.effect)
+    if effect is None or not effect.wanders:
+        return entry
+    parameters = tuple(
+        (name, value * factor if name == "std_m" and not isinstance(value, str) else value)
+        for name, value in entry.parameters
+    )
+    return replace(entry, parameters=parameters)
 
 
 def _scaled(stage: Stage, factor: float) -> Stage:
@@ -178,11 +194,15 @@ def _vector(column: Array) -> Vector:
 
 def _shares(situations: Situations, worst: Worst) -> tuple[VarianceShare, ...]:
     """Each source's part of the mean square to first order, largest first; means are `bias`."""
-    mean, columns = columns_at(situations, worst.point[:, None])
+    point = worst.point[:, None]
+    mean, columns = columns_at(situations, point)
     axes = AXES[worst.wanted.axis]
     parts = {"bias": float(np.sum(mean[0, axes] ** 2))}
-    for source, square in zip(situations.sources(), np.sum(columns[0, axes] ** 2, axis=0),
-                              strict=True):  # fmt: skip
+    squares = np.sum(columns[0, axes] ** 2, axis=0)
+    if situations.drawn:  # they may scale the noise
+        slopes = situations.moments(point, situations.nodes(POINTS)).slopes_m[0, :, axes]
+        squares[: slopes.shape[2]] = np.mean(np.sum(slopes**2, axis=1), axis=0)
+    for source, square in zip(situations.sources(), squares, strict=True):
         parts[source] = parts.get(source, 0.0) + float(square)
     total = math.fsum(parts.values()) or 1.0
     ordered = sorted(parts.items(), key=lambda part: -part[1])

@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from syncline_design.effects.acting import by_stage, departures
+from syncline_design.effects.acting import by_stage
 from syncline_design.effects.record import Array
 from syncline_design.model.lever_arms import position_lever_arm
+from syncline_design.model.roles import ROLES
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation import kernel
 from syncline_design.simulation.ascent import (
@@ -25,8 +26,17 @@ from syncline_design.simulation.ascent import (
     stacked,
 )
 from syncline_design.simulation.chain import SensorSigma, noise_slopes
+from syncline_design.simulation.drawn_effects import (
+    STEP,
+    Drawn,
+    departed,
+    numbers_drawn,
+    wanderers,
+    wandering,
+)
 from syncline_design.simulation.draws import Shifts, generator, lever_arms, stage_shifts
 from syncline_design.simulation.known_effects import Carried, departed_error
+from syncline_design.simulation.lattice import lattice
 from syncline_design.simulation.surroundings import leaning, moment_at, placed_rows
 from syncline_design.simulation.timing_variables import SystemTiming, timing_of
 
@@ -61,6 +71,21 @@ class Situations:
         self.acting = by_stage(system)
         self.blocks = _blocks(system, self.held)
         self.size = self.blocks[-1].rows.stop
+        self.drawn: tuple[Drawn, ...] = ()
+        if self.acting:
+            self.drawn = self._numbers_drawn()
+
+    def _numbers_drawn(self) -> tuple[Drawn, ...]:
+        """What the effects that scatter draw for each sample."""
+        found: list[Drawn] = []
+        point = at_length_one(self.blocks, np.ones((self.size, 1)))
+        self._run(point, self.steps()[:, :1], None, found)
+        return tuple(found)
+
+    @property
+    def dimensions(self) -> int:
+        """How many independent variables there are besides the sensors' noise."""
+        return len(self.free) + len(self.drawn)
 
     @property
     def linear(self) -> bool:
@@ -74,24 +99,32 @@ class Situations:
         return (widest + max(means) - min(means)) * fastest < _LINEAR_RAD
 
     def errors_m(self, point: Array, nodes: Array) -> Array:
-        """The error without noise at points (p, n), each at all nodes: (n, M, 3)."""
+        """The error without noise of sensors at points (p, n), each at all nodes: (n, M, 3)."""
         return self._run(point, nodes, None)
 
     def moments(self, point: Array, nodes: Array) -> Moments:
-        """The error at points (p, n), each at all nodes (free variables, M) [s]."""
+        """The error at points (p, n), each at all nodes (dimensions, M)."""
         slopes: list[Array] = []
         mean = self._run(point, nodes, slopes)
         return Moments(mean, np.concatenate(slopes, axis=2).reshape(*mean.shape, -1))
 
-    def _run(self, point: Array, nodes: Array, slopes: list[Array] | None) -> Array:
+    def _run(
+        self,
+        point: Array,
+        nodes: Array,
+        slopes: list[Array] | None,
+        drawn: list[Drawn] | None = None,
+    ) -> Array:
         """The chain at all nodes of all points; the slopes of its stages are added to `slopes`.
 
-        Effects that scatter do not act.
+        drawn: takes up what the effects that scatter draw, which then stay at their medians.
         """
         count, each = point.shape[1], nodes.shape[1]
         total = count * each
         columns = np.repeat(point, each, axis=1)
-        shifts = self.timing.shifts(self._values(columns, np.tile(nodes, count)))
+        timing = nodes[: len(self.free)]
+        shifts = self.timing.shifts(self._values(columns, np.tile(timing, count)))
+        shares = (np.tile(row, count) for row in nodes[len(self.free) :])
         moment = moment_at(self.system.horizon, chosen(self.blocks, columns, SYSTEM), total)
         carried: Carried | None = None
         for index, stage in enumerate(self.system.stages):
@@ -99,11 +132,15 @@ class Situations:
             draw = _draw(self.system, index, picked, shifts, total)
             rows = placed_rows(draw, moment, leaning(self.system.horizon, picked["lean"]))
             state, motion, noise = rows
-            acting = self.acting.get(stage.name, ())
-            world = departures(acting, state, None, systematic_only=True)
+            if drawn is not None:
+                found = numbers_drawn(self.acting, stage.name, state)
+                drawn += found
+                shares = (np.full(total, 0.5) for _ in found)
+            world = departed(self.acting, stage.name, state, shares)
             carried = departed_error(rows, world, carried)
             if slopes is not None:
                 slopes.append(noise_slopes(state, motion, noise, world, _sigma(stage)))
+                slopes += wandering(self.acting, stage.name, state)
         assert carried is not None
         return carried.error_m.T.reshape(count, each, 3)
 
@@ -120,10 +157,12 @@ class Situations:
         return values
 
     def nodes(self, count: int) -> Array:
-        """(free variables, count): equally likely values of them together [s]."""
+        """(dimensions, count), equally likely together: values of the free timing variables [s],
+        then shares of what effects draw."""
         free = [self.timing.variables[k] for k in self.free]
         found = [variable.on_lattice(row, count) for row, variable in enumerate(free)]
-        return np.array(found).reshape(len(free), count)
+        found += [lattice(row + 1, count)[row] for row in range(len(free), self.dimensions)]
+        return np.array(found).reshape(self.dimensions, count)
 
     def last_ranges_m(self, point: Array) -> Array:
         """Distance of the last stage's object [m] at points (p, n): (n,)."""
@@ -132,18 +171,26 @@ class Situations:
         return ranges_m(self.system.stages[last], picked, point.shape[1])
 
     def steps(self) -> Array:
-        """(free variables, 1 + free variables): at their means, then each one deviation off."""
+        """(dimensions, 1 + dimensions): at their means, then each one deviation off."""
         stds = [self.timing.variables[k].std_s for k in self.free]
-        return np.concatenate([np.zeros((len(stds), 1)), np.diag(stds)], axis=1)
+        stds += [STEP[one.shape] - 0.5 for one in self.drawn]
+        at: Array = np.array([0.0] * len(self.free) + [0.5] * len(self.drawn))[:, None]
+        found: Array = at + np.concatenate([np.zeros((len(stds), 1)), np.diag(stds)], axis=1)
+        return found
 
     def sources(self) -> tuple[str, ...]:
         """What each column of `propagated` comes from: noises stage by stage, then timing."""
         noises = tuple(
-            f"noise of {stage.name}.{sensor}"
+            source
             for stage in self.system.stages
-            for sensor in (*["position"] * 3, *["attitude"] * 3, *["ranging"] * 3)
+            for own in (
+                *(f"noise of {stage.name}.{role}" for role in ROLES),
+                *wanderers(self.acting, stage.name),
+            )
+            for source in [own] * 3
         )
-        return (*noises, *(self.timing.variables[k].source for k in self.free))
+        timing = (self.timing.variables[k].source for k in self.free)
+        return (*noises, *timing, *(one.source for one in self.drawn))
 
     def starting_points(self, seed: int, count: int) -> Array:
         """(p, count) directions at random."""

@@ -16,10 +16,9 @@ from typing import Literal
 
 import numpy as np
 
-from syncline_design.effects.acting import acting_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
-from syncline_design.model.system import SimulationError, System
+from syncline_design.model.system import System
 from syncline_design.simulation.ascent import Ascent, Index
 from syncline_design.simulation.lattice import MANY_POINTS, POINTS, sphere_lattice
 from syncline_design.simulation.settings import demand_simulable
@@ -86,7 +85,6 @@ def statistical_figures(
     one_mission: what is constant in a mission is held at its worst value instead of drawn.
     """
     demand_simulable(system)
-    demand_covered(system)
     situations = Situations(system, one_mission)
     found = _worst_points(situations, wanted, seed)
     return tuple(
@@ -96,21 +94,6 @@ def statistical_figures(
         )
         for one, points in zip(wanted, _promising(situations, wanted, found), strict=True)
     )
-
-
-def scattering(system: System) -> tuple[str, ...]:
-    """Known effects that scatter (noise, jitter): the statistical figures do not cover them."""
-    acting = acting_of(system)
-    return tuple(dict.fromkeys(a.effect.name for a in acting if a.effect.kind == "stochastic"))
-
-
-def demand_covered(system: System) -> None:
-    """Raise SimulationError where the statistical figures would leave out what scatters."""
-    if found := scattering(system):
-        raise SimulationError(
-            f"the statistical figures do not cover known effects that scatter "
-            f"({', '.join(found)}): require monte_carlo instead"
-        )
 
 
 def _promising(situations: Situations, wanted: Sequence[Wanted], found: Array) -> tuple[Array, ...]:
@@ -140,7 +123,6 @@ def figure(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> Wor
 
 def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> bool:
     """Whether some situation at random already exceeds a limit: a quick no, never a yes."""
-    demand_covered(system)
     situations = Situations(system)
     pool = situations.starting_points(seed, _POOL)
     weight = wanted.weight(situations, pool)
@@ -149,8 +131,8 @@ def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0
     moments = situations.moments(point, nodes)
     least = float(limit_m * (1.0 + CLOSE) / np.max(wanted.weight(situations, point)))
     if wanted.p is None:
-        return exact(moments, wanted, len(situations.free)) > least
-    return rays(moments, wanted, len(situations.free)).within(least) < wanted.p
+        return exact(moments, wanted, situations.dimensions) > least
+    return rays(moments, wanted, situations.dimensions).within(least) < wanted.p
 
 
 def _worst_points(situations: Situations, wanted: Sequence[Wanted], seed: int) -> Array:
@@ -211,7 +193,7 @@ def _evaluated(situations: Situations, wanted: Wanted, point: Array) -> Worst:
     in_force().check()
     count = POINTS if situations.linear else MANY_POINTS
     moments = situations.moments(point[:, None], situations.nodes(count))
-    value, at = exact(moments, wanted, len(situations.free)), point[:, None]
+    value, at = exact(moments, wanted, situations.dimensions), point[:, None]
     weighted = float(np.max(value * wanted.weight(situations, at)))
     return Worst(wanted, value, point, weighted, float(situations.last_ranges_m(at)[0]))
 

@@ -11,7 +11,6 @@ from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
 from syncline_design.simulation.ensemble import outside_words
-from syncline_design.simulation.statistical import scattering
 from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.verdict.cautions_of_facts import fact_cautions
@@ -83,12 +82,6 @@ def _worst_case(verified: Verified) -> Iterator[Caution]:
 
 def _quantile(verified: Verified, figures: ErrorFigures) -> Iterator[Caution]:
     """A design that keeps an accuracy limit which 95 % of its errors do not, at its worst."""
-    if found := scattering(verified.system):
-        yield Caution(
-            "figures-left-out",
-            f"known effects that scatter ({', '.join(found)}) are charged in the Syncline and "
-            "simulated, but are not in the statistical figures, which are left out",
-        )
     quantile, tightest = figures.quantile95_3d_m, _tightest_kept(verified)
     if quantile is not None and tightest is not None and not quantile <= tightest.limit:
         yield Caution(

@@ -13,7 +13,6 @@ from syncline_design.model.system import System
 from syncline_design.simulation import MonteCarlo, SimulationError
 from syncline_design.simulation.certified import certified_worst_case_m
 from syncline_design.simulation.figures import error_statistics, worst_case_m
-from syncline_design.simulation.statistical import scattering
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.known_effects import describe
 from syncline_design.spec.load import BadInput, Flaw
@@ -120,8 +119,6 @@ def error_figures(verified: Verified, seed: int, statistics: bool) -> ErrorFigur
         worst_case_m=finite(worst_case_m(system, system.coverage_factor)),
         worst_case_k=system.coverage_factor,
     )
-    if scattering(system):
-        return plain
     try:
         in_force().doing("working out the statistical budget")
         found = error_statistics(system, seed)
