@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 from syncline_design.machine import arguments
 from syncline_design.machine.deadline import NoVerdict, OutOfTime, within_s
+from syncline_design.machine.notebooks import draw_with
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, load
 
@@ -58,6 +59,16 @@ __all__ = [
 ]
 
 SpecOrPath = str | Path | Case  # a spec file, or one that was loaded before
+
+
+def _drawn(result: object) -> str | None:
+    """A result as HTML, when a notebook asks for it."""
+    from syncline_design.report.notebook import shown
+
+    return shown(result)
+
+
+draw_with(_drawn)
 
 
 def _case(spec: SpecOrPath) -> Case:

@@ -20,6 +20,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, ClassVar, Final, TypeVar
 
 from syncline_design.machine.frozen import frozen
+from syncline_design.machine.notebooks import Shown
 
 Json = dict[str, Any]
 R = TypeVar("R", bound="Record")
@@ -33,7 +34,7 @@ def key_of(field: str) -> str:
     return field.removesuffix("_")
 
 
-class Record:
+class Record(Shown):
     """Base of every result that is written as JSON; subclasses are frozen dataclasses."""
 
     __slots__ = ()

@@ -15,6 +15,7 @@ from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.notebooks import Shown
 from syncline_design.model.system import System
 from syncline_design.planning.drives import Outcome, World
 from syncline_design.planning.information import (
@@ -54,7 +55,7 @@ MOST_PATH_ROWS: Final = 200_000
 
 
 @dataclass(frozen=True, eq=False)
-class PlanRun:
+class PlanRun(Shown):
     """A plan, and the path that it is made of: what is written as waypoints.
 
     path: of the vehicle that drives, at most ROW_S apart; target_m: what is aimed at from a row

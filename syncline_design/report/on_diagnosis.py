@@ -212,7 +212,7 @@ def _facts(found: Diagnosis) -> list[tuple[str, str]]:
 def _findings(found: Diagnosis) -> list[Node]:
     """Material causes each at length, then the noise, what is immaterial, and what is left."""
     nodes: list[Node] = [
-        _finding(one) for one in found.findings if one.material and one.kind != "noise"
+        finding_node(one) for one in found.findings if one.material and one.kind != "noise"
     ]
     if lines := noise_lines(found.findings):
         nodes.append(Items(tuple(lines)))
@@ -252,7 +252,7 @@ def _figures_of(one: Finding) -> str:
     return ", ".join(estimate.text for estimate in one.parameters.values())
 
 
-def _finding(found: Finding) -> Node:
+def finding_node(found: Finding) -> Node:
     """One finding: its figures, how sure it is, what else it could be."""
     facts = [(_spaced(split_suffix(n)[0]), _parameter_text(p)) for n, p in found.parameters.items()]
     nodes: list[Node] = [

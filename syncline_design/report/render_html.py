@@ -23,21 +23,24 @@ def html(document: Document) -> str:
     """The page of a document; the same input gives the same bytes."""
     from markupsafe import Markup
 
+    script = _asset("report.js")
+    policy = content_security_policy(script)
+    return _filled(document, "document", "style.css", script=Markup(script), policy=policy)
+
+
+def fragment(document: Document) -> str:
+    """The document as a part of somebody else's page, without a script: for notebooks."""
+    return _filled(document, "fragment", "fragment.css", script="")
+
+
+def _filled(document: Document, template: str, style: str, **more: str) -> str:
+    """The document in a template, every figure drawn."""
+    from markupsafe import Markup
+
     shown = for_output(document, "page")
     drawn = {c.name: c.draw() for part in shown.sections for c in charts(part.nodes)}
-    script = _asset("report.js")
-    return (
-        _environment()
-        .get_template("document.html.j2")
-        .render(
-            d=shown,
-            drawn=drawn,
-            style=Markup(_asset("style.css")),
-            script=Markup(script),
-            policy=content_security_policy(script),
-        )
-        .lstrip()
-    )
+    page = _environment().get_template(f"{template}.html.j2")
+    return page.render(d=shown, drawn=drawn, style=Markup(_asset(style)), **more).lstrip()
 
 
 def _asset(name: str) -> str:

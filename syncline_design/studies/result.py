@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, get_args
 
+from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.records import Json
 from syncline_design.spec.keys import label
 from syncline_design.studies.data import study_data
@@ -44,7 +45,7 @@ class CaseResult:
 
 
 @dataclass(frozen=True)
-class StudyResult:
+class StudyResult(Shown):
     """A finished study; iterate `cases()` for its results, in the order of the study."""
 
     study: Study

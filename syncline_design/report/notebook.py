@@ -1,0 +1,103 @@
+"""Results as a notebook shows them: the same documents as on a page, as a fragment of HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Final
+
+from syncline_design.report import numbers
+from syncline_design.report.document import Document, Outcome, section, show
+from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.words import OUTCOMES
+
+if TYPE_CHECKING:
+    from syncline_design.diagnosis.result import Finding
+    from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
+    from syncline_design.verdict.optimise import Optimisation
+
+_HERE: Final = __name__
+_REPORT: Final = "syncline_design.report"
+# By class, where the function is that makes its document; loaded when one is shown.
+_MAKERS: Final = {
+    "Acceptance": (f"{_REPORT}.on_acceptance", "on_acceptance"),
+    "Audit": (f"{_REPORT}.on_audit", "on_audit"),
+    "DiagnosisAndDesign": (f"{_REPORT}.on_diagnosis", "on_diagnosis"),
+    "Difference": (f"{_REPORT}.on_difference", "on_difference"),
+    "Finding": (_HERE, "on_finding"),
+    "Optimisation": (_HERE, "on_optimisation"),
+    "PlanRun": (f"{_REPORT}.on_plan", "on_plan"),
+    "Reproduction": (f"{_REPORT}.on_paper", "on_paper"),
+    "StudyResult": (f"{_REPORT}.on_study", "on_study"),
+    "TimingAndSpec": (f"{_REPORT}.on_timing", "on_timing"),
+    "Verdict": (f"{_REPORT}.on_verdict", "on_verdict"),
+}
+
+
+def shown(result: object) -> str | None:
+    """The HTML of a result; None of one that only its `repr` tells."""
+    names = (kind.__name__ for kind in type(result).__mro__)
+    place = next((_MAKERS[name] for name in names if name in _MAKERS), None)
+    if place is None:
+        return None
+    from syncline_design.report.render_html import fragment
+
+    module, name = place
+    made: Callable[[Any], Document] = getattr(import_module(module), name)
+    return fragment(made(result))
+
+
+def on_finding(found: Finding) -> Document:
+    """One finding of a diagnosis by itself."""
+    from syncline_design.report.on_diagnosis import finding_node
+
+    outcome = Outcome("warn", "!", found.effect.replace("_", " "))
+    name = f"{found.sensor}, {found.stage}"
+    nodes = section("finding", "What is known of it", [finding_node(found)])
+    return Document("Finding", outcome, name, (found.sentence,), (), tuple(nodes))
+
+
+def on_optimisation(result: Optimisation) -> Document:
+    """An optimisation by its data alone: the best designs, and the front where it was asked for."""
+    currency = result.designs[0].design.currency if result.designs else ""
+    designs = _designs("Best designs", result.designs, currency)
+    front = _designs("Exact front", result.front or (), currency)
+    said = () if result.message is None else (result.message,)
+    return Document(
+        family="Optimisation",
+        outcome=OUTCOMES[result.verdict],
+        name=result.spec.name,
+        sentences=said,
+        facts=(),
+        sections=(
+            *section("designs", "Best designs", show(designs, silent=True)),
+            *section("front", "Exact front, all requirements met but accuracy",
+                     show(front, silent=True)),
+        ),
+        source=result.spec.file,
+    )  # fmt: skip
+
+
+def _designs(
+    caption: str, designs: Sequence[RankedDesign | FrontDesign], currency: str
+) -> Table | None:
+    rows = [
+        (
+            Cell(str(place), float(place)),
+            Cell("-" if one.cost is None else numbers.money(one.cost, currency), one.cost),
+            Cell(numbers.in_unit(one.mass, "kg"), one.mass),
+            Cell(numbers.in_unit(one.power, "W"), one.power),
+            Cell(numbers.length(one.error_m), one.error_m),
+            _payload(one.design),
+        )
+        for place, one in enumerate(designs, 1)
+    ]
+    heads = ("Place #", "Cost #", "Mass #", "Power #", "Error #", "Payload")
+    return table(caption, heads, rows) if rows else None
+
+
+def _payload(design: NamedDesign) -> str:
+    return "; ".join(
+        f"{stage.name} {role}: {entry.name}, {entry.timestamping_name}"
+        for stage, role, entry in design.roles
+    )

@@ -1,0 +1,93 @@
+"""The notebook of the docs says what it said when it was run, and every result can be drawn."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import syncline_design as sd
+from syncline_design.report import notebook
+
+ROOT = Path(__file__).resolve().parent.parent
+VOID = {"path", "use", "rect", "circle", "line", "br", "wbr", "meta", "link", "image", "polygon"}
+
+
+class Words(HTMLParser):
+    """The text of a fragment without styles and figures; tags have to close in order."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.words: list[str] = []
+        self.tags: set[str] = set()
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.add(tag)
+        assert not any(name.startswith("on") or name == "src" for name, _ in attrs)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag not in VOID:
+            assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if not {"style", "svg"} & set(self.open):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        said = " ".join(" ".join(self.words).split())
+        return re.sub(r" Provenance .*", "", said)  # versions and hashes change with any entry
+
+
+def _said(output: dict[str, Any]) -> tuple[str, str]:
+    data = output.get("data", {"text/plain": output.get("text", [])})
+    return "".join(data["text/plain"]), Words("".join(data.get("text/html", ""))).text
+
+
+def test_the_notebook_says_what_it_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    place = importlib.util.spec_from_file_location("make", ROOT / "docs" / "make_notebook.py")
+    assert place is not None
+    assert place.loader is not None
+    make = importlib.util.module_from_spec(place)
+    place.loader.exec_module(make)
+    book = json.loads(make.NOTEBOOK.read_text(encoding="utf-8"))
+    codes = [cell for cell in book["cells"] if cell["cell_type"] == "code"]
+    for cell, outputs in zip(codes, make.ran(codes), strict=True):
+        assert [_said(one) for one in cell["outputs"]] == [_said(one) for one in outputs]
+    assert sum("text/html" in out.get("data", {}) for c in codes for out in c["outputs"]) == 3
+
+
+def test_a_verdict_is_drawn_without_a_script_and_with_every_figure() -> None:
+    verdict = sd.check(ROOT / "specs" / "usv_wire_missing.yaml", monte_carlo=False)
+    drawn = Words(verdict._repr_html_() or "")
+    assert "Does not meet its requirements" in drawn.text
+    assert "447.4 mm" in drawn.text
+    assert drawn.tags >= {"table", "details", "svg"}
+    assert not drawn.tags & {"script", "iframe", "link", "html", "body", "form"}
+
+
+def test_what_a_user_wrote_stays_text(tmp_path: Path) -> None:
+    text = (ROOT / "specs" / "position_track.yaml").read_text(encoding="utf-8")
+    spec = tmp_path / "own.yaml"
+    spec.write_text(re.sub(r"(?m)^name: .*", "name: <img src=x onerror=a()>", text))
+    drawn = sd.check(spec, monte_carlo=False)._repr_html_() or ""
+    assert "&lt;img" in drawn
+    assert "<img" not in drawn
+    Words(drawn)
+
+
+def test_results_without_a_picture_fall_back_to_their_repr() -> None:
+    case = sd.load(ROOT / "specs" / "position_track.yaml")
+    assert notebook.shown(case) is None
+    assert notebook.shown(3) is None
