@@ -23,12 +23,14 @@ from syncline_design.cli.shared import (
     emit,
     guarded,
     output_targets,
+    refuse,
     watched,
 )
 from syncline_design.machine.arguments import FALSE_ALARM_RATES, MOST_EFFECTS
 from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:
+    from syncline_design.campaign.joint import JointRequest
     from syncline_design.comparison.meaning import DesignMeaning
     from syncline_design.diagnosis import Diagnosis
     from syncline_design.machine.deadline import Deadline
@@ -101,6 +103,24 @@ def diagnose(
             help="Exit with 3 where the log agrees but could not have shown what would turn it.",
         ),
     ] = False,
+    joint: Annotated[
+        bool,
+        typer.Option("--joint", help="Each LOG is a run of the same system; take them together."),
+    ] = False,
+    starts: Annotated[
+        str | None,
+        typer.Option(
+            metavar="1,1,2",
+            help="With --joint: the start of the system that each log is of; default: its own.",
+        ),
+    ] = None,
+    store: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH",
+            help="With --joint: keep what each log says in this file, with what it holds.",
+        ),
+    ] = None,
     time_limit: TimeLimitOption = None,
 ) -> int:
     """Compare a measured log with the simulation: name what is missing, show the gap shrink."""
@@ -114,14 +134,21 @@ def diagnose(
     from syncline_design.spec.load import load
     from syncline_design.verdict.optimise import as_measured
 
-    targets = output_targets(output, DIAGNOSE_FORMATS, [spec, *(log or ())], [write_spec])
+    together = _joint(joint=joint, logs=log, starts=starts, store=store)
+    reads = [spec, *(log or ()), *([] if store is None else [store])]
+    targets = output_targets(output, DIAGNOSE_FORMATS, reads, [write_spec])
     settings = DiagnosisSettings(
         seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects
     )
     with watched(deadline, targets, quiet=quiet, steps=False), _progress(quiet) as progress:
         case = load(spec)
         pinned = as_measured(case, seed)
-        found = diagnose_log(pinned, log or (), settings, progress)
+        if together is None:
+            found = diagnose_log(pinned, log or (), settings, progress)
+        else:
+            from syncline_design.campaign.joint import diagnose_joint
+
+            found = diagnose_joint(pinned, together, settings, progress)
         means = _meaning(case, found, seed, deadline)
         found = _with_drive(pinned, found)
     whole = with_design(found, means)
@@ -130,6 +157,23 @@ def diagnose(
     text = console(on_diagnosis(whole))
     emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
     return found.demanded_exit_code(informative=require_informative)
+
+
+def _joint(
+    *, joint: bool, logs: list[Path] | None, starts: str | None, store: Path | None
+) -> JointRequest | None:
+    """Logs to be taken together; refused where an option asks for it and `--joint` does not."""
+    if not joint:
+        given = [n for n, v in (("--starts", starts), ("--store", store)) if v is not None]
+        if given:
+            refuse(f"syncline-design: {given[0]} goes with --joint, where each LOG is a run of "
+                   "its own; several LOGs without it are parts of one run")  # fmt: skip
+        return None
+    from syncline_design.campaign.joint import JointRequest, starts_of
+
+    files = tuple(logs or ())
+    named = None if starts is None else starts_of(starts, len(files))
+    return JointRequest(files, named, store)
 
 
 def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> DesignMeaning | None:

@@ -130,6 +130,7 @@ def refuse_unexpected(error: BaseException) -> NoReturn:
         "DiagnosisError": BAD_INPUT,
         "StudyError": BAD_INPUT,
         "PlanError": BAD_INPUT,
+        "JointError": BAD_INPUT,
     }
     names = [c.__name__ for c in type(error).__mro__]
     for name, code in codes.items():

@@ -15,6 +15,7 @@ SCHEMA: Final = "syncline-design/diagnosis/v1"
 LogOutcome = Literal["agrees", "explained", "unexplained"]
 Kind = Literal["cause", "noise", "stand_in"]
 Severity = Literal["contradiction", "caution"]
+Scope = Literal["build", "start", "log"]
 EXIT_CODES: Final[Mapping[LogOutcome, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
 NOT_SHOWN: Final = 3
 LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
@@ -87,6 +88,16 @@ class Stretch(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class PerLog(Record):
+    """An effect in one of several logs, by its number from 1; start: of the system."""
+
+    log: int
+    file: str
+    start: str
+    parameters: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True, slots=True)
 class Finding(Record):
     """One missing effect: what is wrong, with figures, and how sure this is.
 
@@ -99,6 +110,9 @@ class Finding(Record):
     varying: its one parameter in four quarters of the log, where it is not one value.
     also: other sensors that share it, of a delay of a whole system.
     from_s, to_s: the stamps between which it acts, where it does so in a part of the log alone.
+    scope: of several logs together, whether it is one value in all (build), one a start of the
+    system, or one a log; per_log: its values where it is not one.  one_value: chance by which the
+    logs would differ so much if it were one.
     """
 
     effect: str
@@ -123,6 +137,9 @@ class Finding(Record):
     also: tuple[str, ...] | None = optional()
     from_s: float | None = optional()
     to_s: float | None = optional()
+    scope: Scope | None = optional()
+    per_log: tuple[PerLog, ...] | None = optional()
+    one_value: float | None = optional()
 
     @property
     def fits_a_spec(self) -> bool:
@@ -130,6 +147,7 @@ class Finding(Record):
         effect = registry().get(self.effect)
         return (
             effect is not None
+            and self.scope in (None, "build")
             and self.sensor in effect.sensors
             and all(
                 p.misfit(self.parameters[p.name].value, self.sensor) is None
@@ -443,6 +461,45 @@ class NextDrive(Record):
     command: str
 
 
+@dataclass(frozen=True, slots=True)
+class LogAlone(Record):
+    """One of several logs: what was read of it, and what it says alone.
+
+    number: from 1, in the order of adding.  date: of its first stamp, where its timeline is known.
+    named: effects in words.  left_m: RMS that it leaves unexplained; spec_m: what the spec's noise
+    makes on it.  new: whether this call added it.
+    """
+
+    number: int
+    files: tuple[str, ...]
+    start: str
+    date: str | None
+    rows: int
+    used: int
+    duration_s: float
+    verdict: LogOutcome
+    named: tuple[str, ...]
+    left_m: float
+    spec_m: float
+    white_factor: Mapping[str, float]
+    new: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Joint(Record):
+    """Several logs of one system, taken together.
+
+    starts: how many starts of the system they are of.  store: the file that keeps their
+    statistics; last: hash of its last line.  torn: bytes at its end that a kill had left.
+    """
+
+    logs: tuple[LogAlone, ...]
+    starts: int
+    store: str | None
+    last: str | None
+    torn: int
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Diagnosis(Record):
     """The outcome.
@@ -450,7 +507,8 @@ class Diagnosis(Record):
     sound: whether the log contradicts neither itself nor the limits of the spec's platform.
     where: the regimes that disagreed most before anything was named.  steps: the gap after each
     addition.  unseen: what this log could not show.  smallest_seen: what it would have shown.
-    plan: the drive that would tell, where a finding has aliases.
+    plan: the drive that would tell, where a finding has aliases.  joint: the logs that were taken
+    together, each as a run of its own.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
@@ -473,6 +531,7 @@ class Diagnosis(Record):
     informative: Informative = Informative(True)
     smallest_seen: tuple[Smallest, ...] = ()
     plan: NextDrive | None = optional()
+    joint: Joint | None = optional()
 
     @property
     def exit_code(self) -> int:

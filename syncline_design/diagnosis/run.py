@@ -29,6 +29,7 @@ from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import covariates, first_disagreement_s, strongest, where_map
 from syncline_design.diagnosis.remainder import remainder
 from syncline_design.diagnosis.result import (
+    Check,
     Diagnosis,
     Finding,
     Gap,
@@ -101,13 +102,26 @@ def _within_time(progress: Progress) -> Progress:
     return said
 
 
-def diagnose_measured(
-    inputs: Measured,
-    settings: DiagnosisSettings,
-    case: Case | None = None,
-    progress: Progress = silent,
-) -> Diagnosis:
-    """The diagnosis of a system and a log that are already in memory."""
+@dataclass(frozen=True, slots=True)
+class Examined:
+    """A log that was searched: gross faults undone, the model settled."""
+
+    inputs: Measured
+    faults: tuple[Gross, ...]
+    data: Data
+    search: Search
+    result: SearchResult
+
+    @property
+    def untouched(self) -> Array | None:
+        """The error before the gross faults were undone, where there were any."""
+        return untouched_error(self.inputs, self.data) if self.faults else None
+
+
+def examined(
+    inputs: Measured, settings: DiagnosisSettings, progress: Progress = silent
+) -> Examined:
+    """Undo what is grossly wrong with a log, and look for what is missing."""
     progress("looking for gross faults", 0.05)
     faults, log = gross_faults(
         inputs.system,
@@ -124,14 +138,31 @@ def diagnose_measured(
         faults = (*faults, Gross(slip, before / max(usual_size(result.model.error), 1e-300)))
         log = mended(log, slip, inputs.reread)
         data, search, result = _searched(inputs, log, settings, progress)
+    return Examined(inputs, tuple(faults), data, search, result)
+
+
+def diagnose_measured(
+    inputs: Measured,
+    settings: DiagnosisSettings,
+    case: Case | None = None,
+    progress: Progress = silent,
+) -> Diagnosis:
+    """The diagnosis of a system and a log that are already in memory."""
+    return told(examined(inputs, settings, progress), case, progress)
+
+
+def told(one: Examined, case: Case | None = None, progress: Progress = silent) -> Diagnosis:
+    """What a searched log says, in figures: what is left, what it means, how the gap closes."""
+    inputs, faults, data, search, result = (
+        one.inputs, one.faults, one.data, one.search, one.result
+    )  # fmt: skip
+    settings = search.settings
     view = data.view
     progress("testing what remains", 0.7)
     promise = None if case is None else promise_of(case)
-    untouched = untouched_error(inputs, data) if faults else None
-    weighed_up = _weighed_up(data, search, result, faults, promise, untouched)
-    checks = log_checks(view, result.model.acting)
-    sound = all(c.severity != "contradiction" for c in checks)
-    verdict = outcome(weighed_up.findings, sound and not weighed_up.remaining.material)
+    untouched = one.untouched
+    weighed_up = weigh(one, promise)
+    checks, sound, verdict = weighed_up.checks, weighed_up.sound, weighed_up.verdict
     shown = smallest_seen(search, result)
     progress("measuring the gap", 0.8)
     cells = where_map(view, result.base.error, result.model.precision)
@@ -152,29 +183,33 @@ def diagnose_measured(
         plots=plots(data, result, cells),
         spec=None if case is None else SpecRead(case.spec.name, str(case.path)),
         log_files=tuple(inputs.files),
-        provenance=_provenance(settings, case),
+        provenance=provenance_of(settings, case),
         informative=informative(promise, shown),
         smallest_seen=tuple(one.record for one in shown),
     )
 
 
 @dataclass(frozen=True, slots=True)
-class _WeighedUp:
+class WeighedUp:
     """What was found, and what is left, with what both are worth."""
 
     findings: tuple[Finding, ...]
     remaining: Remaining
+    checks: tuple[Check, ...]
+
+    @property
+    def sound(self) -> bool:
+        return all(c.severity != "contradiction" for c in self.checks)
+
+    @property
+    def verdict(self) -> LogOutcome:
+        return outcome(self.findings, self.sound and not self.remaining.material)
 
 
-def _weighed_up(
-    data: Data,
-    search: Search,
-    result: SearchResult,
-    faults: Sequence[Gross],
-    promise: Promise | None,
-    untouched: Array | None,
-) -> _WeighedUp:
+def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
     """Findings and remainder of a settled model, each with whether it matters."""
+    data, search, result, faults = one.data, one.search, one.result, one.faults
+    untouched = one.untouched
     rest = remainder(data, result.model, search.rng)
     left = rest.p < REMAINDER_SHARE * search.settings.false_alarm_rate
     weights = weighed(promise, data)
@@ -196,7 +231,8 @@ def _weighed_up(
         size_m=rest.size_m,
         material=material,
     )
-    return _WeighedUp(with_system_delay(named, data.view.log.kind), remaining)
+    checks = log_checks(data.view, result.model.acting)
+    return WeighedUp(with_system_delay(named, data.view.log.kind), remaining, tuple(checks))
 
 
 def _with_sizes(
@@ -388,7 +424,8 @@ def _noise(data: Data, result: SearchResult) -> Noise:
     )
 
 
-def _provenance(settings: DiagnosisSettings, case: Case | None) -> Provenance:
+def provenance_of(settings: DiagnosisSettings, case: Case | None) -> Provenance:
+    """What an answer depends on besides the log."""
     return Provenance(
         version=__version__,
         seed=settings.seed,

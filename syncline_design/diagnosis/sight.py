@@ -62,9 +62,9 @@ def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
     entry = EffectEntry(
         effect.name, s.candidate.sensor, stage.name, tuple(zero_values(effect).items())
     )
-    size = np.maximum(_alone(one.model, log_p), 0.0)
+    size = np.maximum(alone(one.model, log_p), 0.0)
     for covariance, count in one.jackknives:
-        size = np.maximum(size, _alone(covariance, log_p, count))
+        size = np.maximum(size, alone(covariance, log_p, count))
     seen = np.diag(one.model) > 0.0
     values = [float(v) if ok else math.inf for v, ok in zip(size, seen, strict=True)]
     return [
@@ -72,7 +72,7 @@ def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
     ]
 
 
-def _alone(covariance: Array, log_p: float, count: int = 0) -> Array:
+def alone(covariance: Array, log_p: float, count: int = 0) -> Array:
     """Value of each parameter alone at which the statistic is at its threshold."""
     freedom = max(int(np.sum(np.diag(covariance) > 0.0)), 1)
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))

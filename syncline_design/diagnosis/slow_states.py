@@ -50,6 +50,7 @@ FLAT = 1e6  # prior variance of a constant while the sizes are found
 SCALE_LEAST = 0.02
 STEADY = 1e-2  # of the model's variance: blocks of an axis without noise agree by far better
 LOST = 1e-7  # share of a column's information below which others hold it all
+SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
 LEAST_LOG_P = -700.0
 NORMAL_95 = 1.959963984540054
 
@@ -259,6 +260,39 @@ class States:
         """Variance of the slow courses of each sensor's channel over the spec's."""
         _, prior = self._sums(level, error, self.courses, 0)
         return {self.roles[c]: float(1.0 / prior[self.channel == c][1]) for c in set(self.channel)}
+
+    def shown_prior(self, total: Array, width: int, level: NoiseLevel) -> Array:
+        """Prior precision of `width` free columns and of the courses of the channels that show any.
+
+        total: normal matrix of these columns, of others, and of the error as the last.  A channel
+        whose courses do not raise the evidence by SHOWN_NATS counts as having none.
+        """
+        fixed = width + self.courses.shape[2]
+        normal, score = total[:fixed, :fixed], total[:fixed, -1]
+        start, limit = np.full(len(self.roles), 0.1), self._limits(level)
+        size2, _, _ = self._sized(normal, score, width, start, limit)
+        evidence = self._evidence(normal, score, width, size2)
+        while np.any(size2 > LEAST**2):
+            less = []
+            for c in np.flatnonzero(size2 > LEAST**2):
+                without = np.where(np.arange(size2.size) == c, LEAST**2, size2)
+                less.append((self._evidence(normal, score, width, without), without))
+            best = max(less, key=lambda one: one[0])
+            if best[0] < evidence - SHOWN_NATS:
+                break
+            evidence, size2 = best
+        return np.concatenate([np.zeros(width), np.maximum(self.wave, 1) / size2[self.channel]])
+
+    def _evidence(self, normal: Array, score: Array, width: int, size2: Array) -> float:
+        """log of the restricted likelihood of courses of these sizes [nat], but for a constant."""
+        variance = np.where(self.wave > 0, size2[self.channel] / np.maximum(self.wave, 1), FLAT)
+        prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
+        scale = np.sqrt(np.diag(normal) + prior)
+        whole = (normal + np.diag(prior)) / scale[:, None] / scale
+        solved = np.linalg.lstsq(whole, score / scale, rcond=1e-12)[0]
+        size = float(np.linalg.slogdet(whole + 1e-12 * np.eye(len(whole)))[1])
+        size += 2.0 * float(np.sum(np.log(scale))) + float(np.sum(np.log(variance)))
+        return 0.5 * float(score @ (solved / scale)) - 0.5 * size
 
     def _sums(
         self, level: NoiseLevel, remaining: Array, columns: Array, width: int

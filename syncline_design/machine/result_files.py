@@ -100,7 +100,7 @@ def replace_whole(final: Path, content: bytes) -> None:
     """Put a file in place in one step without waiting for the disk; OSError."""
     temporary, descriptor = _temporary_in(final.parent)
     try:
-        _write_all(descriptor, content)
+        write_all(descriptor, content)
         temporary.replace(final)
     except OSError:
         with contextlib.suppress(OSError):
@@ -161,10 +161,10 @@ def _feed(descriptor: int, content: bytes) -> None:
     """
     for start in range(0, max(len(content), 1), _PIECE):
         with overdue(of_command()):
-            _write_all(descriptor, content[start : start + _PIECE])
+            write_all(descriptor, content[start : start + _PIECE])
 
 
-def _write_all(descriptor: int, content: bytes) -> None:
+def write_all(descriptor: int, content: bytes) -> None:
     left = memoryview(content)
     while left:
         left = left[os.write(descriptor, left) :]
@@ -180,7 +180,7 @@ def _stage(final: Path, content: bytes) -> _Staged:
         raise explained(final, error) from None
     staged = _Staged(temporary, descriptor, final)
     try:
-        _write_all(descriptor, content)
+        write_all(descriptor, content)
         os.fsync(descriptor)
         temporary.chmod(_mode_for(final))
     except OSError as error:

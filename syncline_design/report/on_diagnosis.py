@@ -45,6 +45,7 @@ from syncline_design.report.document import (
     show,
 )
 from syncline_design.report.on_gap import closed_text, gap_nodes, rms_length
+from syncline_design.report.on_joint import joint_nodes, scope_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 
@@ -85,7 +86,8 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
             *section("drive", "The drive that would tell", _drive(found.plan), "Drive"),
             *section("unseen", "What this log cannot show", _items(found.unseen), "Not shown"),
             *section("design", "What it means for the design", _design(found.design), "Design"),
-            *section("log", "The log", _log(found), "Log"),
+            *section("logs", "Log by log", joint_nodes(found.joint), "Logs"),
+            *section("log", "The log" if found.joint is None else "The logs", _log(found), "Log"),
             *provenance(_provenance(found)),
         ),
         source=found.spec.file if found.spec is not None else "",
@@ -260,6 +262,7 @@ def finding_node(found: Finding) -> Node:
         Text(_full_stop(_called(found)), reach="page"),
         Facts(tuple(facts)),
         Text(f"Evidence: {_full_stop(found.evidence)}"),
+        *scope_nodes(found),
     ]
     if found.varying:
         values = sentence_list([_stretch_text(one) for one in found.varying])

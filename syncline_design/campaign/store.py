@@ -1,0 +1,236 @@
+"""The runs of one system on disk: a file of lines that only grows, each bound to all before it.
+
+A line is {"previous": P, "sha256": H, "body": B}; P is the H of the line before (64 zeros at the
+start), H the SHA-256 of P and of B in canonical JSON.  A line that was changed, taken out, put in
+or moved breaks the chain, and the store is refused as damaged.  A last line without its end is what
+a kill left: it was never acknowledged, so it is dropped, and said.
+What the store trusts: whoever can write to the file and makes the whole chain anew, or takes lines
+off its end, is believed; keep a copy, or the printed hash of the last line, where that matters.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import itertools
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from syncline_design import __version__
+from syncline_design.campaign.kept import Run
+from syncline_design.campaign.packing import PackingError
+from syncline_design.campaign.same_system import description, differences
+from syncline_design.machine.appended_files import append_line, whole_lines
+from syncline_design.machine.input_files import UnsuitableError, read_plain
+from syncline_design.machine.records import NotThisResultError, json_of, read_as
+from syncline_design.model.system import System
+from syncline_design.spec.load import BadInput
+from syncline_design.spec.yaml_text import Flaw
+
+SCHEMA: Final = "syncline-design/store/v1"
+START: Final = "0" * 64
+MOST_BYTES: Final = 2**30
+MOST_DIFFERENCES: Final = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A run in the store: its number from 1, and the start of the system that it belongs to."""
+
+    number: int
+    start: str
+    run: Run
+
+
+@dataclass(frozen=True, slots=True)
+class Stored:
+    """A store that was read.
+
+    system: what it is a store of (`same_system.description`).  baselines: after how many runs a
+    new baseline was set.  torn: bytes of a last line that a kill left without its end.
+    last: hash of the last line.
+    """
+
+    path: Path
+    name: str
+    system: Any
+    entries: tuple[Entry, ...]
+    baselines: tuple[int, ...]
+    torn: int
+    last: str
+
+    @property
+    def runs(self) -> tuple[Run, ...]:
+        return tuple(one.run for one in self.entries)
+
+
+def read_store(path: Path) -> Stored | None:
+    """The store in a file; None where there is no file yet.  BadInput where it is damaged."""
+    try:
+        content = read_plain(path, MOST_BYTES)
+    except FileNotFoundError:
+        return None
+    except (OSError, UnsuitableError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise refused(path, f"cannot read the store: {reason}") from None
+    return _stored(path, content)
+
+
+def _stored(path: Path, content: bytes) -> Stored | None:
+    kept = whole_lines(content)
+    torn = len(content) - len(kept)
+    if torn and not kept and not content.startswith(b'{"previous"'):
+        raise refused(path, "no store", "a file that `watch` or `diagnose --joint --store` made", 1)
+    name, system, last = "", None, START
+    entries: list[Entry] = []
+    baselines: list[int] = []
+    for line, text in enumerate(kept.splitlines(), 1):
+        body, last = _checked(path, line, text, last)
+        if line == 1:
+            name, system = _head(path, body)
+        elif body.get("kind") == "run":
+            entries.append(_entry(path, line, body, len(entries) + 1))
+        elif body.get("kind") == "baseline":
+            baselines.append(len(entries))
+        else:
+            raise refused(path, f"a line of kind {body.get('kind')!r}", "run or baseline", line)
+    if system is None:
+        return None  # nothing but what a kill left of the first line
+    return Stored(path, name, system, tuple(entries), tuple(baselines), torn, last)
+
+
+def _checked(path: Path, line: int, text: bytes, previous: str) -> tuple[dict[str, Any], str]:
+    """The body of a line and its hash, once it follows from the line before."""
+    try:
+        whole = json.loads(text)
+        body, own = whole["body"], whole["sha256"]
+        found = whole["previous"] == previous and own == _digest(previous, body)
+    except (ValueError, TypeError, KeyError, RecursionError):
+        raise refused(
+            path, "damaged: no line of a store", "lines as `watch` wrote them", line
+        ) from None
+    if not found:
+        raise refused(
+            path,
+            "damaged: this line is not what was written after the one before",
+            "an unbroken chain of hashes",
+            line,
+            "take back a copy of the store, or begin a new one and add the logs again",
+        )
+    if not isinstance(body, dict):
+        raise refused(path, "damaged: a line without a body", "lines as written", line)
+    return body, own
+
+
+def _head(path: Path, body: dict[str, Any]) -> tuple[str, Any]:
+    if body.get("kind") != "store" or body.get("schema") != SCHEMA:
+        found = body.get("schema", body.get("kind"))
+        raise refused(path, f"a store of another kind ({found!r})", SCHEMA, 1)
+    return str(body.get("name", "")), body.get("system")
+
+
+def _entry(path: Path, line: int, body: dict[str, Any], number: int) -> Entry:
+    try:
+        run = read_as(Run, json.dumps(body["run"]))
+        run.statistics()
+        return Entry(number, str(body["start"]), run)
+    except (NotThisResultError, PackingError, KeyError) as error:
+        first = (str(error).splitlines() or [""])[0]
+        raise refused(path, f"damaged: a run that cannot be read ({first})", "", line) from None
+
+
+def demand_system(stored: Stored, system: System, spec: str) -> None:
+    """Refuse a spec that describes another system than the store's."""
+    own = json.loads(canonical(description(system)))
+    found = list(itertools.islice(differences(stored.system, own), MOST_DIFFERENCES))
+    if found:
+        raise refused(
+            stored.path,
+            f"a store of another system than {spec}: " + "; ".join(found),
+            "",
+            1,
+            "use a store of its own for every system; a changed name or requirement is none",
+        )
+
+
+def demand_new(stored: Stored | None, run: Run, path: Path) -> None:
+    """Refuse a run that the store holds."""
+    for one in stored.entries if stored is not None else ():
+        if run.sha256 == one.run.sha256 or run.fingerprint == one.run.fingerprint:
+            files = ", ".join(run.files)
+            raise refused(
+                path,
+                f"{files}: this run is in the store already, as number {one.number} "
+                f"({', '.join(one.run.files)})",
+                "a log that was not added before",
+            )
+
+
+def add_run(path: Path, name: str, system: System, run: Run, start: str | None = None) -> None:
+    """Append a run; the first one makes the store.  start: None for a start of its own.
+
+    What another process appended meanwhile is looked at again.
+    """
+
+    def lines(kept: bytes) -> bytes:
+        stored = _stored(path, kept) if kept else None
+        last, text = START, b""
+        if stored is None:
+            head = {"kind": "store", "schema": SCHEMA, "name": name, "version": __version__,
+                    "system": description(system)}  # fmt: skip
+            text, last = _line(last, head)
+        else:
+            demand_system(stored, system, name)
+            demand_new(stored, run, path)
+            last = stored.last
+        number = 1 + (len(stored.entries) if stored is not None else 0)
+        own = start if start is not None else f"#{number}"
+        return text + _line(last, {"kind": "run", "start": own, "run": run.to_json()})[0]
+
+    append_line(path, lines)
+
+
+def add_baseline(path: Path) -> None:
+    """Append that the runs so far are done with: what comes is held against what comes."""
+
+    def line(kept: bytes) -> bytes:
+        stored = _stored(path, kept)
+        if stored is None:
+            raise refused(path, "no store to accept", "a store with runs")
+        return _line(stored.last, {"kind": "baseline", "after": len(stored.entries)})[0]
+
+    append_line(path, line)
+
+
+def _line(previous: str, body: dict[str, Any]) -> tuple[bytes, str]:
+    plain = json.loads(canonical(json_of(body)))
+    own = _digest(previous, plain)
+    return canonical({"previous": previous, "sha256": own, "body": plain}, sort=False).encode(
+        "ascii"
+    ) + b"\n", own
+
+
+def canonical(value: Any, *, sort: bool = True) -> str:
+    """JSON in one way only."""
+    return json.dumps(value, sort_keys=sort, separators=(",", ":"), allow_nan=False)
+
+
+def _digest(previous: str, body: Any) -> str:
+    return hashlib.sha256((previous + canonical(body)).encode("ascii")).hexdigest()
+
+
+def refused(
+    path: Path, message: str, expected: str = "", line: int = 0, hint: str = ""
+) -> BadInput:
+    """A store that cannot be used, by place and reason."""
+    return BadInput((Flaw(str(path), line, 1 if line else 0, "", message, expected, hint=hint),))
+
+
+def by_date(entries: tuple[Entry, ...]) -> Iterator[Entry]:
+    """Runs in the order of their first stamps where all have a date, else as they were added."""
+    if all(one.run.date is not None for one in entries):
+        yield from sorted(entries, key=lambda one: (one.run.first_s, one.number))
+    else:
+        yield from entries

@@ -1,0 +1,294 @@
+"""What several logs say together, as a diagnosis: findings with their scope and figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.campaign.kept import Run
+from syncline_design.campaign.naming import Beside, Named, NamedTerm
+from syncline_design.campaign.pool import Pool, Scoped, Term, fitted
+from syncline_design.campaign.store import Entry, Stored
+from syncline_design.diagnosis.candidates import zero_values
+from syncline_design.diagnosis.consequence import Weights, promise_of
+from syncline_design.diagnosis.findings import estimate, finding
+from syncline_design.diagnosis.result import (
+    Diagnosis,
+    Estimate,
+    Finding,
+    Joint,
+    Likelihoods,
+    LogAlone,
+    LogOutcome,
+    LogRead,
+    Noise,
+    PerLog,
+    Plots,
+    Remaining,
+    Residuals,
+    Rival,
+    SpecRead,
+    WholeGap,
+)
+from syncline_design.diagnosis.run import provenance_of
+from syncline_design.diagnosis.search import DiagnosisSettings
+from syncline_design.diagnosis.sight import Seen, alone, informative
+from syncline_design.diagnosis.slow_states import Judged
+from syncline_design.effects import registry
+from syncline_design.effects.record import Array
+from syncline_design.model.known import EffectEntry
+from syncline_design.spec.case import Case
+
+MOST_NATS = 300.0
+
+
+@dataclass(frozen=True, eq=False)
+class Told:
+    """All that a joint diagnosis is told from; before: how many runs the store held."""
+
+    case: Case
+    settings: DiagnosisSettings
+    entries: tuple[Entry, ...]
+    before: int
+    pool: Pool
+    named: Named
+    stored: Stored | None
+    torn: int
+
+    @property
+    def stages(self) -> list[str]:
+        return [stage.name for stage in self.case.spec.stages]
+
+    @property
+    def runs(self) -> list[Run]:
+        return [one.run for one in self.entries]
+
+    @property
+    def spec_m(self) -> float:
+        """RMS [m] that the spec's noise makes over all logs."""
+        rows = np.array([run.used for run in self.runs], dtype=float)
+        squares = np.square([run.spec_m for run in self.runs])
+        return float(np.sqrt(np.sum(rows * squares) / max(np.sum(rows), 1.0)))
+
+
+def tell(told: Told) -> Diagnosis:
+    """The diagnosis of several logs."""
+    promise = promise_of(told.case)
+    weights = Weights(told.spec_m, promise)
+    found = [*_undone(told), *(_finding(told, one, weights) for one in told.named.terms)]
+    found.sort(key=lambda f: (not f.material, -f.gain_nat))
+    left_m = max((run.left_m for run in told.runs), default=0.0)
+    odd = any(run.left_material for run in told.runs)
+    explained = any(f.material for f in found)
+    verdict: LogOutcome = "unexplained" if odd else "explained" if explained else "agrees"
+    shown = tuple(_seen(told))
+    return Diagnosis(
+        verdict=verdict,
+        sound=True,
+        checks=(),
+        findings=tuple(found),
+        remaining=Remaining(odd, told.spec_m, odd, None, (), left_m, odd),
+        where=(),
+        first_disagreement_s=None,
+        gap=WholeGap(),
+        steps=(),
+        unseen=tuple(_unseen(told)),
+        log=_log_read(told),
+        noise=_noise(told),
+        plots=Plots(Residuals((), {}), (), ()),
+        spec=SpecRead(told.case.spec.name, str(told.case.path)),
+        log_files=tuple(f for run in told.runs for f in run.files),
+        provenance=provenance_of(told.settings, told.case),
+        informative=informative(promise, shown),
+        smallest_seen=tuple(one.record for one in shown),
+        joint=_joint(told),
+    )
+
+
+def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
+    """One effect in words; what differs from log to log has its mean, and a value for each."""
+    term, effect = one.scoped.term, one.scoped.term.effect
+    stage = told.stages[term.stage]
+    k = [s.term.label for s in told.named.fit.scoped].index(term.label)
+    shown = _estimates(term, one.judged)
+    size_m = _size_m(told, k)
+    values = tuple((name, e.value) for name, e in shown.items())
+    material = weights.material(size_m, EffectEntry(effect.name, term.sensor, stage, values))
+    chance = "less than 1e-300" if one.log_p < -690.0 else f"{math.exp(one.log_p):.0e}"
+    words = f"saves {one.gain:.1f} nat; noise alone does that with a chance of {chance}"
+    aliases = tuple(_rival(told, b) for b in one.rivals)
+    total = 1.0 + sum(_odds(b.nats_worse) for b in aliases)
+    aliases = tuple(replace(b, probability=_odds(b.nats_worse) / total) for b in aliases)
+    found = finding(
+        effect, term.sensor, stage, shown, words, one.gain, one.log_p / math.log(10.0),
+        (aliases, (), ()), material, size_m,
+    )  # fmt: skip
+    scope = one.scoped.scope
+    per_log = None if scope == "build" else tuple(_per_log(told, k))
+    tested = one.tested.logs if one.tested.starts is None else one.tested.starts
+    return replace(found, scope=scope, per_log=per_log, one_value=tested)
+
+
+def _odds(worse: float) -> float:
+    return math.exp(-min(max(worse, -MOST_NATS), MOST_NATS))
+
+
+def _rival(told: Told, one: Beside) -> Rival:
+    name, sensor, stage = one.term.label
+    return Rival(name, sensor, told.stages[stage], one.cosine, one.worse, one.possible)
+
+
+def _estimates(term: Term, judged: Judged) -> dict[str, Estimate]:
+    """Parameters with the uncertainty and interval to rely on."""
+    found = {}
+    slopes = [p.name for p in term.effect.slopes()]
+    spreads, seen = judged.spread, np.diag(judged.model) > 0.0
+    for p in term.effect.parameters:
+        k = slopes.index(p.name)
+        value, spread = float(judged.values[k]), float(spreads[k])
+        half = judged.coverage * spread
+        interval = (value - half, value + half) if seen[k] else None
+        shown = spread if seen[k] else math.inf
+        found[p.name] = estimate(value, shown, p.unit, bool(seen[k]), interval)
+    return found
+
+
+def _per_log(told: Told, k: int) -> Iterator[PerLog]:
+    """The values of an effect in every log."""
+    fit = told.named.fit
+    one = fit.scoped[k]
+    group = told.pool.group_of(one.scope)
+    for run, entry in enumerate(told.entries):
+        judged = fit.judged(fit.place[k][group[run]])
+        yield PerLog(entry.number, entry.run.files[0], entry.start, _estimates(one.term, judged))
+
+
+def _size_m(told: Told, k: int) -> float:
+    """RMS [m] that an effect makes over all rows of all logs."""
+    fit = told.named.fit
+    one = fit.scoped[k]
+    values = fit.of(k)[told.pool.group_of(one.scope)]
+    gram = told.pool.gram[:, one.term.index[:, None], one.term.index]
+    squares = np.einsum("lp,lpq,lq->l", values, gram, values)
+    rows = np.array([run.used for run in told.runs], dtype=float)
+    return float(np.sqrt(max(float(rows @ squares) / float(np.sum(rows)), 0.0)))
+
+
+def _undone(told: Told) -> Iterator[Finding]:
+    """Gross faults that were undone in single logs, each with the logs that have it."""
+    groups: dict[tuple[str, str, str, str], list[Entry]] = {}
+    for entry in told.entries:
+        for one in entry.run.named:
+            if one.undone:
+                key = (one.effect, one.sensor, one.stage, one.words)
+                groups.setdefault(key, []).append(entry)
+    for (name, sensor, stage, words), entries in groups.items():
+        effect = registry()[name]
+        every = len(entries) == len(told.entries)
+        files = ", ".join(e.run.files[0] for e in entries)
+        said = f"undone in {'every log' if every else files} before anything was fitted"
+        yield Finding(
+            name, sensor, stage, {}, (), (), (), words, said, 0.0, None, effect.confused_with,
+            effect.separated_by, effect.source, scope="build" if every else "log",
+            per_log=None if every else tuple(
+                PerLog(e.number, e.run.files[0], e.start, {}) for e in entries
+            ),
+        )  # fmt: skip
+
+
+def _seen(told: Told) -> Iterator[Seen]:
+    """The smallest value common to all logs that half of such sets of logs would show."""
+    taken = {one.term.label for one in told.named.fit.scoped}
+    doubles = {b.term.label for one in told.named.terms for b in one.rivals}
+    rate = told.settings.false_alarm_rate / max(len(told.pool.terms), 1)
+    for term in told.pool.terms:
+        if term.label in taken | doubles or term.effect.name in told.settings.exclude_effects:
+            continue
+        fit = fitted(told.pool, (*told.named.fit.scoped, Scoped(term, "build")))
+        judged = fit.judged(fit.place[-1][0])
+        size = _smallest(judged, math.log(rate))
+        effect, stage = term.effect, told.stages[term.stage]
+        entry = EffectEntry(effect.name, term.sensor, stage, tuple(zero_values(effect).items()))
+        for p, value in zip(effect.slopes(), size, strict=True):
+            yield Seen(entry, p.name, float(value), p.high)
+
+
+def _smallest(judged: Judged, log_p: float) -> Array:
+    size = np.maximum(alone(judged.model, log_p), 0.0)
+    for covariance, count in judged.jackknives:
+        size = np.maximum(size, alone(covariance, log_p, count))
+    return np.where(np.diag(judged.model) > 0.0, size, np.inf)
+
+
+def _unseen(told: Told) -> Iterator[str]:
+    """Effects of which no log says enough: at their plausible most they stay below 3 sigma."""
+    for term in told.pool.terms:
+        information = np.einsum("lpp->p", told.pool.normal[:, term.index[:, None], term.index])
+        slopes = term.effect.slopes()
+        names = [
+            p.name
+            for p, i in zip(slopes, information, strict=True)
+            if p.high * math.sqrt(max(float(i), 0.0)) < 3.0
+        ]
+        if names:
+            which = "" if len(names) == len(slopes) else f": {', '.join(names)}"
+            yield f"{term.effect.name} ({term.sensor}){which}"
+
+
+def _log_read(told: Told) -> LogRead:
+    rejected: dict[str, int] = {}
+    for run in told.runs:
+        for reason, count in run.rejected.items():
+            rejected[reason] = rejected.get(reason, 0) + count
+    kinds = sorted({run.kind for run in told.runs})
+    used = sum(run.used for run in told.runs)
+    rows = sum(run.rows for run in told.runs)
+    duration = sum(run.duration_s for run in told.runs)
+    thinned = rows - used - sum(rejected.values())
+    return LogRead("/".join(kinds), rows, used, rejected, max(thinned, 0), (), duration,
+                   duration / max(used - len(told.runs), 1), used, {})  # fmt: skip
+
+
+def _noise(told: Told) -> Noise:
+    """Noise factors over all logs, root mean square by rows."""
+    factors: dict[str, list[tuple[float, int]]] = {}
+    for run in told.runs:
+        for sensor, factor in run.white_factor.items():
+            factors.setdefault(sensor, []).append((factor, run.used))
+    white = {sensor: _rms(own) for sensor, own in factors.items()}
+    before = 0.5 * sum(run.square for run in told.runs)
+    return Noise(white, {}, sum(run.used for run in told.runs),
+                 Likelihoods(before, before - told.named.fit.gain))  # fmt: skip
+
+
+def _rms(own: Sequence[tuple[float, int]]) -> float:
+    weight = sum(rows for _, rows in own)
+    return math.sqrt(sum(rows * f * f for f, rows in own) / max(weight, 1))
+
+
+def _joint(told: Told) -> Joint:
+    logs = tuple(
+        LogAlone(
+            number=e.number,
+            files=e.run.files,
+            start=e.start,
+            date=e.run.date,
+            rows=e.run.rows,
+            used=e.run.used,
+            duration_s=e.run.duration_s,
+            verdict=e.run.verdict,  # type: ignore[arg-type]  # as it was written
+            named=tuple(one.words for one in e.run.named),
+            left_m=e.run.left_m,
+            spec_m=e.run.spec_m,
+            white_factor=dict(e.run.white_factor),
+            new=e.number > told.before,
+        )
+        for e in told.entries
+    )
+    stored = told.stored
+    return Joint(logs, len({e.start for e in told.entries}),
+                 None if stored is None else str(stored.path),
+                 None if stored is None else stored.last, told.torn)  # fmt: skip

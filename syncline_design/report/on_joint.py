@@ -1,0 +1,91 @@
+"""What `diagnose --joint` says besides: whose value a finding is, and what each log says alone."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from syncline_design.diagnosis.result import Finding, Joint, LogAlone
+from syncline_design.report import numbers
+from syncline_design.report.document import Node, Text, code, show
+from syncline_design.report.table import Cell, table
+
+MOST_LOGS: Final = 12  # told outside the page
+SCOPES: Final = {
+    "build": "One value in all logs: it belongs to the build.",
+    "start": "Another value at every start of the system.",
+    "log": "Another value in every log.",
+}
+
+
+def scope_nodes(found: Finding) -> list[Node]:
+    """Whether a finding is one value in all logs, how that was tested, and its value in each."""
+    if found.scope is None:
+        return []
+    words = SCOPES[found.scope]
+    if found.one_value is not None:
+        words += f" {_tested(found)}"
+    nodes: list[Node] = [Text(words)]
+    if found.per_log and any(one.parameters for one in found.per_log):
+        names = list(found.per_log[0].parameters)
+        rows = [
+            (str(one.log), one.file, *(Cell(one.parameters[n].text) for n in names))
+            for one in found.per_log
+        ]
+        heads = ("Log", "File", *(f"{name} #" for name in names))
+        nodes += show(table(f"{found.effect} ({found.sensor}) in each log", heads, rows))
+    elif found.per_log:
+        nodes.append(Text(f"In {', '.join(one.file for one in found.per_log)}."))
+    return nodes
+
+
+def _tested(found: Finding) -> str:
+    chance = found.one_value or 0.0
+    size = "less than 0.001" if chance < 0.001 else numbers.number(chance, 2)
+    if found.scope == "build":
+        return f"Separate values fit no better than chance (p = {size})."
+    return f"Were it one value, the logs would differ so much with a chance of {size}."
+
+
+def joint_nodes(joint: Joint | None) -> list[Node]:
+    """Every log by itself, and where their statistics are kept."""
+    if joint is None:
+        return []
+    several = joint.starts not in (1, len(joint.logs))
+    heads = ("Log", "File", *(["Start"] if several else []), "First stamp", "Rows #",
+             "Alone", "Named alone")  # fmt: skip
+    rows = [_row(one, several=several) for one in joint.logs]
+    whole = table("The logs", heads, rows)
+    few = table("The logs", heads, rows[-MOST_LOGS:])
+    nodes: list[Node] = [
+        *show(whole, silent=True, reach="page"),
+        *show(few, silent=True, reach="text"),
+    ]
+    if len(rows) > MOST_LOGS:
+        words = f"The last {MOST_LOGS} of {len(rows)}; all in --output json or html."
+        nodes.append(Text(words, quiet=True, reach="text"))
+    if joint.starts == len(joint.logs) > 1:
+        words = "Each log is a start of its own, so what differs by start differs by log."
+        nodes.append(Text(words, quiet=True))
+    if joint.store is not None:
+        nodes.append(Text(("Kept in ", code(joint.store), "; hash of its last line ",
+                           code((joint.last or "")[:16]), "."), quiet=True))  # fmt: skip
+    return [*nodes, *torn_nodes(joint.torn)]
+
+
+def torn_nodes(torn: int) -> list[Node]:
+    """What a kill had left at the end of a store."""
+    if not torn:
+        return []
+    words = (
+        f"The store ended in a line without its end ({torn} bytes), as a kill leaves it: that "
+        "line was dropped; add its log again if it is missing above."
+    )
+    return [Text(words, mark="!", tone="warn")]
+
+
+def _row(one: LogAlone, *, several: bool) -> tuple[Cell | str, ...]:
+    mark = "+" if one.new else ""
+    start = [one.start] if several else []
+    return (Cell(str(one.number), one.number, mark=mark), ", ".join(one.files), *start,
+            one.date or "", Cell(numbers.count(one.used), one.used), one.verdict,
+            "; ".join(one.named))  # fmt: skip
