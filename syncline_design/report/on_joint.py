@@ -27,7 +27,7 @@ def scope_nodes(found: Finding) -> list[Node]:
     nodes: list[Node] = [Text(words)]
     if found.per_log and any(one.parameters for one in found.per_log):
         names = list(found.per_log[0].parameters)
-        rows = [
+        rows: list[tuple[Cell | str, ...]] = [
             (str(one.log), one.file, *(Cell(one.parameters[n].text) for n in names))
             for one in found.per_log
         ]
