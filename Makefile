@@ -50,6 +50,7 @@ study: $(DEV)
 docs: $(DEV)
 	$(PIP) -e '.[docs]'
 	$(BIN)/mkdocs build --strict
+	$(BIN)/python -m pytest -q tests/test_requirements_tools.py
 
 clean:
 	rm -rf $(VENV) out build dist

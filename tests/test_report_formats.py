@@ -155,6 +155,21 @@ def test_junit_fails_where_the_verdict_fails() -> None:
     assert f"specs/uav_corridor.yaml:{line}:5" in (failure.text or "")
 
 
+def test_junit_carries_the_figures_of_every_requirement() -> None:
+    verdict = samples.failing()
+    cases = list(junit_of(verdict).iter("testcase"))
+    for case, row in zip(cases, verdict.requirements, strict=True):
+        told = {one.attrib["name"]: one.attrib["value"] for one in case.iter("property")}
+        assert told["requirement"] == row.id
+        assert float(told["limit"]) == row.limit
+        assert row.value is not None
+        assert float(told["value"]) == row.value
+        assert float(told["margin"]) == pytest.approx(row.limit - row.value)
+        assert (told["unit"], told["status"]) == (row.unit, row.status)
+        assert told["place"] == f"{verdict.file}:{row.line}:{row.column}"
+        assert case.attrib["name"] == f"{row.id} {row.kind}"
+
+
 def test_junit_of_an_infeasible_spec_fails_the_conflicting_requirements() -> None:
     root = junit_of(samples.infeasible())
     failures = {

@@ -26,7 +26,10 @@ SILENT: Final = ("pass", "not_reached")  # nothing to annotate
 
 @dataclass(frozen=True, slots=True)
 class Notice:
-    """One thing said about a spec: rule (the requirement's kind), id, place, one sentence."""
+    """One thing said about a spec: rule (the requirement's kind), id, place, one sentence.
+
+    figures: of a requirement, by name, in the unit that is named beside them.
+    """
 
     level: Level
     rule: str
@@ -36,6 +39,7 @@ class Notice:
     column: int
     message: str
     justification: str = ""
+    figures: tuple[tuple[str, str], ...] = ()
 
 
 def findings(verdict: Checked) -> list[Notice]:
@@ -81,7 +85,14 @@ def _requirement(row: RequirementResult, verdict: Verdict) -> Notice:
     known, why = verdict.baseline, waiver_text(row)
     if level in ("fail", "undecided") and known is not None and known.forgives(row.id):
         level, why = "known", f"no worse than in {known.file}"
-    return Notice(level, row.kind, row.id, verdict.file, *place, message, why)
+    return Notice(level, row.kind, row.id, verdict.file, *place, message, why, _figures(row))
+
+
+def _figures(row: RequirementResult) -> tuple[tuple[str, str], ...]:
+    """What a requirement is held at, at full precision; what has no figure is left out."""
+    known = (("limit", row.limit), ("value", row.value), ("margin", row.margin))
+    shown = [(name, repr(value)) for name, value in known if numbers.finite(value) is not None]
+    return (*shown, ("unit", row.unit), ("status", row.status))
 
 
 def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:

@@ -71,6 +71,11 @@ def _case(finding: Notice, file: str) -> ElementTree.Element:
     )
     message = visible(finding.message)
     place = f"{visible(finding.file)}:{finding.line}:{finding.column}"
+    if finding.id:
+        listed = ElementTree.SubElement(case, "properties")
+        told = (("requirement", finding.id), ("kind", finding.rule), *finding.figures)
+        for key, value in (*told, ("place", place)):
+            ElementTree.SubElement(listed, "property", {"name": key, "value": visible(value)})
     if finding.level == "fail":
         failure = ElementTree.SubElement(case, "failure", {"type": finding.rule})
         failure.set("message", message)
