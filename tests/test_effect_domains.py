@@ -47,6 +47,8 @@ IMPOSSIBLE = [
     ("noise_understated", "position", "factor: -3"),
     ("noise_understated", "attitude", "factor: 0"),
     ("noise_understated", "ranging", "factor: -0.5"),
+    ("noise_episode", "ranging", "factor: 0, from_s: 1 s, to_s: 2 s"),
+    ("noise_episode", "position", "factor: 3, from_s: -1 s, to_s: 2 s"),
     ("heavy_tails", "position", "degrees_of_freedom: 3, outlier_rate: -0.5"),
     ("heavy_tails", "position", "degrees_of_freedom: 3, outlier_rate: 1.5"),
     ("heavy_tails", "position", "degrees_of_freedom: 0, outlier_rate: 0.1"),

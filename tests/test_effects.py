@@ -38,7 +38,7 @@ from tests.world import hidden, make_log, scenario
 Array = NDArray[np.float64]
 PAIRS = [(e, s) for e in registry().values() for s in e.sensors]
 IDS = [f"{effect.name}-{sensor}" for effect, sensor in PAIRS]
-OWN = ("factor", "tails")  # they change a sensor's own noise
+OWN = ("factor", "tails", "episode")  # they change a sensor's own noise
 ROWS = 60
 MARGIN = 2e-3  # of the largest slope: what second-order terms leave at the small step taken
 
@@ -102,7 +102,7 @@ def test_every_file_of_the_folder_is_one_effect_of_its_name() -> None:
     folder = Path(next(iter(effects_package.__path__)))
     files = {p.stem for p in folder.glob("*.py")} - NOT_EFFECTS - {"__init__"}
     assert files == set(registry())
-    assert len(files) == 31  # the rows of the dictionary, a name per row or more
+    assert len(files) == 32  # the rows of the dictionary, a name per row or more
 
 
 @pytest.mark.parametrize(("effect", "sensor"), PAIRS, ids=IDS)

@@ -42,7 +42,7 @@ def structure_of(view: Scene, directed: tuple[Directed, ...] = ()) -> Structure:
             if sensor is None or (role != "position" and view.log.kind == "position"):
                 continue
             usual, wandering = _sizes(view, index, role, sensor)
-            loading = slopes * usual
+            loading = slopes * usual * _episodes(view, index, role)[:, None, None]
             own = role == "ranging" and index == last  # each target is a reading of its own
             covariance = loading @ np.swapaxes(loading, 1, 2)
             white.append(White((stage.name, role), covariance, None if own else loading))
@@ -74,6 +74,16 @@ def _sizes(view: Scene, index: int, role: str, sensor: Sensor) -> tuple[Array, A
             axes = DOWN if one.effect.opens == "down" else np.ones(3)
             wandering = wandering + (figures[0] * axes) ** 2
     return usual, np.sqrt(usual**2 + wandering)
+
+
+def _episodes(view: Scene, index: int, role: str) -> Array:
+    """Standard deviations over the usual ones that the spec's own episodes have (n,)."""
+    total = np.ones(len(view))
+    for one in view.known:
+        if (one.stage, one.sensor, one.effect.opens) == (index, role, "episode"):
+            grown = one.effect.depart(view.rows[index], one.values, one.sensor, None)
+            total = total * (1.0 + getattr(grown, f"{role}_noise"))
+    return total
 
 
 def _known_scatter(view: Scene) -> list[Array]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from syncline_design.diagnosis.candidates import EDGE
 from syncline_design.diagnosis.consequence import Weights, rms_m
+from syncline_design.diagnosis.episodes import Episode, episode_effect
 from syncline_design.diagnosis.fitting import Data, Model, Opened, bounds_of
 from syncline_design.diagnosis.gross import Gross
 from syncline_design.diagnosis.identify import Alias, Comparison
@@ -284,12 +285,32 @@ def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:
     return _finding(final, effect, label, shown, _noise_size(data, model, opened), weights)
 
 
+def episode_finding(data: Data, one: Episode, weights: Weights) -> Finding:
+    """Noise of a sensor that is larger for a while."""
+    effect = episode_effect()
+    time_s = data.structure.time_s
+    shown = {"factor": estimate(one.factor, one.spread)}
+    ends = {"from_s": one.from_s - time_s[0], "to_s": one.to_s - time_s[0]}
+    shown |= {name: estimate(float(end), None, "s") for name, end in ends.items()}
+    part = next(w for w in data.structure.white if w.sensor == one.sensor)
+    variance = np.einsum("nii->ni", part.covariance) * np.isfinite(data.view.log.truth_m)
+    more = np.mean(np.sum(variance, axis=1) * (one.growth(time_s) ** 2 - 1.0))
+    size_m = float(np.sqrt(max(more, 0.0)))
+    stage, sensor = one.sensor
+    values = tuple((name, e.value) for name, e in shown.items())
+    material = weights.material(size_m, EffectEntry(effect.name, sensor, stage, values))
+    words = f"saves {one.gain:.1f} nat in its part of the log"
+    found = finding(effect, sensor, stage, shown, words, one.gain, None,
+                    material=material, size_m=size_m)  # fmt: skip
+    return replace(found, from_s=one.from_s, to_s=one.to_s)
+
+
 def _noise_size(data: Data, model: Model, opened: Opened) -> float:
     """RMS [m] of what one stochastic effect of the fitted noise has beyond the spec's."""
     others = bounds_of(data, [one for one in model.opened if one is not opened])
     within = clipped(model.level, others)
     sizes = (0.0 if k == opened.directed else s for k, s in enumerate(model.level.size))
-    within = replace(within, size=tuple(sizes))
+    within = replace(within, size=tuple(sizes), episodes=model.level.episodes)
     levels = [marginal_variance(data.structure, level) for level in (model.level, within)]
     visible = np.isfinite(data.view.log.truth_m)
     return float(np.sqrt(max(np.mean(np.sum((levels[0] - levels[1]) * visible, axis=1)), 0.0)))

@@ -58,7 +58,7 @@ def _variances(data: Data, model: Model, directed: int) -> tuple[Array, Array, A
     level = with_size(model.level, directed, 0.0)
     white = white_covariance(structure, level)[:, axes][:, :, axes]
     lower = np.linalg.cholesky(white)
-    error = np.linalg.solve(lower, (model.error - _lasting(data, model))[:, axes, None])
+    error = np.linalg.solve(lower, (model.error - lasting(data, model))[:, axes, None])
     motion = np.linalg.solve(lower, structure.directed[directed].direction[:, axes])
     basis = _along_and_across(motion[:, :, 0])
 
@@ -79,7 +79,7 @@ def _variances(data: Data, model: Model, directed: int) -> tuple[Array, Array, A
     return columns, ((basis @ error) ** 2).ravel(), known.ravel()
 
 
-def _lasting(data: Data, model: Model) -> Array:
+def lasting(data: Data, model: Model) -> Array:
     """What the slow noise that outlasts many stamps makes of the error [m], (n, 3).
 
     Slow noise of a few stamps is as good as white, and a smoother's remainder of it is neither.

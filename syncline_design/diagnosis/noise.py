@@ -40,16 +40,27 @@ class White:
 
     loading (n, 3, k) with loading loading' = covariance for a sensor that reads once a stamp: its
     noise is common to the rows of the stamp.  None where every row is a reading of its own.
+    growth (n,): standard deviations over the spec's that the log's own episodes have; None: none.
     """
 
     sensor: Sensor
     covariance: Array
     loading: Array | None = None
+    growth: Array | None = None
 
     def rows(self, index: Rows) -> White:
         """The same noise on some of the rows."""
         loading = None if self.loading is None else self.loading[index]
-        return White(self.sensor, self.covariance[index], loading)
+        growth = None if self.growth is None else self.growth[index]
+        return White(self.sensor, self.covariance[index], loading, growth)
+
+    def grown(self, level: NoiseLevel) -> White:
+        """The noise with its episodes, where the level has them."""
+        if self.growth is None or not level.episodes:
+            return self
+        times = self.growth[:, None, None]
+        loading = None if self.loading is None else times * self.loading
+        return White(self.sensor, times**2 * self.covariance, loading)
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,12 +134,14 @@ class NoiseLevel:
 
     factor: per white part; slow: per slow part the variances over the spec's, per column;
     time_constant_s: per slow part, per column; size: per directed part [its unit].
+    episodes: whether white noise grows where the structure says that it does for a while.
     """
 
     factor: tuple[float, ...]
     slow: tuple[tuple[float, ...], ...]
     time_constant_s: tuple[tuple[float, ...], ...]
     size: tuple[float, ...] = ()
+    episodes: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,6 +194,7 @@ def as_specified(structure: Structure) -> NoiseLevel:
     guess = first_guess(structure)
     return replace(
         guess,
+        episodes=False,
         factor=tuple(1.0 for _ in structure.white),
         slow=tuple(tuple(SLOW_LEAST for _ in range(s.columns)) for s in structure.slow),
     )
@@ -196,6 +210,7 @@ def clipped(level: NoiseLevel, bounds: Bounds) -> NoiseLevel:
             for vs, bs in zip(level.slow, bounds.slow, strict=True)
         ),
         size=tuple(0.0 for _ in level.size),
+        episodes=False,
     )
 
 
@@ -211,7 +226,7 @@ def white_covariance(structure: Structure, level: NoiseLevel) -> Array:
     if structure.stamped is not None:
         total += structure.stamped @ np.swapaxes(structure.stamped, 1, 2)
     for part, factor in zip(structure.white, level.factor, strict=True):
-        total += factor**2 * part.covariance
+        total += factor**2 * part.grown(level).covariance
     for directed, size in zip(structure.directed, level.size, strict=True):
         if size > 0.0:
             total += size**2 * (directed.direction @ np.swapaxes(directed.direction, 1, 2))
@@ -225,7 +240,7 @@ def row_covariance(structure: Structure, level: NoiseLevel) -> Array:
     total = structure.fixed.copy()
     for part, factor in zip(structure.white, level.factor, strict=True):
         if part.loading is None:
-            total += factor**2 * part.covariance
+            total += factor**2 * part.grown(level).covariance
     return total
 
 
@@ -236,7 +251,7 @@ def common_loading(structure: Structure, level: NoiseLevel) -> Array:
         columns.append(structure.stamped)
     for part, factor in zip(structure.white, level.factor, strict=True):
         if part.loading is not None:
-            columns.append(factor * part.loading)
+            columns.append(factor * np.asarray(part.grown(level).loading))
     for directed, size in zip(structure.directed, level.size, strict=True):
         if size > 0.0:
             columns.append(size * directed.direction)
@@ -344,7 +359,7 @@ class _Packing:
         own = np.cumsum([0, *(part.columns for part in structure.slow)])
         factor = np.array(
             [
-                2.0 * f**2 * summed_over(found, w.covariance)
+                2.0 * f**2 * summed_over(found, w.grown(level).covariance)
                 if not structure.shared or w.loading is None
                 else 0.0
                 for w, f in zip(structure.white, level.factor, strict=True)

@@ -19,7 +19,7 @@ from syncline_design.diagnosis.candidates import (
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.consequence import Promise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.findings import entry_of, findings
+from syncline_design.diagnosis.findings import entry_of, episode_finding, findings
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
 from syncline_design.diagnosis.gap import block_folds, gap, regime_fold
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
@@ -214,6 +214,7 @@ def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
     left = rest.p < REMAINDER_SHARE * search.settings.false_alarm_rate
     weights = weighed(promise, data)
     named = findings(result.final, faults, weights, left)
+    named = (*named, *(episode_finding(data, one, weights) for one in search.episodes or ()))
     if untouched is not None:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))
     causes = [entry_of(one) for one in named if one.kind == "cause" and one.material]
@@ -283,7 +284,8 @@ def _searched(
     data = with_shown_survey(data, signatures(view, found))
     progress("searching", 0.15)
     search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
-    return data, search, search.run()
+    result = search.run()
+    return search.data, search, result
 
 
 def with_shown_ranging(data: Data) -> Data:

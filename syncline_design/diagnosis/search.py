@@ -23,6 +23,7 @@ from syncline_design.diagnosis.candidates import (
     commonness,
     signatures,
 )
+from syncline_design.diagnosis.episodes import Episode, episode_effect, episodes, with_episodes
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
 from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
@@ -51,6 +52,7 @@ WANDER_NATS = (
 TAILS_NATS = 10.0  # by which Student's t has to be better than the normal
 AS_GOOD_NATS = 2.0  # difference in log p within which the commoner of two effects is named
 MOVED = 2.0  # standard uncertainties by which an effect has to move for its rivals to be tried
+EPISODES = 7  # key of the draws that look for them
 RIVAL_NATS = 4.5  # a rival whose fit is worse by less than this cannot be told apart
 
 Label = tuple[str, str, int]
@@ -115,6 +117,7 @@ class Search:
     signatures: tuple[Signature, ...]
     states: States
     progress: Callable[[float], None]
+    episodes: tuple[Episode, ...] | None = None  # None until they were looked for
 
     def run(self) -> SearchResult:
         """Add effects while they beat chance; then take out what is no longer needed."""
@@ -123,7 +126,12 @@ class Search:
         while len(model.labels) < self.settings.max_effects:
             scores = gram(self.data, model, self.free_signatures(model), model.level)
             threshold = self.threshold(scores)
-            trial = self.best(model, scores, threshold)
+            trial = self.moving(model, scores, threshold)
+            if trial is None and self.episodes is None and self.with_episodes(model):
+                base = fit(self.data)
+                model = fit(self.data, model.acting, model.opened, start=model.level)
+                continue
+            trial = trial or self.noise(model, threshold)
             if trial is None:
                 break
             model = cut_down(self.states, self.exchanged(trial.model, model))
@@ -154,22 +162,32 @@ class Search:
         """Signatures of what the model does not hold yet."""
         return [s for s in self.signatures if s.candidate.label not in model.labels]
 
-    def best(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
+    def with_episodes(self, model: Model) -> bool:
+        """Look for noise that is larger for a while, once; whether the data have it now."""
+        rng = np.random.Generator(np.random.Philox([self.settings.seed, EPISODES]))
+        wanted = episode_effect().name not in self.settings.exclude_effects
+        self.episodes = episodes(self.data, model, rng) if wanted else ()
+        if self.episodes:
+            self.data = with_episodes(self.data, self.episodes)
+            self.states = slow_states(self.data)
+        return bool(self.episodes)
+
+    def moving(self, model: Model, scores: Gram, threshold: float) -> Trial | None:
         """The candidate that best explains what is left, its noise fitted anew; none beats chance.
 
-        Effects that move the mean go first, in all of the log and then in a part of it, then waves
-        without a name, then noise.
+        Effects that act in all of the log go first, then those in a part of it, then waves without
+        a name; noise comes after all of them.
         """
         moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
         if not kept and (part := self.part_trial(model)) is not None:
             return part
-        if not kept and (wave := self.wave_trial(model)) is not None:
-            return wave
-        if not kept:
-            scattering = [t for t in self.scatter_trials(model) if plausible(self.data, t.model)]
-            kept = [t for t in scattering if t.log_p <= threshold]
-        return preferred(kept)
+        return preferred(kept) if kept else self.wave_trial(model)
+
+    def noise(self, model: Model, threshold: float) -> Trial | None:
+        """The noise that best explains how what is left scatters; none beats chance."""
+        found = [t for t in self.scatter_trials(model) if plausible(self.data, t.model)]
+        return preferred([t for t in found if t.log_p <= threshold])
 
     def standing(self, model: Model, free: Sequence[Signature]) -> dict[Label, float]:
         """Effects that noise of another kind would not show by chance, with how sure that is.
@@ -315,6 +333,7 @@ def ladder(data: Data, model: Model) -> list[NoiseLevel]:
     kept = replace(
         spec,
         size=model.level.size,
+        episodes=model.level.episodes,
         factor=tuple(max(f, 0.3) for f in model.level.factor),
     )
     return [model.level, kept]

@@ -121,7 +121,12 @@ def _standing(
     while model.acting:
         stated = as_specified(data.structure)
         larger = tuple(max(own, 1.0) for own in model.level.factor)
-        by_spec = replace(model, level=replace(stated, factor=larger, size=model.level.size))
+        by_spec = replace(
+            model,
+            level=replace(
+                stated, factor=larger, size=model.level.size, episodes=model.level.episodes
+            ),
+        )
         both = zip(model.acting, states.own(model), states.own(by_spec), strict=True)
         judged = [(a, max(pair, key=lambda one: one.log_p)) for a, *pair in both]
         fallen = [(one.log_p, a.label) for a, one in judged if not standing(one, a.effect)]

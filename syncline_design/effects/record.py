@@ -232,9 +232,11 @@ def everywhere(stage: Stage, sensor: Target) -> bool:
 
 
 Promise = Literal["timing", "latency", "clock", "lever_arm", "mounting", "noise"]
-Opening = Literal["", "factor", "slow", "down", "size", "tails"]
+Opening = Literal["", "factor", "slow", "down", "size", "tails", "episode"]
 # Figures that each opening fits, in the order of the effect's parameters.
-OPENED: Mapping[Opening, int] = {"factor": 1, "slow": 2, "down": 2, "size": 1, "tails": 2}
+OPENED: Mapping[Opening, int] = {
+    "factor": 1, "slow": 2, "down": 2, "size": 1, "tails": 2, "episode": 3,
+}  # fmt: skip
 OUTLIER_FACTOR = 10.0  # what opens tails has outliers of so many times the spec's deviation
 SELDOM = 1000
 
@@ -277,7 +279,8 @@ class Effect:
     rarity: where two effects fit a log equally well, the one that is met more often is named, the
     one of the lower figure, and the other listed as its alias; the order is ours, by judgement.
     opens: which of a log's noise a stochastic one sets free: the "factor" of its sensor, the "slow"
-    noise of its sensor or its "down" part alone, the "size" of its own scatter, the "tails".
+    noise of its sensor or its "down" part alone, the "size" of its own scatter, the "tails", or the
+    white noise of its sensor for an "episode".
     undoing: a discrete one's.
     bounded_by_k: charged with k times its standard deviation, k the coverage factor.
     memory: the parameter that is the time constant of what it remembers, "" of one without memory.

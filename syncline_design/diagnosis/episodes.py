@@ -1,0 +1,207 @@
+"""Noise that changes: a sensor that scatters more in a part of the log.
+
+With e what the named effects and slow noise leave, Sigma its white covariance and C_s one sensor's
+part of it, a row says of that part
+    t = (w' C_s w - tr Sigma^-1 C_s) / 2,   w = Sigma^-1 e,
+the slope of its log likelihood by the part's size.  Means of t over a stretch and outside it are
+held against those of the same blocks in any other order: what scatters alike all along knows no
+order.  The stretch to the row is the one that saves most at its own size.  What is left in it has
+to come and go from row to row: a missing effect that shows while the vehicle moves is no noise.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from syncline_design.diagnosis.fitting import Data, Model, data_of
+from syncline_design.diagnosis.motion_scatter import lasting
+from syncline_design.diagnosis.noise import Sensor, as_specified, white_covariance
+from syncline_design.effects import registry
+from syncline_design.effects.record import Array, Effect
+
+BLOCKS = 40
+LEAST, MOST = 2, 30  # blocks of a stretch
+CUT = 9.0  # times its expectation beyond which a row's square is cut while a stretch is looked for
+ORDERS = 1000  # of the blocks, against which a stretch has to stand out
+EXPLAINED = 0.5  # share of the variance between blocks that the stretch has to make up
+LEAST_GROWN = 1.3  # standard deviations over the usual ones
+SIZES = np.geomspace(1.05, 300.0, 90)
+NATS = 15.0
+MEDIAN_SQUARE = 0.4549364231195724  # of the standard normal
+STEADY = 0.5  # correlation of one row with the next above which it is no noise
+MOST_EPISODES = 3
+ROUNDS = 4
+LEAST_ROWS = 200  # of a log that is searched
+
+
+@dataclass(frozen=True, slots=True)
+class Episode:
+    """A sensor whose white noise is `factor` times as large from one stamp to another.
+
+    spread: standard uncertainty of the factor; gain: nat saved.
+    """
+
+    sensor: Sensor
+    from_s: float
+    to_s: float
+    factor: float
+    spread: float
+    gain: float
+
+    def growth(self, time_s: Array) -> Array:
+        """Standard deviations over the usual ones (n,)."""
+        inside = (time_s >= self.from_s) & (time_s <= self.to_s)
+        return np.where(inside, self.factor, 1.0)
+
+
+def episode_effect() -> Effect:
+    """The effect of the dictionary that an episode is."""
+    return next(one for one in registry().values() if one.opens == "episode")
+
+
+def with_episodes(data: Data, found: tuple[Episode, ...]) -> Data:
+    """The data with the white noise of some sensors growing for a while."""
+    time_s = data.structure.time_s
+    white = []
+    for part in data.structure.white:
+        own = [one.growth(time_s) for one in found if one.sensor == part.sensor]
+        white.append(replace(part, growth=np.prod(own, axis=0)) if own else part)
+    structure = replace(data.structure, white=tuple(white))
+    return replace(data_of(data.view, structure), axes=data.axes)
+
+
+def episodes(data: Data, model: Model, rng: np.random.Generator) -> tuple[Episode, ...]:
+    """The episodes of a log, the clearest first."""
+    if len(data.view) < LEAST_ROWS:
+        return ()
+    axes = list(data.axes)
+    left = (model.error - lasting(data, model))[:, axes]
+    found: tuple[Episode, ...] = ()
+    structure = data.structure
+    while len(found) < MOST_EPISODES:
+        level = replace(as_specified(structure), episodes=True)
+        white = white_covariance(structure, level)[:, axes][:, :, axes]
+        parts = [
+            (w.sensor, w.grown(level).covariance[:, axes][:, :, axes]) for w in structure.white
+        ]
+        tried = [one for p in parts if (one := _in_sensor(data, left, white, p, rng))]
+        if not tried:
+            break
+        found = (*found, max(tried, key=lambda one: one.gain))
+        structure = with_episodes(data, found).structure
+    return found
+
+
+def _in_sensor(
+    data: Data,
+    left: Array,
+    white: Array,
+    part: tuple[Sensor, Array],
+    rng: np.random.Generator,
+) -> Episode | None:
+    """The stretch in which one sensor's noise is larger, if there is one."""
+    sensor, own = part
+    inverse = np.linalg.inv(white)
+    weighted = np.einsum("nij,nj->ni", inverse, left)
+    expected = np.einsum("nij,nji->n", inverse, own)
+    square = np.einsum("ni,nij,nj->n", weighted, own, weighted)
+    usual = np.median(square / np.maximum(expected, 1e-300))
+    slope = np.minimum(square, CUT * max(float(usual), 1.0) * expected) - expected
+    blocks = np.array([part.mean() for part in np.array_split(slope, BLOCKS)])
+    if not np.any(expected > 0.0) or (place := _stands_out(blocks, rng)) is None:
+        return None
+    edges = np.linspace(0, len(left), BLOCKS + 1).astype(int)
+    first, last = int(edges[place[0]]), int(edges[place[1]])
+    factor, times = 1.0, 1.0
+    for _ in range(ROUNDS):
+        times = _usual(left, white, first, last)
+        rest, mine = times * (white - own), times * own
+        inside = slice(first, last)
+        saved = [np.sum(_saved(left[inside], rest[inside], mine[inside], k)) for k in SIZES]
+        factor = float(SIZES[int(np.argmax(saved))])
+        first, last = _best_run(_saved(left, rest, mine, factor))
+    inside = slice(first, last)
+    parts = (left[inside], times * (white - own)[inside], times * own[inside])
+    gain = float(np.sum(_saved(*parts, factor)))
+    if factor < LEAST_GROWN or gain < NATS + 2.0 * math.log(BLOCKS):
+        return None
+    if _steady(np.linalg.solve(np.linalg.cholesky(white[inside]), left[inside, :, None])[:, :, 0]):
+        return None
+    time_s = data.structure.time_s
+    spread = _spread(*parts, factor)
+    return Episode(sensor, float(time_s[first]), float(time_s[last - 1]), factor, spread, gain)
+
+
+def _usual(left: Array, white: Array, first: int, last: int) -> float:
+    """Variance outside a stretch over the spec's, by the median of the squares (normal noise)."""
+    outside = np.r_[0:first, last : len(left)]
+    lower = np.linalg.cholesky(white[outside])
+    squares = np.linalg.solve(lower, left[outside, :, None]) ** 2
+    return float(np.median(squares)) / MEDIAN_SQUARE if outside.size else 1.0
+
+
+def _stands_out(blocks: Array, rng: np.random.Generator) -> tuple[int, int] | None:
+    """[first, last) block of the stretch that is louder than any order of the blocks shows."""
+    pairs = [(a, b) for a in range(BLOCKS) for b in range(a + LEAST, min(a + MOST, BLOCKS) + 1)]
+    first, last = np.array(pairs).T
+    count = last - first
+    size = np.sqrt(count * (BLOCKS - count) / BLOCKS)
+
+    def contrasts(rows: Array) -> Array:
+        sums = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(rows, axis=1)], axis=1)
+        inside = sums[:, last] - sums[:, first]
+        outside = sums[:, -1:] - inside
+        found: Array = (inside / count - outside / (BLOCKS - count)) * size
+        return found
+
+    own = contrasts(blocks[None])[0]
+    best = int(np.argmax(own))
+    orders = np.array([rng.permutation(blocks) for _ in range(ORDERS)])
+    most = float(np.max(contrasts(orders)))
+    total = float(np.sum((blocks - blocks.mean()) ** 2))
+    made_up = float(own[best] ** 2) / max(total, 1e-300)  # between and inside the two parts
+    if own[best] <= most or made_up < EXPLAINED:
+        return None
+    return pairs[best]
+
+
+def _saved(left: Array, rest: Array, own: Array, factor: float) -> Array:
+    """nat that every row saves when the sensor's part is factor^2 times as large (n,)."""
+
+    def cost(covariance: Array) -> Array:
+        lower = np.linalg.cholesky(covariance)
+        white = np.linalg.solve(lower, left[:, :, None])[:, :, 0]
+        size = np.sum(np.log(np.einsum("nii->ni", lower)), axis=1)
+        found: Array = 0.5 * np.sum(white**2, axis=1) + size
+        return found
+
+    saved: Array = cost(rest + own) - cost(rest + factor**2 * own)
+    return saved
+
+
+def _best_run(saved: Array) -> tuple[int, int]:
+    """Rows [first, last) of largest sum (Kadane's maximum subarray)."""
+    total = np.concatenate([[0.0], np.cumsum(saved)])
+    least = np.minimum.accumulate(total)
+    last = int(np.argmax(total[1:] - least[:-1])) + 1
+    return int(np.argmin(total[:last])), last
+
+
+def _steady(white: Array) -> bool:
+    """Whether what is left goes on from row to row (n, a)."""
+    if len(white) < 3:
+        return True
+    return bool(np.sum(white[1:] * white[:-1]) > STEADY * np.sum(white**2))
+
+
+def _spread(left: Array, rest: Array, own: Array, factor: float) -> float:
+    """Standard uncertainty of the factor, by the curve of the likelihood over its logarithm."""
+    step = 0.05
+    low, middle, high = (
+        float(np.sum(_saved(left, rest, own, factor * math.exp(k * step)))) for k in (-1, 0, 1)
+    )
+    curve = (2.0 * middle - low - high) / step**2
+    return factor / math.sqrt(curve) if curve > 0.0 else math.inf

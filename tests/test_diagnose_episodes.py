@@ -1,0 +1,103 @@
+"""Noise that is larger for a while: against what was put in, and what must not pass for it."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from syncline_design.diagnosis import Diagnosis, diagnose
+from syncline_design.diagnosis.episodes import _best_run, _stands_out
+from syncline_design.effects import registry
+from syncline_design.report.on_diagnosis import noise_lines
+from syncline_design.spec.edit import with_effects
+from syncline_design.spec.load import load
+from tests.test_effects import rows
+from tests.world import WorldLog, make_log, scenario
+
+Array = NDArray[np.float64]
+FROM_S, TO_S, TIMES = 30.0, 48.0, 6.0
+SIGMA_M = (0.012, 0.012, 0.02)  # of the car's positions
+
+
+def _louder(log: WorldLog, path: Path) -> Path:
+    """The log's file with more white noise in its positions for a while."""
+    with log.to_csv(path).open(encoding="utf-8", newline="") as file:
+        head, *lines = csv.reader(file)
+    table = np.array(lines, dtype=float)
+    time_s = table[:, head.index("time_s")]
+    inside = (time_s >= FROM_S) & (time_s <= TO_S)
+    rng = np.random.default_rng(8)
+    for axis, sigma in zip(("north", "east", "down"), SIGMA_M, strict=True):
+        more = rng.normal(0.0, sigma * np.sqrt(TIMES**2 - 1.0), int(inside.sum()))
+        table[inside, head.index(f"position_{axis}_m")] += more
+    text = [",".join(head), *(",".join(f"{v:.9g}" for v in row) for row in table)]
+    path.write_text("\n".join(text) + "\n", encoding="utf-8")
+    return path
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory: pytest.TempPathFactory) -> tuple[Diagnosis, Diagnosis]:
+    """What a log with a loud stretch says, and what it says once that is written into the spec."""
+    folder = tmp_path_factory.mktemp("episodes")
+    log = make_log(scenario("car_stops", 4, 80.0, 8.0), ())
+    path = _louder(log, folder / "log.csv")
+    spec = folder / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    first = diagnose(spec, [path])
+    return first, diagnose(with_effects(load(spec), first.effects_entries()), [path])
+
+
+def test_a_loud_stretch_is_said_with_its_sensor_size_and_interval(
+    found: tuple[Diagnosis, Diagnosis],
+) -> None:
+    (one,) = found[0].findings
+    assert (one.effect, one.sensor, one.kind, one.material) == (
+        "noise_episode", "position", "noise", True)  # fmt: skip
+    assert one.from_s == pytest.approx(FROM_S, abs=0.6)
+    assert one.to_s == pytest.approx(TO_S, abs=0.6)
+    factor = one.parameters["factor"]
+    assert factor.standard_uncertainty is not None
+    assert factor.value == pytest.approx(TIMES, abs=3.0 * factor.standard_uncertainty)
+    rows_inside, rows_all = 8.0 * (TO_S - FROM_S), 8.0 * 80.0
+    more_m = np.sqrt(np.sum(np.square(SIGMA_M)) * (TIMES**2 - 1.0) * rows_inside / rows_all)
+    assert one.size_m == pytest.approx(more_m, rel=0.1)
+    (line,) = noise_lines(found[0].findings)
+    assert line.startswith("Noise of position (car): ")
+    assert "times as much from" in line
+
+
+def test_written_back_the_same_log_agrees(found: tuple[Diagnosis, Diagnosis]) -> None:
+    assert found[1].verdict == "agrees"
+    assert found[1].findings == ()
+
+
+def test_the_stretch_of_largest_sum_is_that_of_all_stretches() -> None:
+    rng = np.random.default_rng(2)
+    saved = rng.normal(-0.2, 1.0, 60)
+    saved[20:33] += 1.5
+    sums = {(a, b): saved[a:b].sum() for a in range(60) for b in range(a + 1, 61)}
+    assert _best_run(saved) == max(sums, key=lambda pair: sums[pair])
+
+
+def test_blocks_that_scatter_alike_have_no_loud_stretch() -> None:
+    rng = np.random.default_rng(5)
+    flagged = sum(
+        _stands_out(rng.chisquare(30, 40) / 30.0, np.random.default_rng(k)) is not None
+        for k in range(60)
+    )
+    assert flagged <= 1
+    loud = rng.chisquare(30, 40) / 30.0
+    loud[11:17] += 3.0
+    assert _stands_out(loud, rng) == (11, 17)
+
+
+def test_the_simulated_noise_grows_between_its_ends_alone() -> None:
+    state = rows()  # 60 rows, a tenth of a second apart
+    values = {"factor": 4.0, "from_s": 1.95, "to_s": 3.05}
+    grown = registry()["noise_episode"].depart(state, values, "attitude", None).attitude_noise
+    assert np.flatnonzero(grown).tolist() == list(range(20, 31))
+    assert set(grown) == {0.0, 3.0}
