@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from syncline_design.effects.kinematics import elapsed
-from syncline_design.effects.noise_understated import EFFECT as UNDERSTATED
 from syncline_design.effects.record import (
     Basis,
     Contribution,
@@ -36,7 +35,14 @@ def _depart(rows: StageRows, values: Values, sensor: Target, rng: Rng) -> Depart
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
     """(factor - 1) times the sensor's terms: the error while it lasts."""
-    return UNDERSTATED.contribute(stage, {"factor": values["factor"]}, sensor, basis)
+    part, more = getattr(stage, sensor, None), max(values["factor"] - 1.0, 0.0)
+    if part is None:
+        return Contribution()
+    if sensor == "ranging":
+        sight_rad = more * math.hypot(*part.sigma[1:])
+        return Contribution(systematic_m=more * part.sigma[0], sight_rad=sight_rad)
+    size = more * math.hypot(*part.sigma)
+    return Contribution(turn_rad=size) if sensor == "attitude" else Contribution(systematic_m=size)
 
 
 EFFECT = Effect(
