@@ -5,6 +5,7 @@ Then one hidden delay of the receiver, found from pairs of formats.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -16,9 +17,10 @@ from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.readers import open_recording
 from syncline_design.logs.readers.epochs import WEEK_NS, gps_to_utc, week_start_ns
 from syncline_design.logs.reading import read_log
+from syncline_design.logs.stream_times import ASSUMED_GPS
 from syncline_design.spec.log_block import LogChoice
 from tests import flat_flight_logs as made
-from tests.flight_logs import TO_ENU, TO_FLU, Flight, flight, geodetic
+from tests.flight_logs import ORIGIN, TO_ENU, TO_FLU, Flight, flight, geodetic
 from tests.test_diagnose_recordings import FIXES, LATE_S, TRUTH, found, latency
 
 pytest.importorskip("pyubx2")
@@ -140,3 +142,46 @@ def test_the_delay_is_found_from_a_pair_of_formats(tmp_path: Path, name: str) ->
     value, sigma = latency(result)
     assert abs(value - LATE_S) < 4.0 * sigma
     assert [f.effect for f in result.findings if f.kind == "cause"] == ["latency"]
+
+
+# ---- what a file does not tell ------------------------------------------------------------------
+
+
+def rows_of(files: list[Path], choice: LogChoice) -> tuple[float, tuple[str, ...]]:
+    """The delay by least squares on the rows, and what was said of them."""
+    log = read_log(row_sources(files, choice, ["uav"], poses=False), ["uav"], needs_ranging=False,
+                   origin=choice.origin)  # fmt: skip
+    antenna, velocity = log.stages[0].antenna_m, log.stages[0].velocity_mps
+    assert antenna is not None
+    return -np.sum((antenna - log.truth_m) * velocity) / np.sum(velocity**2), log.notes
+
+
+@pytest.mark.parametrize("axes", ["ned", "enu"])
+def test_axes_that_no_file_tells_are_those_that_fit_the_globe(tmp_path: Path, axes: str) -> None:
+    """A TUM trajectory in either frame against fixes in WGS 84: the same delay, and it is said."""
+    fixes = made.write_pos(tmp_path / "gnss.pos", FIXES)
+    place = TRUTH.place if axes == "ned" else TO_ENU.apply(TRUTH.place)
+    rows = [f"{t // 10**9}.{t % 10**9:09d} {x:.9f} {y:.9f} {z:.9f} 0 0 0 1"
+            for t, (x, y, z) in zip(TRUTH.stamp_ns.tolist(), place, strict=True)]  # fmt: skip
+    reference = tmp_path / "ref.txt"
+    reference.write_text("\n".join(rows) + "\n")
+    origin = (math.radians(ORIGIN[0]), math.radians(ORIGIN[1]), ORIGIN[2])
+    late_s, notes = rows_of([fixes, reference], LogChoice.model_construct(origin=origin))
+    assert late_s == pytest.approx(LATE_S, abs=1e-3)
+    assert any("taken as the latter (log: {frame: ned})" in n for n in notes) == (axes == "ned")
+
+
+@pytest.mark.parametrize("told", [None, "utc", "gps"])
+def test_the_clock_of_week_seconds_is_the_specs_else_gps_and_said(
+    tmp_path: Path, told: str | None
+) -> None:
+    fixes = made.write_nmea(tmp_path / "gnss.log", FIXES)
+    reference = made.write_sbet(tmp_path / "ref.out", TRUTH)
+    whole = np.fromfile(reference, dtype="<f8").reshape(-1, 17)
+    whole[:, 0] -= 18.0 if told == "utc" else 0.0
+    whole.tofile(reference)
+    late_s, notes = rows_of([fixes, reference], LogChoice.model_construct(timeline=told))
+    assert late_s == pytest.approx(LATE_S, abs=1e-3)
+    said = "in UTC, as the spec says" if told == "utc" else "in GPS, as the spec says"
+    assert any((said if told else ASSUMED_GPS) in note for note in notes)
+    assert any("wander" in note for note in notes)

@@ -26,6 +26,7 @@ LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 LEAST_STEPS = 4  # rows in a window
 LEAST_WINDOWS = 8
 CLEAR = 20.0  # times the noise of a displacement: windows need not be longer
+_AS_LARGE = 0.05
 MOST_TURN_RAD = 0.7  # in one window: longer ones say no more
 LAGS_S = np.linspace(-1.0, 1.0, 41)
 LATE_S = 0.15  # by which a column may come late
@@ -303,7 +304,8 @@ def _described(
         best = (exact or near)[0]
         return Disagreement(best.factor, best.words)
     factor = float(np.sqrt(np.sum(own**2) / max(whole, 1e-300)))
-    return Disagreement(factor, f"{factor:.3g} times in size, and in another direction")
+    size = "as large" if abs(factor - 1.0) < _AS_LARGE else f"{factor:.3g} times in size"
+    return Disagreement(factor, f"{size}, and in another direction")
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,6 +29,7 @@ from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
+from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.quantity import format_estimate
 
@@ -252,7 +253,17 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     stage = view.system.stages[label[2]].name
     gain = math.log(fault.falls_by)
     words = f"undoing it makes the usual error {math.exp(gain):.0f} times smaller"
-    return finding(effect, label[1], stage, found, words, gain)
+    return finding(effect, label[1], stage, found, words + _of_a_clock(view, fault), gain)
+
+
+def _of_a_clock(view: Scene, fault: Gross) -> str:
+    """What else leap seconds may be: of stamps whose clock the file does not tell."""
+    slip = fault.acting.values.get("seconds")
+    taken = [note.split(":")[0] for note in view.log.notes if ASSUMED_GPS in note]
+    if not taken or not isinstance(slip, float) or round(abs(slip)) != GPS_MINUS_UTC_S:
+        return ""
+    return (f"; {taken[0]} was {ASSUMED_GPS}, and {GPS_MINUS_UTC_S} s is what UTC differs by: not "
+            f"the position's stamps may be wrong but that ({TELL_CLOCK})")  # fmt: skip
 
 
 def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:

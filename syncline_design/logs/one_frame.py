@@ -16,10 +16,17 @@ from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Part, Role
 from syncline_design.logs.smoothing import velocity_of
-from syncline_design.logs.stream_values import GLOBE, Values, height_of, separation_of
+from syncline_design.logs.stream_values import (
+    ENU_TO_NED,
+    GLOBE,
+    Values,
+    height_of,
+    separation_of,
+)
 from syncline_design.spec.log_block import LogChoice
 
 WORTH_SAYING_RAD: Final = 1e-4
+SWAPPED: Final = 0.3  # of what is left in the axes assumed, where others are the right ones
 TILTED: Final = 0.3  # what a turn about any axis has to leave of the rest, where down is not told
 
 
@@ -59,11 +66,48 @@ def in_one_frame(
                 _about(one, other.origin, f"the origin of {other.offer.name}")
                 return
             if choice.origin is not None:
+                if other.assumed and choice.frame is None:
+                    _with_fitting_axes(other, one, np.asarray(choice.origin, dtype=float))
                 return  # `places` makes it local there
             first = _first_place(one)
             _about(one, first, "its own first fix")
     if tested.has(POSITION[:2]) and reference.has(POSITION[:2]) and choice.origin is None:
         _lay(reference, tested, pair)
+
+
+def _with_fitting_axes(one: Values, globe: Values, origin: Array) -> None:
+    """Axes that nothing tells, as places of WGS 84 show them: assumed, or north, east, down.
+
+    One of the two has to leave far less than the other; a delay costs metres, wrong axes the way.
+    """
+    if not one.has(POSITION):
+        return
+    heights = globe.columns.get("height_m", np.full(globe.time_ns.shape, origin[2]))
+    place = geodetic_to_ned(np.stack([*(globe.columns[n] for n in GLOBE), heights], 1), origin)
+    own = _track(one, globe.time_ns).place
+    other = own @ ENU_TO_NED.T
+    level = slice(0, 2)
+    left = [_left(place[:, level] - places[:, level]) for places in (own, other)]
+    if not np.isfinite(left).all() or left[1] > SWAPPED * left[0]:
+        return
+    one.put(POSITION, one.vectors(POSITION) @ ENU_TO_NED.T)
+    if one.has(VELOCITY):
+        one.put(VELOCITY, one.vectors(VELOCITY) @ ENU_TO_NED.T)
+    if one.has(ATTITUDE):
+        turned = ENU_TO_NED @ euler_to_rotation(one.vectors(ATTITUDE))
+        one.put(ATTITUDE, rotation_to_euler(turned))
+    one.notes[:] = [n for n in one.notes if "the frame is not told" not in n and
+                    "positions in east, north, up" not in n]  # fmt: skip
+    one.note(
+        f"the frame is not told: as east, north, up it is {left[0]:.3g} m from "
+        f"{globe.offer.name}, as north, east, down {left[1]:.3g} m: taken as the latter "
+        "(log: {frame: ned})"
+    )
+
+
+def _left(apart: Array) -> float:
+    known = apart[np.isfinite(apart).all(axis=1)]
+    return float(np.sqrt(np.mean(np.sum(known**2, axis=1)))) if known.shape[0] > 3 else float("nan")
 
 
 def _first_place(one: Values) -> Array:

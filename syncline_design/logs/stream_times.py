@@ -25,6 +25,9 @@ from syncline_design.spec.log_block import LogChoice
 CALENDARS: Final = ("utc", "gps", "tai")
 UTC_CLOCK: Final = "clock_utc_ns"
 LEAST_PAIRS: Final = 3
+GPS_MINUS_UTC_S: Final = 18  # since 2017
+ASSUMED_GPS: Final = "taken as GPS time, which the file does not tell"
+TELL_CLOCK: Final = "log: {timeline: utc} if they are UTC"
 
 
 def on_one_timeline(several: Sequence[Values], choice: LogChoice) -> bool:
@@ -71,7 +74,10 @@ def _counts_weeks(one: Values) -> bool:
 def _with_weeks(
     several: Sequence[Values], timelines: dict[int, Timeline], choice: LogChoice
 ) -> None:
-    """Seconds of the week get their week: the spec's, or that of another file of the call."""
+    """Seconds of the week get their week: the spec's, or that of another file of the call.
+
+    They count on the clock that the spec names; without one GPS's is assumed, and said.
+    """
     lacking = [one for one in several if timelines[id(one)] == "unknown" and _counts_weeks(one)]
     for one in lacking:
         week, source = choice.gps_week, "as the spec says"
@@ -81,8 +87,11 @@ def _with_weeks(
             continue
         set_ = one.time_ns != UNSET
         one.time_ns = np.where(set_, one.time_ns + week_start_ns(week), UNSET)
-        timelines[id(one)] = "gps"
+        told = choice.timeline if choice.timeline in CALENDARS else None
+        timelines[id(one)] = told or "gps"
         one.note(f"seconds of the week are of GPS week {week}, {source}")
+        clock = f"in {told.upper()}, as the spec says" if told else f"{ASSUMED_GPS} ({TELL_CLOCK})"
+        one.note(f"seconds of the week are {clock}")
 
 
 def _week_beside(

@@ -96,6 +96,8 @@ def values_of(offer: Offer, pieces: Sequence[Piece], choice: LogChoice) -> Value
         factor = suffix_unit(name)[0]
         columns[si_name(name)] = values * factor if factor != 1.0 else values
     found = Values(offer, time_ns, columns)
+    for words in offer.stream.notes:  # what its reader did
+        found.note(words)
     frame, body = _axes(found, choice)
     turn = _attitude(found, frame, body)
     _position(found, frame)

@@ -64,6 +64,7 @@ DIAGNOSES: Final[dict[str, Outcome]] = {
 _UNSOUND: Final = Outcome(
     "bad", "!", "Unexplained: the log contradicts itself or the limits of the spec's platform"
 )
+RULED_OUT: Final = 0.01  # probability of an alias that is not held open
 LARGE: Final = 1.25  # times the RMS that the spec's noise expects: said in the outcome
 NOWHERE: Final = "in no regime on average: it shows in how the errors vary, not in their mean"
 MOST_REGIMES: Final = 4  # told outside the page
@@ -267,11 +268,16 @@ def finding_node(found: Finding) -> Node:
     if found.varying:
         values = sentence_list([_stretch_text(one) for one in found.varying])
         nodes.append(Text(f"It varies along the log: {values}.", mark="!"))
-    if found.aliases:
-        names = sentence_list([_alias_text(one) for one in found.aliases])
+    unlikely = [a for a in found.aliases if a.probability is not None and a.probability < RULED_OUT]
+    open_ = [a for a in found.aliases if a not in unlikely]
+    if open_:
+        names = sentence_list([_alias_text(one) for one in open_])
         apart = f"To separate them: {found.separated_by}."
         words = f"This log cannot tell it apart from {names}. {apart}"
         nodes.append(Text(words, mark="!", tone="warn"))
+    if unlikely:
+        names = sentence_list([_alias_text(one) for one in unlikely])
+        nodes.append(Text(f"Of the same signature, but unlikely here: {names}.", quiet=True))
     if found.lookalikes:
         names = sentence_list([rival_text(one, alike=True) for one in found.lookalikes])
         nodes.append(Text(f"In its place on this log: {names}.", quiet=True))

@@ -117,8 +117,8 @@ class SbetRecording(BatchRecording):
             primary=WEEK_SECONDS,
             of_times=of_times,
             notes=(
-                "yaw is platform heading minus wander; velocities were turned from the wander "
-                "frame to north, east, down",
+                "yaw is platform heading minus wander; velocities (y to the left, z up) were "
+                "turned from the wander frame to north, east, down",
             ),
             body="frd",
             kind="SBET",
