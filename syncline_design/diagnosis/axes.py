@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from syncline_design.diagnosis.noise import Structure
+from syncline_design.diagnosis.noise import Structure, White
 from syncline_design.diagnosis.scene import scene
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
@@ -55,6 +55,38 @@ def without_still_axes(
         return log
     note = f"{' and '.join(hidden)}: the same error in every row, so not compared"
     return replace(log, truth_m=truth, notes=(*log.notes, note))
+
+
+def still_axes_apart(structure: Structure, axes: Axes) -> Structure:
+    """The structure with the noise of axes that never vary fixed and each for itself.
+
+    Such an axis is off by a constant, which effects have to explain as well as the spec's noise
+    lets them; that it does not scatter says nothing about how large the noise of the others is.
+    """
+    still = np.array([k not in axes for k in range(3)])
+    if not np.any(still):
+        return structure
+    moving = (~still)[:, None].astype(float)
+    total = sum(np.einsum("nii->ni", w.covariance) for w in structure.white)
+    if structure.stamped is not None:
+        total = total + np.sum(structure.stamped**2, axis=2)
+    fixed = structure.fixed * (moving * moving.T)
+    kept = np.einsum("nii->ni", structure.fixed)
+    fixed = fixed + ((kept + total) * still)[:, :, None] * np.eye(3)
+    return replace(
+        structure,
+        white=tuple(_on(part, moving) for part in structure.white),
+        slow=tuple(replace(part, loading=part.loading * moving) for part in structure.slow),
+        directed=tuple(replace(d, direction=d.direction * moving) for d in structure.directed),
+        stamped=None if structure.stamped is None else structure.stamped * moving,
+        fixed=fixed,
+    )
+
+
+def _on(part: White, moving: Array) -> White:
+    """White noise on some of the axes, moving (3, 1) 1 on them and 0 on the others."""
+    loading = None if part.loading is None else part.loading * moving
+    return White(part.sensor, part.covariance * (moving * moving.T), loading)
 
 
 def _expected_std(structure: Structure) -> Array:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from syncline_design.effects.record import SELDOM, Array, Effect, Target
 from syncline_design.model.system import Stage
 
 STEP_TIMES = 24  # places along the log where a step is looked for at first
+MEMORIES_S = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0)  # time constants whose shape is looked for as it is
+LEAST_MEMORY = 2.0  # stamps
 EDGE = 0.15  # share of the rows at either end where a step is not looked for: it would be a latency
 
 
@@ -41,11 +43,20 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Signature:
-    """Columns (n, 3, p) [m per unit] that a candidate adds to the error, located at `at`."""
+    """Columns (n, 3, p) [m per unit] that a candidate adds to the error, located at `at`.
+
+    start: values at which a memory has that shape, none where it is the slope at zero.
+    """
 
     candidate: Candidate
     at: dict[str, float]
     columns: Array
+    start: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is its candidate's one slope at zero."""
+        return not self.at and not self.start
 
 
 def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...]:
@@ -126,13 +137,33 @@ def zero_values(effect: Effect, at: dict[str, float] | None = None) -> dict[str,
 
 
 def signatures(view: Scene, found: Sequence[Candidate]) -> tuple[Signature, ...]:
-    """Signatures of all candidates whose mean error moves; a step at several times."""
-    return tuple(
+    """Signatures of all candidates whose mean error moves; a step at several times.
+
+    A memory of many seconds looks like no slope at zero: it is also looked for as it is, at some
+    time constants.
+    """
+    moving = [candidate for candidate in found if candidate.effect.sensitivity is not None]
+    located = [
         Signature(candidate, at, signature(view, candidate, at))
-        for candidate in found
-        if candidate.effect.sensitivity is not None
+        for candidate in moving
         for at in _locations(view, candidate.effect)
-    )
+    ]
+    return (*located, *(s for candidate in moving for s in _remembered(view, candidate)))
+
+
+def _remembered(view: Scene, candidate: Candidate) -> Iterator[Signature]:
+    """What an effect with a memory does, over its time constant, for those that the log can tell.
+
+    The slope at zero holds while the motion does not change within the memory.
+    """
+    name = candidate.effect.memory
+    if not name:
+        return
+    most = next(p.high for p in candidate.effect.parameters if p.name == name)
+    for constant_s in MEMORIES_S:
+        if LEAST_MEMORY * view.log.interval_s < constant_s < min(most, 0.1 * view.log.duration_s):
+            moved = view.error() - view.error((candidate.acting({name: constant_s}),))
+            yield Signature(candidate, {}, moved[:, :, None] / constant_s, {name: constant_s})
 
 
 def _locations(view: Scene, effect: Effect) -> list[dict[str, float]]:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.axes import Axes, varying_axes
+from syncline_design.diagnosis.borrowed import Noisier, borrowed_nats
 from syncline_design.diagnosis.candidates import Candidate, slopes
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.noise import (
@@ -46,6 +47,11 @@ class Data:
     noise_rows: NDArray[np.int64]
     noise_structure: Structure
     axes: Axes
+    noisier: tuple[Noisier, ...] = ()  # once a search is on
+
+    def borrowed_nats(self, model: Model, known: Precision) -> float:
+        """What noise of the columns of motion costs a model's effects [nat], at a covariance."""
+        return borrowed_nats(self.noisier, model.acting, model.error, known)
 
     def error(self, acting: Sequence[Acting]) -> Array:
         """Corrected error with unknown components at zero (they have a huge variance)."""

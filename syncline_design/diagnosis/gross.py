@@ -34,6 +34,7 @@ WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time s
 SHORT_SLIP = 2  # a slip this short may be a latency of no whole number of seconds
 SEARCHED_TO = 0.1  # what is searched so widely has to help so much
 FAR_BETTER = 0.5  # of the error of the best fault of the list
+MEMORY_SHARES = (0.5, 0.7, 0.85, 1.0, 1.2, 1.4, 2.0)  # time constants over the shift of stamps
 SHORT_SHIFT_S = 0.5  # a shorter shift of stamps is a latency, to be fitted
 MOST_DELAY_S = 0.25  # that a slip may have beside it
 NEARLY_FREE = 2.0  # the same for what is searched
@@ -155,12 +156,36 @@ def gross_faults(
             wide = None
         if not _clear(shift, size, expected_m):
             shift = None
+        listed, shift = (_unless_smoothed(one, base, exclude) for one in (listed, shift))
         best = _preferred(_preferred(listed, shift), wide)
         if best is None:
             break
         found.append(Gross(best.acting, size / max(best.size_m, 1e-300)))
         log = best.mend(log)
     return tuple(found), log
+
+
+def _unless_smoothed(tried: _Tried | None, base: Scene, exclude: Sequence[str]) -> _Tried | None:
+    """A shift of the positions' stamps, unless a memory of about as long fits far better.
+
+    Positions that a filter of some seconds smooths are late by as much, and by more than that.
+    """
+    if tried is None or tried.acting.sensor != "position" or not _is_shift(tried.acting):
+        return tried
+    around_s = abs(float(_value(tried.acting)))
+    sizes = [
+        usual_size(base.error((Acting(effect, "position", 0, {effect.memory: share * around_s}),)))
+        for effect in registry().values()
+        if effect.memory and effect.name not in exclude and "position" in effect.sensors
+        for share in MEMORY_SHARES
+        if effect.parameters[0].holds(share * around_s)
+    ]
+    return None if sizes and min(sizes) < FAR_BETTER * tried.size_m else tried
+
+
+def _is_shift(one: Acting) -> bool:
+    """Whether it moves stamps, by whole seconds or not."""
+    return _restamps(one) or one.effect.undoing is None
 
 
 def _far_down(left_m: float, size_m: float, expected_m: float) -> bool:

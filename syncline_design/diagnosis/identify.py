@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, slopes
+from syncline_design.diagnosis.charges import Charge, charge
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
+from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.spans import cut_to, cuttable, span_of
-from syncline_design.diagnosis.trials import freedom_of, plausible, with_effect
-from syncline_design.effects.record import Array, Effect
+from syncline_design.diagnosis.trials import plausible, with_effect
+from syncline_design.effects.record import Array
 
-Label = tuple[str, str, int]
 SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
 NEAR = 0.97  # above which another is refitted in its place: first order is not the last word
 CLASS_NATS = 15.0  # ... unless re-simulation fits worse by more than this
@@ -61,13 +62,6 @@ class Comparison:
     excluded: tuple[Alias, ...] = ()
 
 
-def without(model: Model, label: Label) -> Model:
-    """The model less one effect, not fitted again; its noise within what is left open."""
-    acting = tuple(a for a in model.acting if a.label != label)
-    opened = tuple(o for o in model.opened if o.candidate.label != label)
-    return replace(model, acting=acting, opened=opened)
-
-
 def competed(
     data: Data, model: Model, label: Label, others: Sequence[Signature], again: int = 2
 ) -> tuple[Model, Comparison]:
@@ -87,63 +81,79 @@ def competed(
     rest = without(model, label)
     fits = {a.candidate.label: with_effect(data, rest, found[a.candidate.label], rest.level)
             for a in near}  # fmt: skip
-    best = _best(data, model, label, fits)
+    charges = {one: charge(data, fitted, one, model) for one, fitted in fits.items()}
+    charges[label] = charge(data, model, label, model)
+    best = _best(data, model, label, fits, charges)
     if best != label and again:
         return competed(data, fits[best], best, others, again - 1)
-    return model, _sorted_out(data, model, label, screened, fits)
+    return model, _sorted_out(data, model, label, screened, fits, charges)
 
 
-def _price(data: Data, effect: Effect) -> float:
-    """What an effect pays for its freedom [nat]: half of log N a figure (Schwarz 1978)."""
-    return 0.5 * math.log(max(len(data.view) * len(data.axes), 2)) * freedom_of(effect)
+def _best(
+    data: Data,
+    named: Model,
+    label: Label,
+    fits: Mapping[Label, Model],
+    charges: Mapping[Label, Charge],
+) -> Label:
+    """The likeliest member of a class; among those that are as good, the commonest in practice.
 
-
-def _best(data: Data, named: Model, label: Label, fits: Mapping[Label, Model]) -> Label:
-    """The likeliest member of a class; among those that are as good, the commonest in practice."""
-    scores = {label: named.nll + _price(data, effect_of(named, label))}
+    As good is what noise of the columns of motion may have made worse.
+    """
+    scores = {label: named.nll + charges[label].nats + charges[label].prior}
     for other, model in fits.items():
         if plausible(data, model):
-            scores[other] = model.nll + _price(data, effect_of(model, other))
+            scores[other] = model.nll + charges[other].nats + charges[other].prior
     if len(scores) > 1 and not plausible(data, named):
         del scores[label]
-    least = min(scores.values())
-    close = [one for one, score in scores.items() if score <= least + AS_GOOD_NATS]
-    return min(close, key=lambda one: (commonness(one), scores[one], one))
-
-
-def effect_of(model: Model, label: Label) -> Effect:
-    """The effect of a label that the model holds."""
-    acting = {a.label: a.effect for a in model.acting}
-    return acting.get(label) or {o.candidate.label: o.candidate.effect for o in model.opened}[label]
+    least = min(scores, key=lambda one: (scores[one], one))
+    close = [
+        one for one, score in scores.items()
+        if score <= scores[least] + AS_GOOD_NATS + charges[one].doubt(charges[least])
+    ]  # fmt: skip
+    return min(close, key=lambda one: (charges[one].unusual, commonness(one), scores[one], one))
 
 
 def _sorted_out(
-    data: Data, named: Model, label: Label, screened: Sequence[Alias], fits: Mapping[Label, Model]
+    data: Data,
+    named: Model,
+    label: Label,
+    screened: Sequence[Alias],
+    fits: Mapping[Label, Model],
+    charges: Mapping[Label, Charge],
 ) -> Comparison:
     """Aliases, lookalikes and what is excluded, with the losses of the refits where there are."""
-    own = _price(data, effect_of(named, label))
     lists: tuple[list[Alias], list[Alias], list[Alias]] = ([], [], [])
     for one in screened:
-        model = fits.get(one.candidate.label)
+        model, doubt = fits.get(one.candidate.label), 0.0
         if model is not None:
             worse = model.nll - named.nll
-            loss = worse + _price(data, one.candidate.effect) - own
+            own, other = charges[label], charges[one.candidate.label]
+            doubt = own.doubt(other)
+            loss = _beyond(worse + other.nats - own.nats, doubt) + other.prior - own.prior
+            doubt += max(other.borrowed - own.borrowed, 0.0)
             one = replace(one, fit=worse, loss=loss, possible=plausible(data, model), refitted=True)
-        lists[_place(one)].append(one)
+        lists[_place(one, doubt)].append(one)
     aliases, lookalikes, excluded = lists
     return Comparison(tuple(aliases), tuple(lookalikes), tuple(excluded))
 
 
-def _place(one: Alias) -> int:
-    """Which list an effect belongs to: 0 aliases, 1 lookalikes, 2 excluded."""
-    same = one.cosine > SAME
-    if one.possible and (_rivals(one) or (same and one.fit < CLASS_NATS)):
+def _beyond(loss: float, doubt: float) -> float:
+    """What of a difference [nat] is beyond doubt."""
+    return math.copysign(max(abs(loss) - doubt, 0.0), loss)
+
+
+def _place(one: Alias, doubt: float) -> int:
+    """Which list an effect belongs to: 0 aliases, 1 lookalikes, 2 excluded.
+
+    doubt: by how much it may seem worse than it is [nat].
+    """
+    same, rivals = one.cosine > SAME, one.fit < RIVAL_NATS + doubt
+    if one.possible and (
+        (rivals and one.cosine > RIVAL_COSINE) or (same and one.fit < CLASS_NATS + doubt)
+    ):
         return 0
-    return 1 if same or one.fit < RIVAL_NATS else 2
-
-
-def _rivals(alias: Alias) -> bool:
-    return alias.fit < RIVAL_NATS and alias.cosine > RIVAL_COSINE
+    return 1 if same or rivals else 2
 
 
 def _screened(
@@ -207,7 +217,7 @@ def unseen(data: Data, model: Model, others: Sequence[Signature]) -> tuple[str, 
     """What this log could not show: parameters that at their plausible most stay below 3 sigma."""
     hidden = []
     for s in others:
-        if s.at:
+        if not s.plain:
             continue
         columns = np.nan_to_num(s.columns)
         own = np.sqrt(np.maximum(np.diag(inner(columns, model.precision.solve(columns))), 0.0))

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.diagnosis.axes import without_still_axes
+from syncline_design.diagnosis.axes import still_axes_apart, varying_axes, without_still_axes
 from syncline_design.diagnosis.candidates import (
     candidates,
     directed_parts,
@@ -280,7 +280,9 @@ def _searched(
     view = scene(inputs.system, log, inputs.known)
     found = candidates(view, settings.exclude_effects)
     parts = directed_parts(view, found)
-    data = with_shown_ranging(data_of(view, structure_of(view, parts)))
+    structure = structure_of(view, parts)
+    structure = still_axes_apart(structure, varying_axes(view.error(), structure))
+    data = with_shown_ranging(data_of(view, structure))
     data = with_shown_survey(data, signatures(view, found))
     progress("searching", 0.15)
     search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
@@ -361,7 +363,7 @@ def _whole_gap(
 
 def _placebo(data: Data, search: Search, result: SearchResult, untouched: Array | None) -> Gap:
     """The gap with one more effect, drawn from those that were not chosen."""
-    free = [s for s in search.free_signatures(result.model) if not s.at]
+    free = [s for s in search.free_signatures(result.model) if s.plain]
     if not free or not result.model.labels:
         return Gap(added="")
     chosen = free[int(search.rng.integers(len(free)))]

@@ -23,6 +23,7 @@ from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, Departures, StageRows, Target
 from syncline_design.logs.log import Log, LogTrack, Rows, StageLog
+from syncline_design.logs.stamps import per_stamp
 from syncline_design.model import timing
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.chain import rotation_exp
@@ -172,13 +173,25 @@ def _stage_rows(
         target_m=position + rotate(rotation, ranging + vector),
         lagged=LoggedPast(
             log.time_s,
-            logged.velocity_track or LogTrack(log.time_s, logged.velocity_mps),
+            _path_velocity(log, logged),
             log.time_s,
             rotation,
             logged.rate_radps,
             logged.follows_position,
         ),
     )
+
+
+def _path_velocity(log: Log, logged: StageLog) -> LogTrack:
+    """The velocity [m/s], NED, that a memory of the path sums up.
+
+    Of a path that is known itself it is the slope of the spline through it: the sum undoes the
+    slope's noise, and smoothing would take away of the motion.
+    """
+    if log.kind == "position" and logged.follows_reference and np.all(np.isfinite(log.truth_m)):
+        times, places = per_stamp(log.time_s, log.truth_m)
+        return LogTrack(times, pieces(times, places).slope(times, times))
+    return logged.velocity_track or LogTrack(log.time_s, logged.velocity_mps)
 
 
 def _mean_timing(system: System, stage: Stage, ranged: bool) -> Departures:

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from syncline_design.diagnosis.borrowed import noisier_scenes
 from syncline_design.diagnosis.candidates import (
     STEP_TIMES,
     Candidate,
@@ -357,5 +358,6 @@ def start_search(
     """Candidates and signatures of a log."""
     found = candidates(data.view, settings.exclude_effects)
     rng = np.random.Generator(np.random.Philox(settings.seed))
+    data = replace(data, noisier=noisier_scenes(data.view, rng.spawn(1)[0]))
     shown = signatures(data.view, found)
     return Search(data, settings, rng, found, shown, slow_states(data), progress)

@@ -7,9 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from syncline_design.diagnosis.borrowed import doubt_nats
 from syncline_design.diagnosis.candidates import Signature
 from syncline_design.diagnosis.fitting import Data, Model, fit
-from syncline_design.diagnosis.identify import Comparison, Label, competed, effect_of, without
+from syncline_design.diagnosis.identify import Comparison, competed
+from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.noise import as_specified
 from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted_of, names_of
 from syncline_design.diagnosis.tails import tails_in
@@ -166,7 +168,11 @@ def refitted_without(data: Data, model: Model, label: Label) -> Model:
 
 def _evidence(data: Data, model: Model, label: Label, less: Model) -> Evidence:
     effect = effect_of(model, label)
-    gain = max(less.nll - model.nll, 0.0)
+    gain = less.nll - model.nll
+    borrowed, without_it = (data.borrowed_nats(one, model.precision) for one in (model, less))
+    if borrowed < without_it:  # noise that an effect takes out of the columns is no evidence
+        gain -= without_it - borrowed + doubt_nats(borrowed, without_it)
+    gain = max(gain, 0.0)
     if any(o.candidate.label == label and o.what == "tails" for o in model.opened):
         gain += max(tails_in(data, model).gain, 0.0)  # not in the normal likelihood
     return Evidence(gain, log_chance(effect, gain, freedom_of(effect)))

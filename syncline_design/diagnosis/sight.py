@@ -47,7 +47,7 @@ def smallest_seen(search: Search, result: SearchResult) -> tuple[Seen, ...]:
         for one in (*compared.aliases, *compared.lookalikes)
     }
     free = [
-        s for s in search.free_signatures(model) if not s.at and s.candidate.label not in doubles
+        s for s in search.free_signatures(model) if s.plain and s.candidate.label not in doubles
     ]
     judged = search.states.judged(model, [s.columns for s in free]) if free else []
     log_p = search.chance(len({s.candidate.label for s in search.signatures}))

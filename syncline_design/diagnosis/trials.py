@@ -41,7 +41,8 @@ def log_chance(effect: Effect, gain: float, freedom: int) -> float:
 
 def with_effect(data: Data, model: Model, found: Signature, level: NoiseLevel) -> Model:
     """The model with one more effect that moves the mean, fitted from zero by re-simulation."""
-    start = found.candidate.acting(zero_values(found.candidate.effect, found.at))
+    values = {**zero_values(found.candidate.effect, found.at), **found.start}
+    start = found.candidate.acting(values)
     opened = model.opened
     if found.candidate.effect.kind == "stochastic":
         directed = directed_index(data, found.candidate)

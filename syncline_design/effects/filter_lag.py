@@ -80,7 +80,7 @@ EFFECT = Effect(
     name="filter_lag",
     sensors=("position",),
     kind="deterministic",
-    parameters=(Parameter("time_constant_s", 1e-3, 2.0, "s", signed=False),),
+    parameters=(Parameter("time_constant_s", 1e-3, 10.0, "s", signed=False),),
     sentence="positions are smoothed with a time constant of {time_constant_s}",
     confused_with="latency",
     separated_by="accelerating hard and gently: sweep the frequency of the motion",

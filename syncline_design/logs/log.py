@@ -32,7 +32,8 @@ class StageLog:
     antenna_m (n, 3) NED, None from the second stage on; euler_rad (n, 3) roll, pitch, yaw;
     velocity_mps (n, 3) NED, reference point; rate_radps (n, 3) body; range_m, azimuth_rad,
     elevation_rad (n,), None in a position log.  velocity_track, rate_track: where the motion was
-    logged at a rate of its own.  follows_position: the velocity was derived from antenna_m.
+    logged at a rate of its own.  follows_position, follows_reference: the velocity was derived from
+    antenna_m, from the better system's places.
     """
 
     name: str
@@ -46,6 +47,7 @@ class StageLog:
     velocity_track: LogTrack | None = None
     rate_track: LogTrack | None = None
     follows_position: bool = False
+    follows_reference: bool = False
 
     def rows(self, index: Rows) -> StageLog:
         """Some of the rows."""

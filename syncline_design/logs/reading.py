@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -33,6 +34,8 @@ from syncline_design.logs.refusals import refuse
 from syncline_design.logs.sources import RowSource
 from syncline_design.logs.tables import LogTable, read_tables
 from syncline_design.logs.twins import without_twins
+
+Source = Literal["columns", "position", "reference"]  # of a velocity
 
 LEAST_ROWS = 10
 
@@ -219,7 +222,7 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
     time_s = draft.columns[TIME]
     euler = draft.vectors([prefix + n for n in ATTITUDE])
     antenna = draft.vectors([prefix + n for n in POSITION]) if first else None
-    velocity, follows = _velocity(draft, prefix, antenna, kind, name)
+    velocity, source = _velocity(draft, prefix, antenna, kind, name)
     if draft.has([prefix + n for n in RATE]):
         rate = draft.vectors([prefix + n for n in RATE])
     else:
@@ -239,22 +242,24 @@ def _stage_log(draft: _Draft, name: str, prefix: str, first: bool, kind: Kind) -
         elevation,
         velocity_track=draft.tracks.get(prefix + "velocity"),
         rate_track=draft.tracks.get(prefix + "rate"),
-        follows_position=follows,
+        follows_position=source == "position",
+        follows_reference=source == "reference",
     )
 
 
 def _velocity(
     draft: _Draft, prefix: str, antenna: Array | None, kind: Kind, name: str
-) -> tuple[Array, bool]:
-    """Velocity columns, or the slope of the reference or antenna positions, smoothed."""
+) -> tuple[Array, Source]:
+    """Velocity columns, or the slope of reference or antenna positions, smoothed; its source."""
     time_s = draft.columns[TIME]
     if draft.has([prefix + n for n in VELOCITY]):
-        return draft.vectors([prefix + n for n in VELOCITY]), draft.follows_position
+        source: Source = "position" if draft.follows_position else "columns"
+        return draft.vectors([prefix + n for n in VELOCITY]), source
     reference = draft.vectors(REFERENCE) if kind != "georeference" else None
     if reference is not None and np.all(np.isfinite(reference)):
         draft.notes.append(f"velocity of {name} was derived from the reference positions")
-        return derived_velocity(time_s, reference), False
+        return derived_velocity(time_s, reference), "reference"
     if antenna is None:
         raise _missing(draft, [prefix + n for n in VELOCITY])
     draft.notes.append(f"velocity of {name} was derived from its own positions, smoothed over 1 s")
-    return derived_velocity(time_s, antenna), True
+    return derived_velocity(time_s, antenna), "position"

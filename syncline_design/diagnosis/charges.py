@@ -1,0 +1,104 @@
+"""What an effect is charged beside the likelihood when a class of effects competes.
+
+Its figures, each as half of log N (Schwarz 1978), of all subsets of them the cheapest, charged for
+having been chosen (Chen and Chen, Biometrika 95 (2008)): an arm of which only the height is seen
+has one figure, as has a height of the target.  Less the noise that it borrows from the columns of
+motion, which is known up to its own chance.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from syncline_design.diagnosis.borrowed import doubt_nats
+from syncline_design.diagnosis.fitting import Data, Model
+from syncline_design.diagnosis.identity import Label, effect_of
+from syncline_design.diagnosis.trials import freedom_of
+from syncline_design.effects.record import Array
+
+USUAL_ARM = 3.0  # longest arm or baseline of a stage, beyond which an error of an arm is not usual
+
+UNUSUAL_NATS = 5.0  # what such an arm is charged: one in a hundred or so
+
+
+@dataclass(frozen=True, slots=True)
+class Charge:
+    """figures: what its figures cost, borrowed: noise of columns in its favour or not [nat].
+
+    unusual: whether its values are beyond what such an effect usually has on this platform.
+    """
+
+    figures: float
+    borrowed: float
+    unusual: bool
+
+    @property
+    def nats(self) -> float:
+        """What is charged before values are looked at."""
+        return self.figures - self.borrowed
+
+    @property
+    def prior(self) -> float:
+        """What unusual values are charged."""
+        return UNUSUAL_NATS if self.unusual else 0.0
+
+    def doubt(self, other: Charge) -> float:
+        """By how much the noise of columns may have chosen between two effects [nat]."""
+        return doubt_nats(self.borrowed, other.borrowed)
+
+
+def charge(data: Data, model: Model, label: Label, named: Model) -> Charge:
+    """What one effect of a model is charged, at the covariance of the named one's."""
+    borrowed = data.borrowed_nats(model, named.precision)
+    return Charge(_figures(data, model, label), borrowed, _unusual(data, model, label))
+
+
+def _figures(data: Data, model: Model, label: Label) -> float:
+    each = 0.5 * math.log(max(len(data.view) * len(data.axes), 2))
+    whole = each * freedom_of(effect_of(model, label))
+    values, covariance = _fitted(model, label)
+    size, cheapest = len(values), whole
+    for count in range(1, size):
+        for left in itertools.combinations(range(size), size - count):
+            lost = 0.5 * _square(values[list(left)], covariance[np.ix_(left, left)])
+            paid = whole - each * len(left) + math.log(math.comb(size, count))
+            cheapest = min(cheapest, paid + lost)
+    return cheapest
+
+
+def _fitted(model: Model, label: Label) -> tuple[Array, Array]:
+    """Values and covariance of the figures of one effect that move the mean."""
+    at = 0
+    for one in model.acting:
+        names = [p.name for p in one.effect.slopes()]
+        if one.label == label:
+            part = slice(at, at + len(names))
+            return np.array([float(one.values[n]) for n in names]), model.covariance[part, part]
+        at += len(names)
+    return np.zeros(0), np.zeros((0, 0))
+
+
+def _square(values: Array, covariance: Array) -> float:
+    """x' C^-1 x: what setting figures to zero costs in squares, the others fitted again."""
+    scale = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    seen = scale > 0.0
+    if not np.any(seen):
+        return 0.0
+    unit = values[seen] / scale[seen]
+    correlation = covariance[np.ix_(seen, seen)] / np.outer(scale[seen], scale[seen])
+    return float(unit @ np.linalg.pinv(correlation, rcond=1e-10, hermitian=True) @ unit)
+
+
+def _unusual(data: Data, model: Model, label: Label) -> bool:
+    """An arm that is off by more than some of the longest arm or baseline that the spec knows."""
+    if effect_of(model, label).breaks != "lever_arm":
+        return False
+    stage, rows = data.view.system.stages[label[2]], data.view.rows[label[2]]
+    arms = [float(np.linalg.norm(arm, axis=-1).max()) for arm in (rows.antenna_m, rows.ranging_m)]
+    longest = max(stage.platform.baseline_m, *arms)
+    values, _ = _fitted(model, label)
+    return bool(float(np.linalg.norm(values)) > USUAL_ARM * longest > 0.0)
