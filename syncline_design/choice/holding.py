@@ -26,15 +26,19 @@ def best_design(problem: Problem) -> Design | None:
 
     Raises Unfinished where simulation gave up, NoVerdict where nothing can be proven.
     """
+    found = outcome_of(problem)
+    return found.design if isinstance(found, Choice) and found.accepted else None
+
+
+def outcome_of(problem: Problem) -> Choice | Infeasible:
+    """The same, with a design that simulation leaves open where there is none that meets all."""
     try:
-        found: Choice | Infeasible = choose(problem, "front")
+        found = choose(problem, "front")
     except TooLarge:
         found = choose(problem)
-    if isinstance(found, Infeasible):
-        return None
-    if not found.exhausted:
+    if isinstance(found, Choice) and not found.exhausted:
         raise Unfinished("the search for a design that passes simulation gave up")
-    return found.design if found.accepted else None
+    return found
 
 
 def best_in(part: Narrowed) -> Design | None:
@@ -68,10 +72,10 @@ def best_with(problem: Problem, kind: EntryKind, identity: str) -> Design | None
     return min(ranked)[2] if ranked else None
 
 
-def best_without(problem: Problem, sensor: str) -> Design | None:
-    """The best design with this sensor in no role."""
-    return best_in(
-        kept(problem, lambda _, options: ~_hold(options, "sensor", sensor), lambda _, clock: True)
+def without(problem: Problem, sensor: str) -> Narrowed:
+    """The designs with this sensor in no role."""
+    return kept(
+        problem, lambda _, options: ~_hold(options, "sensor", sensor), lambda _, clock: True
     )
 
 

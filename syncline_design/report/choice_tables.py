@@ -7,13 +7,15 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
+from syncline_design.report.on_alternatives import alternatives_table, ways_cell
 from syncline_design.report.table import Cell, Table, Tone, table
 from syncline_design.report.verdict_tables import currency_of
 from syncline_design.report.words import PRIMITIVES
+from syncline_design.verdict.named import RankedDesign
 
 if TYPE_CHECKING:
     from syncline_design.choice.outcome import PriceStep
-    from syncline_design.verdict.named import Exclusion, FrontDesign, NamedDesign, RankedDesign
+    from syncline_design.verdict.named import Exclusion, FrontDesign, NamedDesign
     from syncline_design.verdict.tree import Verdict
 
 
@@ -26,6 +28,7 @@ def choice_tables(verdict: Verdict) -> list[Table]:
         _priced(verdict, choice.front or (), "Pareto front: cost against error"),
         _staircase(choice.staircase or (), currency_of(verdict)),
         _priced(verdict, choice.next_best or (), "What else almost won"),
+        alternatives_table(choice.alternatives or (), currency_of(verdict)),
         _excluded(choice.excluded or ()),
     )
     return [entry for entry in found if entry is not None]
@@ -67,12 +70,14 @@ def _priced(
     rows = []
     for entry in designs:
         shown: tuple[str, Tone] = ("\u25c6", "good") if is_chosen(verdict, entry) else ("", "")
+        ways = [ways_cell(entry, currency)] if isinstance(entry, RankedDesign) else []
         rows.append((
             _money(entry.cost, currency),
             Cell(numbers.length(entry.error_m), entry.error_m),
-            Cell(_sensors(entry.design), tone=shown[1], mark=shown[0]),
+            Cell(_sensors(entry.design), tone=shown[1], mark=shown[0]), *ways,
         ))  # fmt: skip
-    return table(caption, ("Cost #", "Error #", "Design"), rows) if rows else None
+    heads = ("Cost #", "Error #", "Design", "Ways of stamping it")[: len(rows[0]) if rows else 0]
+    return table(caption, heads, rows) if rows else None
 
 
 def _sensors(design: NamedDesign) -> str:

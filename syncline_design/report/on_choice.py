@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
 from syncline_design.choice.evaluate import chosen_options, evaluate
@@ -22,18 +23,26 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.on_alternatives import (
+    alternatives_table,
+    bargain_nodes,
+    ways_cell,
+)
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import qualification, warning_nodes
 from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
+from syncline_design.verdict.named import RankedDesign
 from syncline_design.verdict.optimise import Optimisation, Optimised
 
 
 def on_choice(found: Optimised) -> Document:
     """The best designs of a spec as a document, or why there is none."""
-    designs = designs_table(found.problem, found.designs, found.case.spec.currency)
+    currency, result = found.case.spec.currency, found.result
+    designs = designs_table(found.problem, found.designs, currency, result.designs)
+    without = alternatives_table(result.alternatives or (), currency)
     return Document(
         family="Optimisation",
         outcome=_outcome(found),
@@ -43,7 +52,9 @@ def on_choice(found: Optimised) -> Document:
         sections=(
             *_why_not(found.result),
             *section("designs", "Best designs", show(designs, silent=True)),
-            *why_not_section(found.result, found.case.spec.currency),
+            *why_not_section(result, currency),
+            *section("alternatives", "If a sensor cannot be had", show(without, silent=True)),
+            *section("bargains", "Worth a thought", bargain_nodes(result.bargains or (), currency)),
             *section("warnings", "Warnings", warning_nodes(found.result.warnings)),
             *_front(found),
             *section("hinges", "What it hinges on", hinges_nodes(found.result)),
@@ -125,19 +136,29 @@ def _why_not(result: Optimisation) -> list[Section]:
     return section("infeasibility", "Why no design meets the requirements", nodes)
 
 
-def designs_table(problem: Problem, designs: Sequence[Design], currency: str) -> Table:
-    """Best first, with what each costs and reaches, and what simulation leaves open."""
+def designs_table(
+    problem: Problem, designs: Iterable[Design], currency: str, named: Sequence[RankedDesign] = ()
+) -> Table:
+    """Best first, with what each costs and reaches, and what simulation leaves open.
+
+    named: the same designs, with how else their sensors can be stamped.
+    """
     rows = []
-    for place, design in enumerate(designs, 1):
+    for place, (design, shown) in enumerate(itertools.zip_longest(designs, named), 1):
         sums = evaluate(problem, design)
         undecided = judgement(problem, design).undecided
         rows.append([
             Cell(str(place), float(place)),
             *(amount_cell(getattr(sums, name), name, currency) for name in _RESOURCES),
             Cell(numbers.length(sums.error_m), sums.error_m),
-            *_role_cells(problem, design), Cell(_open_text(undecided)),
+            *_role_cells(problem, design),
+            Cell("") if shown is None else ways_cell(shown, currency),
+            Cell(_open_text(undecided)),
         ])  # fmt: skip
-    heads = ("Place", "Cost #", "Mass #", "Power #", "Error #", *_role_heads(problem), "Simulation")
+    heads = (
+        "Place", "Cost #", "Mass #", "Power #", "Error #", *_role_heads(problem),
+        "Ways of stamping it", "Simulation",
+    )  # fmt: skip
     return table("Best designs", heads, rows)
 
 

@@ -35,6 +35,7 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.error_figures import error_figures
 from syncline_design.report.explained import explained
+from syncline_design.report.on_alternatives import bargain_nodes
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -286,6 +287,8 @@ def _choice(verdict: Verdict) -> list[Node]:
     proof = _proof(verdict)
     nodes: list[Node] = [Text(proof)] if proof else []
     nodes += verdict_figures.choice_chart(verdict)
+    found = verdict.choice.bargains if verdict.choice is not None else None
+    nodes += bargain_nodes(found or (), verdict_tables.currency_of(verdict))
     for table in choice_tables.choice_tables(verdict):
         nodes += _folded(table)
     return nodes

@@ -10,6 +10,7 @@ from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
+from syncline_design.choice.stampings import stampings_of
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Case
@@ -22,6 +23,7 @@ from syncline_design.verdict.named import (
     FrontDesign,
     NamedDesign,
     RankedDesign,
+    StampingRange,
 )
 from syncline_design.verdict.tree import finite
 
@@ -42,6 +44,7 @@ def choice_of(
     """What was chosen among what; points: the front of cost, where it is known."""
     from syncline_design.choice.decide import best
     from syncline_design.choice.front import front, staircase
+    from syncline_design.verdict.alternatives import alternatives, bargains
 
     assert picked.verified is not None
     chosen = picked.verified.design
@@ -61,10 +64,12 @@ def choice_of(
         front_designs(case, problem, points),
         left_out(case, problem, "cost"),
         staircase([p for p in points if not p.undecided]),
-        ranked_designs(case, problem, following[:NEXT_BEST]),
+        ranked_designs(case, problem, following[:NEXT_BEST], folded=True),
         ranked_designs(case, problem, ranked[:NEXT_BEST]),
         excluded,
         count,
+        tuple(pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))),
+        tuple(bargains(case, problem, chosen, points)),
     )
 
 
@@ -98,18 +103,30 @@ def full_design(case: Case, problem: Problem, design: Design) -> NamedDesign:
 
 
 def ranked_designs(
-    case: Case, problem: Problem, designs: Iterable[Design]
+    case: Case, problem: Problem, designs: Iterable[Design], *, folded: bool = False
 ) -> tuple[RankedDesign, ...]:
-    """Designs with what they cost and reach, in the order given."""
-    return tuple(_ranked(case, problem, design) for design in designs)
+    """Designs with what they cost and reach, in the order given.
+
+    folded: each stands for every design of its sensors.
+    """
+    return tuple(_ranked(case, problem, design, folded) for design in designs)
 
 
-def _ranked(case: Case, problem: Problem, design: Design) -> RankedDesign:
+def _ranked(case: Case, problem: Problem, design: Design, folded: bool) -> RankedDesign:
     figures = design_budget(case, problem, design)
     shown = named_design(case, problem, design, figures)
     error = figures.total(case.spec.sync_model)
     left_open = _undecided(problem, design)
-    return RankedDesign(shown.cost, shown.mass, shown.power, error, shown, left_open)
+    over = _stampings(problem, design) if folded else None
+    return RankedDesign(shown.cost, shown.mass, shown.power, error, shown, left_open, over)
+
+
+def _stampings(problem: Problem, design: Design) -> StampingRange | None:
+    found = stampings_of(problem, design)
+    if found is None:
+        return None
+    cost = None if found.cost is None else (float(found.cost[0]), float(found.cost[1]))
+    return StampingRange(found.count, cost, found.error_m, problem.judge is None)
 
 
 def _undecided(problem: Problem, design: Design) -> tuple[str, ...] | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from syncline_design.choice.outcome import PriceStep, Proof
 from syncline_design.machine.records import Record, optional
@@ -140,8 +141,26 @@ class FrontDesign(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class StampingRange(Record):
+    """Designs of the same sensors, however they are stamped and whatever clocks there are.
+
+    designs: how many meet every requirement (simulated false: every sum; what is simulated was not
+    asked); cost, error_m: the least and the most of them.
+    """
+
+    designs: int
+    cost: tuple[float, float] | None
+    error_m: tuple[float, float]
+    simulated: bool
+
+
+@dataclass(frozen=True, slots=True)
 class RankedDesign(Record):
-    """A design among the best, with what it takes (None: an entry does not say) and reaches."""
+    """A design among the best, with what it takes (None: an entry does not say) and reaches.
+
+    stampings: where it stands for all designs of its sensors, their range; not there where they
+    are too many to be counted.
+    """
 
     cost: float | None
     mass: float | None
@@ -149,6 +168,44 @@ class RankedDesign(Record):
     error_m: float
     design: NamedDesign
     undecided: tuple[str, ...] | None = optional()
+    stampings: StampingRange | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class Alternative(Record):
+    """The best design without one of the sensors of the chosen one.
+
+    places: the roles that the sensor takes; instead: what every role takes that then changes, as
+    `uav.position: trimble_r12_rtk by pps, hardware`.  dearer_by, worse_by: than the chosen design.
+    Of a spec that has no design without it, all but the verdict is null or empty.
+    """
+
+    sensor: str
+    places: tuple[str, ...]
+    verdict: Literal["meets", "infeasible", "indeterminate"]
+    cost: float | None
+    error_m: float | None
+    dearer_by: float | None
+    worse_by: float | None
+    instead: tuple[str, ...]
+    design: NamedDesign | None
+
+
+@dataclass(frozen=True, slots=True)
+class Bargain(Record):
+    """A step of the exact front of cost from the chosen design that is worth a thought.
+
+    better: `extra` more money takes the error from `error_from_m` to `error_to_m`, at least 5 % off
+    and at least twice the share by which the price rises.  cheaper: `extra` (below 0) if the error
+    may grow from `error_from_m` (the limit, where it is the price that is least) to `error_to_m`.
+    """
+
+    kind: Literal["better", "cheaper"]
+    extra: float
+    cost: float
+    error_from_m: float
+    error_to_m: float
+    design: NamedDesign
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +214,8 @@ class ChoiceResult(Record):
 
     front: of cost against error, where costs are known; front_left_out: what has no place on it.
     next_best: designs that differ in a sensor; next_best_every: of all designs.  excluded: a
-    thousand rows at most, excluded_count: how many there are.
+    thousand rows at most, excluded_count: how many there are.  alternatives: without a sensor each;
+    bargains: what a little more money, or a little more error, would buy.
     """
 
     proof: Proof | None = optional()
@@ -168,6 +226,8 @@ class ChoiceResult(Record):
     next_best_every: tuple[RankedDesign, ...] | None = optional()
     excluded: tuple[Exclusion, ...] | None = optional()
     excluded_count: int | None = optional()
+    alternatives: tuple[Alternative, ...] | None = optional()
+    bargains: tuple[Bargain, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

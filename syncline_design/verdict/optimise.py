@@ -40,6 +40,7 @@ from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.admitted import Kinds, kinds_of, with_whole_catalog
+from syncline_design.verdict.alternatives import alternatives, bargains
 from syncline_design.verdict.cautions import design_cautions
 from syncline_design.verdict.choice_data import (
     front_designs,
@@ -47,7 +48,7 @@ from syncline_design.verdict.choice_data import (
     ranked_designs,
     ruled_out,
 )
-from syncline_design.verdict.named import Exclusion, FrontDesign, RankedDesign
+from syncline_design.verdict.named import Alternative, Bargain, Exclusion, FrontDesign, RankedDesign
 from syncline_design.verdict.open_choice import Picked, pick
 from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
 from syncline_design.verdict.verified import Verified, error_figures
@@ -103,7 +104,7 @@ class Optimisation(Record):
     or incomplete; gave_up: what lacks designs because too many were simulated; message: what ended
     a search that found no design; front: with `--pareto`, `front_left_out` what has no place on
     it; slack, tolerances, measure_next: of a design that meets, null where that was not worked out;
-    why_not: of the entries that were asked about.
+    why_not: of the entries that were asked about; alternatives, bargains: as in a verdict.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
@@ -127,6 +128,8 @@ class Optimisation(Record):
     measure_next: tuple[Measurement, ...] | None = optional()
     infeasibility: Explanation | None = optional()
     why_not: tuple[Answer, ...] | None = optional()
+    alternatives: tuple[Alternative, ...] | None = optional()
+    bargains: tuple[Bargain, ...] | None = optional()
 
     @property
     def exit_code(self) -> int:
@@ -190,13 +193,14 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         designs = _designs(problem, picked.verified.design, settings, pieces)
         if picked.verified.word == "meets":
             kind, more = Hinged, _hinges((case, problem, designs[0], build), pieces)
+            more |= _others(case, problem, designs[0], settings, points, pieces)
     if settings.why_not:
         asked = Asked(case, problem, designs[0] if designs else None, build, questions[0])
         more["why_not"] = tuple(pieces.listed("why not", lambda: why_not(asked, questions[1])))
     result = kind(
         verdict=_word(case, problem, picked),
         **_frame(case, problem, settings, picked.choice.proof),
-        designs=ranked_designs(case, problem, designs),
+        designs=ranked_designs(case, problem, designs, folded=not settings.every),
         warnings=_cautions(case, picked.verified, settings) if designs else (),
         cut_short=tuple(pieces.cut_short),
         gave_up=tuple(pieces.gave_up),
@@ -324,6 +328,19 @@ def _hinges(given: tuple[Case, Problem, Design, Build], pieces: Pieces) -> dict[
         "tolerances": pieces.made("tolerances", lambda: _tolerances(*given), None),
         "measure_next": pieces.made("what to measure next", lambda: measure_next(*given), None),
     }
+
+
+def _others(
+    case: Case, problem: Problem, chosen: Design, settings: OptimizeSettings,
+    points: tuple[FrontPoint, ...], pieces: Pieces,
+) -> dict[str, Any]:  # fmt: skip
+    """What if a sensor cannot be had, and what a little more money would buy."""
+    if not settings.pareto or settings.resource != "cost":
+        nothing: tuple[FrontPoint, ...] = ()
+        points = pieces.made("bargains", lambda: tuple(front(problem)), nothing)
+    without = pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))
+    found = tuple(bargains(case, problem, chosen, points))
+    return {"alternatives": tuple(without), "bargains": found}
 
 
 def _tolerances(

@@ -1,0 +1,98 @@
+"""What if a sensor of the design cannot be had, and what a little more money would buy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from syncline_design.choice.evaluate import chosen_options, evaluate
+from syncline_design.choice.holding import outcome_of, without
+from syncline_design.choice.outcome import FrontPoint, Infeasible
+from syncline_design.choice.table import Design, Problem
+from syncline_design.spec.case import Case
+from syncline_design.verdict.choice_data import full_design
+from syncline_design.verdict.named import Alternative, Bargain
+
+LEAST_GAIN = 0.05  # share of the error, or of the price, that a bargain takes off at least
+LEAST_RATIO = 2.0  # by how much that share exceeds the share it costs
+MOST_BARGAINS = 3  # of each kind
+
+
+def alternatives(case: Case, problem: Problem, chosen: Design) -> Iterator[Alternative]:
+    """One for each sensor of the design that is not all that its roles may take."""
+    places: dict[str, list[str]] = {}
+    for table, option in zip(problem.roles, chosen_options(problem, chosen), strict=True):
+        places.setdefault(option.sensor, []).append(f"{table.stage_name}.{table.role}")
+    open_to = _choices(problem)
+    for sensor, roles in places.items():
+        if all(open_to[role] > 1 for role in roles):
+            yield _without(case, problem, chosen, sensor, tuple(roles))
+
+
+def _choices(problem: Problem) -> dict[str, int]:
+    """How many sensors each role may take."""
+    return {
+        f"{table.stage_name}.{table.role}": len(set(table.options.sensor.tolist()))
+        for table in problem.roles
+    }
+
+
+def _without(
+    case: Case, problem: Problem, chosen: Design, sensor: str, places: tuple[str, ...]
+) -> Alternative:
+    part = without(problem, sensor)
+    found = outcome_of(part.problem)
+    if isinstance(found, Infeasible):
+        return Alternative(sensor, places, "infeasible", None, None, None, None, (), None)
+    design = part.whole(found.design)
+    before, after = evaluate(problem, chosen), evaluate(problem, design)
+    dearer = None
+    if before.cost is not None and after.cost is not None:
+        dearer = float(after.cost - before.cost)
+    return Alternative(
+        sensor, places, "meets" if found.accepted else "indeterminate",
+        None if after.cost is None else float(after.cost), after.error_m,
+        dearer, float(after.total_m - before.total_m),
+        tuple(_changes(problem, chosen, design)), full_design(case, problem, design),
+    )  # fmt: skip
+
+
+def _changes(problem: Problem, old: Design, new: Design) -> Iterator[str]:
+    """Roles and clocks that the other design takes otherwise."""
+    olds, news = chosen_options(problem, old), chosen_options(problem, new)
+    for table, before, after in zip(problem.roles, olds, news, strict=True):
+        if before.names != after.names:
+            name, primitive, method = after.names
+            yield f"{table.stage_name}.{table.role}: {name} by {primitive}, {method}"
+    for vehicle, first, second in zip(problem.vehicles, old.clocks, new.clocks, strict=True):
+        if first != second:
+            yield f"clock of {vehicle.name}: {vehicle.clocks[second].id}"
+
+
+def bargains(
+    case: Case, problem: Problem, chosen: Design, points: Sequence[FrontPoint]
+) -> Iterator[Bargain]:
+    """What a little more money, or a little more error, would buy; the largest gain first."""
+    sums = evaluate(problem, chosen)
+    if sums.cost is None or sums.error_m <= 0.0:
+        return
+    price, error = float(sums.cost), sums.error_m
+    limit = problem.limits.accuracy_m
+    allowed = error if limit is None or problem.objective == "error" else limit
+    known = [p for p in points if not p.undecided]
+    paid = price or min((float(p.amount) for p in known if p.amount > 0), default=0.0)
+    found: list[tuple[float, Bargain]] = []
+    for point in known:
+        extra, reached = float(point.amount - sums.cost), point.error_m
+        if extra > 0.0 and reached < error:
+            gain, pain, kind, start = 1.0 - reached / error, extra / paid, "better", error
+        elif extra < 0.0 and reached > allowed:
+            gain, pain, kind, start = -extra / paid, reached / allowed - 1.0, "cheaper", allowed
+        else:
+            continue
+        if gain >= LEAST_GAIN and gain >= LEAST_RATIO * pain:
+            shown = full_design(case, problem, point.design)
+            one = Bargain(kind, extra, float(point.amount), start, reached, shown)  # type: ignore[arg-type]
+            found.append((gain / pain if pain else float("inf"), one))
+    found.sort(key=lambda pair: -pair[0])
+    for kind in ("better", "cheaper"):
+        yield from [one for _, one in found if one.kind == kind][:MOST_BARGAINS]
