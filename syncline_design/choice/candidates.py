@@ -22,6 +22,7 @@ from syncline_design.choice.options import (
     Bools,
     Floats,
     Indices,
+    Names,
     Option,
     Options,
     Spent,
@@ -253,6 +254,14 @@ class Candidates:
     def _error(self, place: int) -> Fraction:
         """A sensor's term of the sensor-induced error [m], exactly."""
         return sensor_error(self.role.sensors[place].entry, self.role.role, self.motion)
+
+    def names_of(self, rows: Indices) -> list[Names]:
+        """The names of some rows, none of which stands for a sensor that cannot work here."""
+        sensors, ways = self.role.sensors, self.ways
+        return [
+            (sensors[s].id, ways[w].primitive, ways[w].method)
+            for s, w in zip(self.sensor[rows].tolist(), self.way[rows].tolist(), strict=True)
+        ]
 
     def __call__(self, row: int) -> Option:
         """The option of one row."""

@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields, replace
 from fractions import Fraction
-from typing import Any, Literal, overload
+from typing import Any, Literal, Protocol, overload, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -203,6 +203,15 @@ def _sum(one: Column, other: Column) -> Column:
 Make = Callable[[int], Option]
 
 
+@runtime_checkable
+class NamesOfRows(Protocol):
+    """A source of options that can name them without making them."""
+
+    def names_of(self, rows: Indices) -> list[Names]:
+        """The names of some rows."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Options(Sequence[Option]):
     """Options of one role by columns.
@@ -317,6 +326,13 @@ class Options(Sequence[Option]):
     def by_name(self) -> Indices:
         """Rows in the order of their names."""
         return np.argsort(self.rank, kind="stable")
+
+    def all_names(self) -> list[Names]:
+        """The names of every option, read off its source where that can tell without making it."""
+        source = getattr(self.make, "__self__", None)
+        if isinstance(source, NamesOfRows):
+            return source.names_of(self.at)
+        return [option.names for option in self]
 
     def place_of(self, names: Names) -> int | None:
         """The row of that name; None where there is none."""
