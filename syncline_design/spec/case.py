@@ -114,6 +114,7 @@ class Case:
     positions: key path, as in ("requirements", 0, "limit"), to (line, column); origins: where each
     catalog entry is defined; files: what was read besides.  Looked up as the case is made: stages,
     hardware (shared, of all that may be used, in the order of the catalogs) and effects (known).
+    missions: of a spec that has them, each a case of its own; the spec itself is none of them.
     """
 
     spec: Spec
@@ -126,6 +127,7 @@ class Case:
     origins: Origins = field(repr=False)
     files: tuple[FileRead, ...] = ()
     trajectory: FileContent | None = None
+    missions: tuple[Mission, ...] = ()
     stages: tuple[StageCase, ...] = field(init=False, repr=False)
     hardware: Mapping[str, Candidate[InfrastructureEntry]] = field(init=False, repr=False)
     effects: tuple[EffectEntry, ...] = field(init=False, repr=False)
@@ -159,6 +161,14 @@ class Case:
     def clock(self, vehicle: str, identity: str | None) -> ClockEntry | None:
         """A vehicle's clock of that id; None: its timelines are taken as common."""
         return _named(self.clocks(vehicle), identity)
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """One mission of a spec: the spec with the mission's overrides in place."""
+
+    name: str
+    case: Case
 
 
 def _limited(spec: Spec, distance_m: float) -> Spec:

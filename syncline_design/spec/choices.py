@@ -169,6 +169,7 @@ class RoleChoice(FileRecord):
         ),
     ] = None
     lever_arm: Vector | None = None
+    per_mission: YesNo = False  # whether each mission may have a sensor of its own
     note: str = ""
 
     @model_validator(mode="after")

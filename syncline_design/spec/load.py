@@ -14,7 +14,7 @@ from syncline_design.machine.input_files import (
     noting,
     read_plain,
 )
-from syncline_design.spec.case import Case
+from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.files import (
     BUILTIN_PACKAGE,
@@ -26,6 +26,7 @@ from syncline_design.spec.files import (
     problem_at,
 )
 from syncline_design.spec.known_effects import effect_problems
+from syncline_design.spec.missions import disagreements, in_mission, mission_documents
 from syncline_design.spec.references import (
     currency_problems,
     draw_in,
@@ -127,7 +128,36 @@ def _complete(
     document: ParsedFile, path: Path, collection: Collection, found: FilesRead | None = None
 ) -> Case:
     """The case, or every problem of the file; found: what was read since the spec was asked for."""
-    draw_in(document, collection)  # a study's case may name what its base does not
+    documents, overrides = mission_documents(document)
+    for one in (document, *(own for _, own in documents)):
+        draw_in(one, collection)  # a study's case may name what its base does not
+    try:
+        case = _alone(document, path, collection, found)
+    except BadInput as error:
+        raise BadInput((*error.problems, *overrides)) from None
+    _stop_at(overrides)
+    missions = tuple(_mission(name, own, path, collection, case.files) for name, own in documents)
+    if missions:
+        _stop_at(list(disagreements(document, missions)))
+    return replace(case, missions=missions) if missions else case
+
+
+def _mission(
+    name: str, document: ParsedFile, path: Path, collection: Collection,
+    files: tuple[FileRead, ...],
+) -> Mission:  # fmt: skip
+    """One mission as a case, with what is wrong in it alone."""
+    try:
+        case = _alone(document, path, collection.copy())
+    except BadInput as error:
+        raise BadInput(in_mission(name, error.problems)) from None
+    return Mission(name, replace(case, files=files))
+
+
+def _alone(
+    document: ParsedFile, path: Path, collection: Collection, found: FilesRead | None = None
+) -> Case:
+    """The case of one document."""
     filled = fill_empirical(document, path.parent, path.parent, collection)
     spec, problems = validate(Spec, document, filled)
     problems = [*document.problems, *problems, *collection.problems]
@@ -221,4 +251,5 @@ def without_simulated(case: Case) -> Case:
             path = ("requirements", renumbered[int(path[1])], *path[2:])
         positions[path] = position
     spec = case.spec.model_copy(update={"requirements": requirements})
-    return replace(case, spec=spec, positions=positions)
+    missions = tuple(replace(one, case=without_simulated(one.case)) for one in case.missions)
+    return replace(case, spec=spec, positions=positions, missions=missions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 from pydantic import field_validator as reads_field
@@ -22,9 +22,12 @@ from syncline_design.spec.fields import (
     NonNegativeTime,
     PositiveMoney,
     PositiveNumber,
+    Reader,
     Text,
     YesNo,
     did_you_mean,
+    kind_of,
+    read_number,
     refusal,
     refusals,
 )
@@ -38,6 +41,7 @@ from syncline_design.spec.yaml_text import KeyPath
 
 MOST_REQUIREMENTS = 1_000
 MOST_STAGES = 32  # the work grows with the square of their number; chains have two or three
+MOST_MISSIONS = 100
 MOST_EFFECTS = 1_000  # each acts on every simulated sample; a system is known by a few
 
 
@@ -96,6 +100,38 @@ class HorizonChoice(FileRecord):
         return Horizon(float(self.duration), float(self.extent), float(self.tilt))
 
 
+class MissionChoice(FileRecord):
+    """One mission: keys of stages by their names, limits (or keys) of requirements by their ids."""
+
+    name: Text
+    stages: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    requirements: dict[str, Any] = Field(default_factory=dict)
+    note: str = ""
+
+
+def _read_choose_for(value: Any) -> str | Quantity:
+    if value in ("nominal", "always"):
+        return str(value)
+    wanted = "nominal, always, or a probability such as 0.95"
+    if isinstance(value, str):
+        raise refusal("not one of the choices", wanted, kind_of(value), did_you_mean(value, _HOW))
+    share = read_number(value)
+    if not 0.0 < share < 1.0:
+        raise refusal("out of range", wanted, share.text)
+    return share
+
+
+_HOW = ("nominal", "always")
+ChooseFor = Annotated[
+    str | float,
+    Reader(
+        _read_choose_for,
+        {"anyOf": [{"enum": list(_HOW)},
+                   {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}]},
+    ),
+]  # fmt: skip
+
+
 class Spec(FileRecord):
     """One system: its requirements, stages, and how the choice is made."""
 
@@ -122,10 +158,14 @@ class Spec(FileRecord):
     monte_carlo: MonteCarloChoice = Field(default_factory=MonteCarloChoice)
     effects: Annotated[tuple[EffectChoice, ...], Field(max_length=MOST_EFFECTS)] = ()
     log: LogChoice | None = None
+    choose_for: ChooseFor = "nominal"  # or for any figures in their intervals, or a share
+    missions: Annotated[tuple[MissionChoice, ...], Field(max_length=MOST_MISSIONS)] = ()
 
     @model_validator(mode="after")
     def _consistent(self) -> Spec:
         errors = [
+            *_duplicates("missions", "name", [m.name for m in self.missions]),
+            *_choose_for_errors(self),
             *_duplicates("requirements", "id", [r.id for r in self.requirements]),
             *_duplicates("stages", "name", [s.name for s in self.stages]),
             *_owned_twice(self.owned),
@@ -214,6 +254,19 @@ def _spacing_errors(spec: Spec) -> list[Located]:
         (("requirements", index, "kind"), error)
         for index, one in enumerate(spec.requirements)
         if one.kind == "sample_spacing"
+    ]
+
+
+def _choose_for_errors(spec: Spec) -> list[Located]:
+    """A share of the figures is counted on sums; what is simulated has no sum."""
+    if isinstance(spec.choose_for, str):
+        return []
+    message = f"choose_for: {spec.choose_for} does not go with a requirement that is no sum"
+    hint = "choose for nominal or always, or delete the requirement"
+    return [
+        (("requirements", index, "kind"), refusal(message, found=one.kind, hint=hint))
+        for index, one in enumerate(spec.requirements)
+        if one.kind in JUDGED_KINDS
     ]
 
 
