@@ -110,15 +110,17 @@ def family_of(
     names: Sequence[str],
     problems: Sequence[Problem],
     differing: Mapping[int, Mapping[str, Resources]] | None = None,
+    groups: Sequence[int] | None = None,
 ) -> Family:
     """The family of these missions' problems, whose roles and vehicles are the same ones.
 
     differing: roles that each mission may take in its own way, with what each sensor takes alone.
+    groups: of each problem the number of its mission, where several are one mission's.
     """
-    differing = differing or {}
+    differing, groups = differing or {}, groups or range(len(problems))
     tables = list(zip(*(problem.roles for problem in problems), strict=True))
     roles = tuple(
-        _own_ways(own, differing[r]) if r in differing else _shared_ways(own)
+        _own_ways(own, differing[r], groups) if r in differing else _shared_ways(own)
         for r, own in enumerate(tables)
     )
     clocks = tuple(
@@ -138,16 +140,23 @@ def _shared_ways(tables: Sequence[RoleTable]) -> FamilyRole:
     return FamilyRole(_common([table.options.all_names() for table in tables]))
 
 
-def _own_ways(tables: Sequence[RoleTable], alone: Mapping[str, Resources]) -> FamilyRole:
+def _own_ways(
+    tables: Sequence[RoleTable], alone: Mapping[str, Resources], groups: Sequence[int]
+) -> FamilyRole:
     """An option for each mission, in every combination."""
-    counts = [len(table.options) for table in tables]
-    if math.prod(counts) > MOST_WAYS:
+    members = [[m for m, one in enumerate(groups) if one == group] for group in sorted({*groups})]
+    own = [_common([tables[m].options.all_names() for m in some]) for some in members]
+    count = math.prod(places.shape[1] for places in own)
+    if count > MOST_WAYS:
         raise TooLarge(
-            f"{math.prod(counts)} ways of taking {tables[0].role} of {tables[0].stage_name} with "
-            f"a sensor of its own in each mission (at most {MOST_WAYS}): name fewer candidates"
+            f"{count} ways of taking {tables[0].role} of {tables[0].stage_name} with a sensor of "
+            f"its own in each mission (at most {MOST_WAYS}): name fewer candidates"
         )
-    grids = np.meshgrid(*(np.arange(n) for n in counts), indexing="ij")
-    return FamilyRole(np.array([grid.ravel() for grid in grids], dtype=np.intp), alone)
+    grids = np.meshgrid(*(np.arange(places.shape[1]) for places in own), indexing="ij")
+    rows = np.zeros((len(tables), count), dtype=np.intp)
+    for some, places, grid in zip(members, own, grids, strict=True):
+        rows[some] = places[:, grid.ravel()]
+    return FamilyRole(rows, alone)
 
 
 def _common(names: Sequence[Sequence[str] | Sequence[Names]]) -> Indices:

@@ -10,7 +10,7 @@ from syncline_design.choice.table import Design
 from syncline_design.machine.deadline import Deadline as Deadline
 from syncline_design.machine.deadline import NoVerdict as NoVerdict
 from syncline_design.machine.deadline import OutOfTime as OutOfTime
-from syncline_design.machine.records import Record
+from syncline_design.machine.records import Record, optional
 
 Road = Literal["auto", "front", "milp", "enumerate"]
 FixKind = Literal[
@@ -190,7 +190,8 @@ class Explanation(Record):
     further_conflicts: those that remain once the first is lifted; where there are any, no
     requirement alone can be moved far enough.  joint_fixes: changes that help together.  cut_short:
     the time limit ended the search for reasons and remedies, so what is not there may still exist.
-    text: the whole in words, line by line.
+    text: the whole in words, line by line.  missions: of a family those that cannot be met by one
+    payload; one alone has the reasons of its own.
     """
 
     roles_without_options: tuple[RoleGap, ...]
@@ -200,6 +201,7 @@ class Explanation(Record):
     joint_fixes: tuple[tuple[Fix, ...], ...]
     cut_short: bool
     text: tuple[str, ...] = ()
+    missions: tuple[str, ...] | None = optional()
 
     @property
     def conflicts(self) -> tuple[Members, ...]:

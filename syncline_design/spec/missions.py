@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from syncline_design.model.roles import ROLES
-from syncline_design.spec.case import Case, Mission, RoleCase
-from syncline_design.spec.fields import did_you_mean, kind_of
+from syncline_design.spec.case import Mission, RoleCase
+from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import problem_at
 from syncline_design.spec.keys import PLATFORM_KEYS
 from syncline_design.spec.yaml_text import Flaw, KeyPath, ParsedFile
@@ -118,10 +118,7 @@ def _override_requirement(draft: _Draft, path: KeyPath, value: Any, source: KeyP
 
 def _override_stage(draft: _Draft, path: KeyPath, value: Any, source: KeyPath) -> None:
     """Keys of a stage; platform and roles key by key."""
-    if not isinstance(value, Mapping):
-        draft.refuse(source, "not a mapping", "keys of the stage", kind_of(value))
-        return
-    for key, item in value.items():
+    for key, item in value.items() if isinstance(value, Mapping) else ():
         inside = (*source, key)
         if _is_the_same(draft, "stages", key, inside):
             continue

@@ -18,7 +18,13 @@ from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
 from syncline_design.verdict.baseline import Baseline
-from syncline_design.verdict.named import BillLine, ChoiceResult, ExplainedRequirement, NamedDesign
+from syncline_design.verdict.named import (
+    BillLine,
+    ChoiceResult,
+    ExplainedRequirement,
+    NamedDesign,
+    RankedDesign,
+)
 
 SCHEMA = "syncline-design/verdict/v1"
 SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
@@ -324,6 +330,39 @@ class KnownEffect(Record):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class MissionVerdict(Record):
+    """What is said of one mission of a family; alone: the best payload of this mission by itself.
+
+    cost, mass and power of its requirements are the family's.
+    """
+
+    name: str
+    verdict: Word
+    requirements: tuple[RequirementResult, ...]
+    figures: ErrorFigures | None
+    design: NamedDesign | None = None
+    syncline: SynclineFigures | None = None
+    monte_carlo: MonteCarlo | None = None
+    alone: RankedDesign | None = optional()
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Robustness(Record):
+    """What the design was chosen for, beside the choice at nominal figures.
+
+    choose_for: always, or the probability; figures: how many datasheet figures have an interval.
+    price: what the chosen design takes more of the objective than the nominal one (None: there is
+    none, or the objective is the error).
+    """
+
+    choose_for: str
+    figures: int
+    nominal: RankedDesign | None
+    price: float | None
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Verdict(Record):
     """What `check` says of one spec; without a design its figures are None."""
 
@@ -346,6 +385,8 @@ class Verdict(Record):
     measured: tuple[MeasuredEntry, ...] | None = optional()
     explained: tuple[ExplainedRequirement, ...] | None = optional()
     bill_of_materials: tuple[BillLine, ...] | None = optional()
+    missions: tuple[MissionVerdict, ...] | None = optional()
+    robustness: Robustness | None = optional()
     baseline: Baseline | None = optional()
 
     @property

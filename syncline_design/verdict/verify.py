@@ -41,6 +41,7 @@ from syncline_design.verdict.design_data import (
     used_entries,
 )
 from syncline_design.verdict.explain import Worked, explained
+from syncline_design.verdict.family import is_family, refuse_missions
 from syncline_design.verdict.held import placed
 from syncline_design.verdict.held import results as held_results
 from syncline_design.verdict.measured import claim_cautions, measured
@@ -113,7 +114,11 @@ def _or_refused(path: Path, work: Callable[[Path], T]) -> T | Refused:
 
 def check_loaded(case: Case, settings: CheckSettings) -> Verdict:
     """The verdict of a loaded spec; without any design when the time is over, indeterminate."""
-    build = _build(settings)
+    if is_family(case):
+        from syncline_design.verdict.missions import check_family
+
+        return check_family(case, settings)
+    build = build_of(settings)
     problem: Problem | None = None
     try:
         problem = build(case)
@@ -134,8 +139,8 @@ def _sole_verdict(case: Case, problem: Problem, settings: CheckSettings, build: 
     everything, design = sole
     verified = verify(case, everything, design, settings)
     if verified.word == "fails" and names_candidates(case):
-        return _infeasible(case, problem, settings, build)
-    return _verdict(case, everything, verified, settings, without_choice(problem))
+        return infeasible_verdict(case, problem, settings, build)
+    return verdict_on(case, everything, verified, settings, without_choice(problem))
 
 
 def unfinished_verdict(
@@ -146,7 +151,7 @@ def unfinished_verdict(
         verdict="indeterminate",
         **frame(case, problem, settings.seed),
         requirements=tuple(
-            placed(case, index, one, _unmet(case, one, in_conflict=False), settings)
+            placed(case, index, one, unmet(case, one, in_conflict=False), settings)
             for index, one in enumerate(case.spec.requirements)
         ),
         warnings=(Caution("time-limit", f"{why}; no design was found by then"),),
@@ -154,14 +159,18 @@ def unfinished_verdict(
     )
 
 
-def _build(settings: CheckSettings) -> Build:
+def build_of(settings: CheckSettings) -> Build:
     """How a spec becomes a problem: with simulated requirements, unless nothing is simulated."""
     kinds = JUDGED_KINDS if settings.monte_carlo else STATED_KINDS
     return Simulations(settings.seed, settings.today, kinds).problem_of
 
 
 def picked_design(case: Case, seed: int = 0) -> tuple[Problem, Design]:
-    """The only design of a pinned spec, or the best of an open one; BadInput when there is none."""
+    """The only design of a pinned spec, or the best of an open one; BadInput when there is none.
+
+    By its figures as given, whatever it is chosen for.
+    """
+    refuse_missions(case)
     problem = Simulations(seed).problem_of(case)
     sole = sole_design(problem)
     if sole is not None:
@@ -200,14 +209,14 @@ def open_verdict(
     points: Sequence[FrontPoint] | None = None,
 ) -> Verdict:
     """The verdict on what was picked for a spec; points: its front of cost, where known."""
-    build = build or _build(settings)
+    build = build or build_of(settings)
     if sole_design(problem) is not None:
         return _sole_verdict(case, problem, settings, build)
     if picked.verified is None:
-        return _infeasible(case, problem, settings, build)
+        return infeasible_verdict(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
     choice = choice_of(case, problem, picked, pieces, points)
-    found = _verdict(case, problem, picked.verified, settings, choice)
+    found = verdict_on(case, problem, picked.verified, settings, choice)
     missing = choice.front_left_out
     warnings = (
         *_passed_over(picked),
@@ -229,7 +238,9 @@ def _unproven(picked: Picked) -> Iterator[Caution]:
         yield Caution("not-proven-optimal", message)
 
 
-def _infeasible(case: Case, problem: Problem, settings: CheckSettings, build: Build) -> Verdict:
+def infeasible_verdict(
+    case: Case, problem: Problem, settings: CheckSettings, build: Build
+) -> Verdict:
     """Why there is no design, and which single changes would help."""
     from syncline_design.choice.explain import explain
 
@@ -241,7 +252,7 @@ def _infeasible(case: Case, problem: Problem, settings: CheckSettings, build: Bu
         verdict="infeasible",
         **frame(case, problem, settings.seed),
         requirements=tuple(
-            placed(case, i, one, _unmet(case, one, one.id in conflict, minimal), settings)
+            placed(case, i, one, unmet(case, one, one.id in conflict, minimal), settings)
             for i, one in enumerate(case.spec.requirements)
         ),
         warnings=(*((late,) if found.cut_short else ()), *implausible_cautions(case)),
@@ -250,7 +261,7 @@ def _infeasible(case: Case, problem: Problem, settings: CheckSettings, build: Bu
     )
 
 
-def _unmet(
+def unmet(
     case: Case, one: Requirement, in_conflict: bool, minimal: bool = True
 ) -> RequirementResult:
     """A requirement of a spec without a design: part of the conflict, or not reached."""
@@ -315,13 +326,14 @@ def _monte_carlo(
         return None, str(error)
 
 
-def _verdict(
+def verdict_on(
     case: Case,
     problem: Problem,
     verified: Verified,
     settings: CheckSettings,
     choice: ChoiceResult,
 ) -> Verdict:
+    """The whole verdict on a verified design."""
     entries = used_entries(case, problem, verified.design)
     assumed = assumptions(entries)
     figures = error_figures(verified, settings.seed, settings.monte_carlo)

@@ -1,0 +1,180 @@
+"""A spec of several missions, or one chosen for any figures within their intervals, as a family.
+
+`choose_for: always` holds a design against both ends of every datasheet interval: accuracy is worst
+where every error is largest, sync where every error is smallest (a better sensor has a smaller
+tau_crit), so that what holds at both ends holds everywhere between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from syncline_design.choice.family import Family, FamilyDesign, family_of
+from syncline_design.choice.family_best import Found, iter_family
+from syncline_design.choice.judged import judgement
+from syncline_design.choice.options import Resources
+from syncline_design.choice.prices import resources_of
+from syncline_design.choice.problem import sole_design
+from syncline_design.choice.table import Design, Problem
+from syncline_design.choice.variations import SheetFigure, quantity, sigma_figures, with_figure
+from syncline_design.spec.case import Case, Mission
+from syncline_design.spec.load import BadInput, Flaw
+
+Build = Callable[[Case], Problem]
+End = Literal["low", "high"]
+ALL = ""  # the mission of a spec that has none
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """One mission with its figures as given, or all at one end of their intervals."""
+
+    mission: str
+    end: End | None
+    case: Case
+    problem: Problem
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """A spec's missions as scenarios, and the family that they are."""
+
+    case: Case
+    missions: tuple[Mission, ...]
+    scenarios: tuple[Scenario, ...]
+    family: Family
+
+    def of(self, mission: str) -> list[int]:
+        """The places of a mission's scenarios."""
+        return [i for i, one in enumerate(self.scenarios) if one.mission == mission]
+
+
+@dataclass(frozen=True, slots=True)
+class Chosen:
+    """A design of each scenario; found: with the family's sums, None of what is pinned.
+
+    problems: in whose tables the designs' places hold.
+    """
+
+    designs: tuple[Design, ...]
+    problems: tuple[Problem, ...]
+    found: Found | None = None
+    undecided: bool = False
+
+
+def is_family(case: Case) -> bool:
+    """Whether a spec is judged in more than one scenario."""
+    return bool(case.missions) or case.spec.choose_for != "nominal"
+
+
+def refuse_missions(case: Case) -> None:
+    """BadInput where one system is meant and the spec has several missions."""
+    if case.missions:
+        place = case.position(("missions",))
+        message = "several missions, and this works on one system"
+        hint = "give it a spec of one mission: its overrides put into stages and requirements"
+        raise BadInput((Flaw(str(case.path), *place, "missions", message, hint=hint),))
+
+
+def missions_of(case: Case) -> tuple[Mission, ...]:
+    """The missions of a spec; the spec itself where it has none."""
+    return case.missions or (Mission(ALL, case),)
+
+
+def work_of(case: Case, build: Callable[[], Build], *, nominal: bool = False) -> Work:
+    """The scenarios of a spec; build: a fresh way to make a problem of each case.
+
+    nominal: with figures as given, whatever the spec asks for.
+    """
+    missions = missions_of(case)
+    scenarios = [
+        Scenario(one.name, end, own, build()(own))
+        for one in missions
+        for end, own in _ends(one.case, nominal or case.spec.choose_for == "nominal")
+    ]
+    names = [one.mission for one in scenarios]
+    order = list(dict.fromkeys(names))
+    problems = [one.problem for one in scenarios]
+    family = family_of(names, problems, _differing(missions), [order.index(n) for n in names])
+    return Work(case, missions, tuple(scenarios), family)
+
+
+def intervals(case: Case) -> tuple[SheetFigure, ...]:
+    """Every datasheet figure with an interval, of what the spec may use."""
+    return tuple(figure for figure in sigma_figures(case) if figure.quantity.has_tolerance)
+
+
+def _ends(case: Case, nominal: bool) -> list[tuple[End | None, Case]]:
+    """A mission's case as it is, or with all figures at either end of their intervals."""
+    figures = () if nominal else intervals(case)
+    if not figures:
+        return [(None, case)]
+    return [("high", at_end(case, figures, "high")), ("low", at_end(case, figures, "low"))]
+
+
+def at_end(case: Case, figures: Sequence[SheetFigure], end: End) -> Case:
+    """A case with figures at one end of their intervals."""
+    for figure in figures:
+        value = figure.quantity.high if end == "high" else figure.quantity.low
+        case = with_figure(case, figure, quantity(value, figure.dimension))
+    return case
+
+
+def _differing(missions: Sequence[Mission]) -> dict[int, dict[str, Resources]]:
+    """Roles of which each mission may have its own sensor: what each sensor takes alone."""
+    out: dict[int, dict[str, Resources]] = {}
+    first = missions[0].case
+    slots = [(stage.index, role) for stage in first.stages for role in stage.roles]
+    for r, (stage, role) in enumerate(slots):
+        if not role.choice.per_mission:
+            continue
+        out[r] = {}
+        for mission in missions:
+            own = mission.case.stages[stage].role(role.role)
+            for one in own.sensors if own is not None else ():
+                out[r][one.id] = resources_of(mission.case, one.entry)
+    return out
+
+
+def choose_family(work: Work) -> Chosen | None:
+    """The first design that meets every requirement of every mission; None: there is none.
+
+    Where simulation leaves open every design that keeps the sums, the first of those.
+    """
+    left_open: list[FamilyDesign] = []
+
+    def passes(design: FamilyDesign) -> bool:
+        designs = work.family.designs(design)
+        found = [judgement(p, d) for p, d in zip(work.family.problems, designs, strict=True)]
+        if any(one.failed for one in found):
+            return False
+        if any(one.undecided for one in found):
+            left_open.append(design)
+            return False
+        return True
+
+    problems = work.family.problems
+    one = next(iter_family(work.family, passes), None)
+    if one is not None:
+        return Chosen(work.family.designs(one.design), problems, one)
+    if left_open:
+        return Chosen(work.family.designs(left_open[0]), problems, None, undecided=True)
+    return None
+
+
+def pinned_family(work: Work) -> Chosen | None:
+    """The only design that a spec leaves, whatever it breaks; None where something is open."""
+    soles = [sole_design(one.problem) for one in work.scenarios]
+    given = [one for one in soles if one is not None]
+    if len(given) < len(soles):
+        return None
+    return Chosen(tuple(design for _, design in given), tuple(problem for problem, _ in given))
+
+
+def alone(work: Work, mission: Mission, build: Callable[[], Build]) -> tuple[Work, Chosen | None]:
+    """What a mission would choose by itself."""
+    case = replace(mission.case, missions=())
+    own = work_of(case, build)
+    return own, choose_family(own)

@@ -1,0 +1,373 @@
+"""The verdict on a family: every mission judged by itself, one payload bought for all of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from syncline_design.choice.family import FamilyEvaluation
+from syncline_design.choice.outcome import (
+    NoVerdict,
+    OutOfTime,
+)
+from syncline_design.choice.problem import selection_of, with_everything
+from syncline_design.choice.table import Design, Problem
+from syncline_design.machine.deadline import in_force
+from syncline_design.spec.case import Case, Mission
+from syncline_design.spec.references import names_candidates
+from syncline_design.spec.selection import Selection
+from syncline_design.verdict.bill import total
+from syncline_design.verdict.family import (
+    Build,
+    Chosen,
+    Work,
+    choose_family,
+    pinned_family,
+    work_of,
+)
+from syncline_design.verdict.family_choice import (
+    Sums,
+    choice_of_family,
+    ranked,
+    robustness_of,
+)
+from syncline_design.verdict.family_infeasible import infeasible_family
+from syncline_design.verdict.named import (
+    BillLine,
+    ChoiceResult,
+    NamedDesign,
+    RankedDesign,
+    SharedHardware,
+)
+from syncline_design.verdict.recheck_family import family_sums
+from syncline_design.verdict.recheck_sums import BUDGETS
+from syncline_design.verdict.tree import (
+    Caution,
+    MissionVerdict,
+    RequirementResult,
+    Verdict,
+    Word,
+    finite,
+    word_of,
+)
+from syncline_design.verdict.verified import frame
+from syncline_design.verdict.verify import (
+    CheckSettings,
+    build_of,
+    unfinished_verdict,
+    verdict_on,
+    verify,
+)
+
+_WORST_FIRST: dict[str, int] = {"fails": 0, "infeasible": 0, "indeterminate": 1, "meets": 2}
+_STATUS_ORDER = {"fail": 0, "indeterminate": 1, "pass": 2}
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """One mission with the family's design: its verdict, and its rows at their worst corner."""
+
+    mission: Mission
+    selection: Selection
+    verdict: Verdict
+    rows: tuple[RequirementResult, ...]
+    alone: RankedDesign | None = None
+
+    @property
+    def word(self) -> Word:
+        """meets, fails or indeterminate."""
+        return word_of(self.rows)
+
+
+def check_family(case: Case, settings: CheckSettings) -> Verdict:
+    """The verdict on a spec of several missions, or one chosen for figures in their intervals."""
+
+    def build() -> Build:
+        return build_of(settings)
+
+    try:
+        in_force().doing("choosing")
+        work = work_of(case, build)
+        pinned = pinned_family(work)
+        if pinned is not None:
+            found = _verdict_on(work, pinned, settings, build, ChoiceResult())
+            if found.verdict != "fails" or not any(
+                names_candidates(one.case) for one in work.missions
+            ):
+                return found
+        chosen = choose_family(work) if pinned is None else None
+        if chosen is None:
+            return infeasible_family(work, settings, build)
+        return _verdict_on(work, chosen, settings, build, choice_of_family(work))
+    except OutOfTime as error:
+        return unfinished_verdict(case, None, settings, str(error))
+
+
+def _verdict_on(
+    work: Work,
+    chosen: Chosen,
+    settings: CheckSettings,
+    build: Callable[[], Build],
+    choice: ChoiceResult,
+) -> Verdict:
+    selections = [
+        selection_of(problem, design)
+        for problem, design in zip(chosen.problems, chosen.designs, strict=True)
+    ]
+    sums = family_sums(
+        [(one.case, own) for one, own in zip(work.scenarios, selections, strict=True)]
+    )
+    _demand_agreement(chosen, sums)
+    judged = [_judged(work, one, chosen, selections, sums, settings) for one in work.missions]
+    if work.case.missions:
+        judged = [replace(one, alone=_alone(one, build)) for one in judged]
+    shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], _least_margin(one.rows)))
+    return _assembled(work, judged, shown, sums, settings, build, choice)
+
+
+def _demand_agreement(chosen: Chosen, sums: Sums) -> None:
+    """The sums of the choice and those added up anew from the names have to be the same."""
+    if chosen.found is None:
+        return
+    found: FamilyEvaluation = chosen.found.sums
+    if any(found.amount(name) != sums[name] for name in BUDGETS):
+        raise NoVerdict("the chosen payload does not stand up to the independent recheck")
+
+
+def _judged(
+    work: Work,
+    mission: Mission,
+    chosen: Chosen,
+    selections: Sequence[Selection],
+    sums: Sums,
+    settings: CheckSettings,
+) -> Judged:
+    """A mission's verdict at its figures as given; its rows at whichever end is worst."""
+    places = work.of(mission.name)
+    selection = selections[places[0]]
+    rows: list[tuple[RequirementResult, ...]] = []
+    simulated = any(one.kind == "monte_carlo" for one in mission.case.spec.requirements)
+    plain = replace(settings, monte_carlo=settings.monte_carlo and simulated)
+    for place in places:
+        scenario = work.scenarios[place]
+        if scenario.end is not None:
+            at_end = verify(scenario.case, chosen.problems[place], chosen.designs[place], plain)
+            rows.append(at_end.requirements)
+    problem, design = chosen.problems[places[0]], chosen.designs[places[0]]
+    if rows:
+        problem = with_everything(build_of(settings)(mission.case))
+        design = _named_in(problem, selection)
+    verified = verify(mission.case, problem, design, settings)
+    verdict = verdict_on(mission.case, problem, verified, settings, ChoiceResult())
+    rows.append(verified.requirements)
+    worst = _worst_rows(rows)
+    return Judged(mission, selection, verdict, _with_sums(mission.case, worst, sums))
+
+
+def _named_in(problem: Problem, selection: Selection) -> Design:
+    """The design of these names in another problem."""
+    options = []
+    for table in problem.roles:
+        own = selection.role(table.stage_name, table.role)
+        place = None
+        if own is not None:
+            place = table.options.place_of((own.sensor, own.primitive, own.method))
+        if place is None:
+            raise NoVerdict(f"{table.role} of {table.stage_name} is not open at given figures")
+        options.append(place)
+    clocks = [
+        [clock.id for clock in vehicle.clocks].index(selection.clock(vehicle.name))
+        for vehicle in problem.vehicles
+    ]
+    return Design(tuple(options), tuple(clocks))
+
+
+def _worst_rows(rows: Sequence[Sequence[RequirementResult]]) -> tuple[RequirementResult, ...]:
+    """Of each requirement the worst row; the last rows are those at figures as given."""
+    given = {row.id: row for row in rows[-1]}
+    out: dict[str, RequirementResult] = {}
+    for some in rows:
+        for row in some:
+            known = out.get(row.id)
+            if known is None or _badness(row) < _badness(known):
+                out[row.id] = row
+    if len(rows) == 1:
+        return tuple(out.values())
+    return tuple(_at_worst(row, given.get(row.id)) for row in out.values())
+
+
+def _at_worst(row: RequirementResult, given: RequirementResult | None) -> RequirementResult:
+    if given is None or given.value is None or given.value == row.value:
+        return row
+    told = f"at the worst end of the datasheet intervals; {given.value:.6g} at given figures"
+    return replace(row, note="; ".join(part for part in (row.note, told) if part))
+
+
+def _badness(row: RequirementResult) -> tuple[int, float]:
+    margin = math.inf if row.margin is None else row.margin
+    return _STATUS_ORDER[row.status], margin
+
+
+def _with_sums(
+    case: Case, rows: Sequence[RequirementResult], sums: Sums
+) -> tuple[RequirementResult, ...]:
+    """Rows with cost, mass and power of all that the family buys."""
+    limits = {one.id: case.limit(one) for one in case.spec.requirements}
+    return tuple(
+        _with_sum(row, limits[row.id], sums[row.kind]) if row.kind in BUDGETS else row
+        for row in rows
+    )
+
+
+def _with_sum(
+    row: RequirementResult, limit: Fraction, amount: Fraction | None
+) -> RequirementResult:
+    if amount is None:
+        return row
+    passed = amount <= limit
+    margin = finite(float(limit - amount))
+    return replace(row, status="pass" if passed else "fail", value=float(amount), margin=margin)
+
+
+def _least_margin(rows: Sequence[RequirementResult]) -> float:
+    shares = [row.margin / row.limit for row in rows if row.margin is not None and row.limit]
+    return min(shares, default=math.inf)
+
+
+def _alone(one: Judged, build: Callable[[], Build]) -> RankedDesign | None:
+    """The best payload of a mission by itself."""
+    in_force().doing(f"choosing for {one.mission.name} alone")
+    own = work_of(replace(one.mission.case, missions=()), build)
+    chosen = choose_family(own)
+    return None if chosen is None or chosen.undecided else ranked(own, chosen)
+
+
+def _assembled(
+    work: Work,
+    judged: Sequence[Judged],
+    shown: Judged,
+    sums: Sums,
+    settings: CheckSettings,
+    build: Callable[[], Build],
+    choice: ChoiceResult,
+) -> Verdict:
+    """The family's verdict; what only one mission can show is that of the tightest one."""
+    words = {one.word for one in judged}
+    word: Word = min(words, key=lambda one: _WORST_FIRST[one])
+    bill = _bill([one.verdict for one in judged])
+    design = shown.verdict.design
+    assert design is not None
+    several = bool(work.case.missions)
+    made = frame(work.case, work.scenarios[0].problem, settings.seed)
+    made["spec"] = replace(
+        made["spec"],
+        combinations=str(work.family.combinations),
+        open_roles=_open_roles(work),
+    )
+    return replace(
+        shown.verdict,
+        verdict=word,
+        **made,
+        requirements=_family_rows(judged) if several else shown.rows,
+        design=_bought(design, [one.verdict.design for one in judged], sums, bill),
+        warnings=tuple(_warnings(judged, shown, several=several)),
+        choice=choice if choice.proof is not None else None,
+        bill_of_materials=bill,
+        missions=tuple(_mission_verdict(one) for one in judged) if several else None,
+        robustness=robustness_of(work, sums, build),
+    )
+
+
+def _open_roles(work: Work) -> tuple[str, ...]:
+    tables = work.scenarios[0].problem.roles
+    return tuple(
+        f"{table.stage_name}.{table.role}"
+        for table, role in zip(tables, work.family.roles, strict=True)
+        if len(table.options) + len(table.excluded) > 1 or len(role) > 1
+    )
+
+
+def _family_rows(judged: Sequence[Judged]) -> tuple[RequirementResult, ...]:
+    """Of each requirement the row of the mission that is nearest to its limit, or beyond it."""
+    worst: dict[str, tuple[RequirementResult, str]] = {}
+    for one in judged:
+        for row in one.rows:
+            share = -math.inf if row.margin is None else row.margin / (row.limit or 1.0)
+            known = worst.get(row.id)
+            if known is None or (_STATUS_ORDER[row.status], share) < _order_of(known[0]):
+                worst[row.id] = (row, one.mission.name)
+    return tuple(
+        row
+        if row.kind in BUDGETS
+        else replace(row, note="; ".join(p for p in (f"in mission {name}", row.note) if p))
+        for row, name in worst.values()
+    )
+
+
+def _order_of(row: RequirementResult) -> tuple[int, float]:
+    share = -math.inf if row.margin is None else row.margin / (row.limit or 1.0)
+    return _STATUS_ORDER[row.status], share
+
+
+def _mission_verdict(one: Judged) -> MissionVerdict:
+    return MissionVerdict(
+        name=one.mission.name,
+        verdict=one.word,
+        requirements=one.rows,
+        figures=one.verdict.figures,
+        design=one.verdict.design,
+        syncline=one.verdict.syncline,
+        monte_carlo=one.verdict.monte_carlo,
+        alone=one.alone,
+    )
+
+
+def _warnings(judged: Sequence[Judged], shown: Judged, *, several: bool) -> Iterator[Caution]:
+    """What any mission is cautioned of, once; which mission the page's figures are of."""
+    if several:
+        name = shown.mission.name
+        yield Caution(
+            "mission-shown",
+            f"ledger, figures and simulation are those of mission {name}, the one nearest to a "
+            "limit; every mission's own are in the table of missions",
+        )
+    seen: dict[Caution, list[str]] = {}
+    for one in judged:
+        for caution in one.verdict.warnings:
+            seen.setdefault(caution, []).append(one.mission.name)
+    for caution, names in seen.items():
+        if not several or len(names) == len(judged):
+            yield caution
+        else:
+            yield replace(caution, message=f"in mission {', '.join(names)}: {caution.message}")
+
+
+def _bill(verdicts: Sequence[Verdict]) -> tuple[BillLine, ...]:
+    """What is bought for all missions: each piece once, shared hardware as often as one needs."""
+    lines: dict[tuple[str, str, str], BillLine] = {}
+    for verdict in verdicts:
+        for line in verdict.bill_of_materials or ():
+            key = (line.stage, line.use, line.entry)
+            if key not in lines or lines[key].quantity < line.quantity:
+                lines[key] = line
+    return tuple(lines.values())
+
+
+def _bought(
+    design: NamedDesign,
+    designs: Sequence[NamedDesign | None],
+    sums: Sums,
+    bill: tuple[BillLine, ...],
+) -> NamedDesign:
+    """A mission's design with what the whole family buys."""
+    boards: dict[tuple[str, str], SharedHardware] = {}
+    for own in designs:
+        for board in own.infrastructure if own is not None else ():
+            known = boards.get((board.vehicle, board.id))
+            if known is None or known.count < board.count:
+                boards[board.vehicle, board.id] = board
+    cost, mass, power = (None if (a := sums[n]) is None else float(a) for n in BUDGETS)
+    cost = total(bill, "cost") if cost is not None else None
+    return replace(design, cost=cost, mass=mass, power=power, infrastructure=tuple(boards.values()))
