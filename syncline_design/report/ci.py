@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 from syncline_design.machine.sentences import sentence_list
@@ -46,10 +46,21 @@ def findings(verdict: Checked) -> list[Notice]:
     """Every requirement, problem, reason of infeasibility and warning of a verdict."""
     if isinstance(verdict, Refused):
         return [_problem(entry) for entry in verdict.problems]
-    found = [_requirement(row, verdict) for row in verdict.requirements]
+    found = list(_requirements(verdict))
     if verdict.verdict in ("infeasible", "indeterminate") and not found_failure(found):
         found.insert(0, _no_design(verdict))
     return found + [_warning(entry, verdict) for entry in verdict.warnings]
+
+
+def _requirements(verdict: Verdict) -> Iterator[Notice]:
+    """Every requirement; of several missions each mission's, at the place of its own limit."""
+    for row in () if verdict.missions else verdict.requirements:
+        yield _requirement(row, verdict)
+    for mission in verdict.missions or ():
+        for row in mission.requirements:
+            found = _requirement(row, verdict)
+            message = f"mission {mission.name}: {found.message}"
+            yield replace(found, id=f"{mission.name} {row.id}", message=message)
 
 
 def found_failure(found: list[Notice]) -> bool:

@@ -36,6 +36,7 @@ from syncline_design.report.document import (
 from syncline_design.report.error_figures import error_figures
 from syncline_design.report.explained import explained
 from syncline_design.report.on_alternatives import bargain_nodes
+from syncline_design.report.on_missions import missions, robustness
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -73,6 +74,8 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
                      "Why not"),
             *section("requirements", "Requirements",
                      show(verdict_tables.requirements(verdict), silent=True)),
+            *section("missions", "Missions", missions(verdict), "Missions"),
+            *section("robustness", "What robustness costs", robustness(verdict), "Robustness"),
             *section("baseline", "Against the baseline", _since(verdict), "Baseline"),
             *section("explained", "Worked out", explained(verdict), "Worked out"),
             *section("figures", "Three figures", error_figures(verdict), "Figures"),

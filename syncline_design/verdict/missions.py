@@ -163,7 +163,23 @@ def _judged(
     verdict = verdict_on(mission.case, problem, verified, settings, ChoiceResult())
     rows.append(verified.requirements)
     worst = _worst_rows(rows)
-    return Judged(mission, selection, verdict, _with_sums(mission.case, worst, sums))
+    rows_here = _in_place(work.case, mission.case, _with_sums(mission.case, worst, sums))
+    return Judged(mission, selection, verdict, rows_here)
+
+
+def _in_place(
+    spec: Case, case: Case, rows: Sequence[RequirementResult]
+) -> tuple[RequirementResult, ...]:
+    """Rows at the place of the limit that the mission gives itself."""
+    places = {}
+    for index, one in enumerate(case.spec.requirements):
+        at = ("requirements", index, "limit")
+        if case.positions.get(at) != spec.positions.get(at):
+            places[one.id] = case.positions[at]
+    return tuple(
+        replace(row, line=places[row.id][0], column=places[row.id][1]) if row.id in places else row
+        for row in rows
+    )
 
 
 def _named_in(problem: Problem, selection: Selection) -> Design:

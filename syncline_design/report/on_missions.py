@@ -1,0 +1,150 @@
+"""Several missions with one payload: what each reaches, what it would fly alone, what robust is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from syncline_design.machine.sentences import sentence_list
+from syncline_design.report import numbers
+from syncline_design.report.document import Facts, Node, Text, show
+from syncline_design.report.table import Cell, Table, table
+from syncline_design.report.verdict_words import kind_text, margin_text, status_of
+from syncline_design.report.words import OUTCOMES
+
+if TYPE_CHECKING:
+    from syncline_design.verdict.named import NamedDesign, RankedDesign
+    from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Robustness, Verdict
+
+
+def missions(verdict: Verdict) -> list[Node]:
+    """A table mission by requirement, then the shared payload against each mission's own."""
+    found = verdict.missions
+    if not found:
+        return []
+    lead = (
+        "One payload for all missions: cost, mass and power are those of everything that is "
+        "bought, once."
+    )
+    return [
+        Text(lead),
+        *show(_by_requirement(found), silent=True),
+        *show(_alone(verdict, found)),
+    ]
+
+
+def _by_requirement(found: tuple[MissionVerdict, ...]) -> Table:
+    columns = {row.id: row for mission in found for row in mission.requirements}
+    rows = []
+    for mission in found:
+        own = {row.id: row for row in mission.requirements}
+        outcome = OUTCOMES[mission.verdict]
+        rows.append((
+            Cell(mission.name),
+            Cell(outcome.word, tone=outcome.tone, mark=outcome.mark),
+            *(_kept(own.get(name)) for name in columns),
+        ))  # fmt: skip
+    heads = [f"{name} ({kind_text(row)})" for name, row in columns.items()]
+    return table("Missions by requirement", ("Mission", "Verdict", *heads), rows)
+
+
+def _kept(row: RequirementResult | None) -> Cell:
+    """`111.9 mm of 200 mm`, with its mark."""
+    if row is None:
+        return Cell(numbers.MISSING)
+    state = status_of(row)
+    if row.value is None:
+        return Cell(state.word, tone=state.tone, mark=state.mark)
+    value, limit = (numbers.in_unit(one, row.unit) for one in (row.value, row.limit))
+    text = f"{value} of {limit}"
+    return Cell(text, row.value, state.tone, state.mark, sub=margin_text(row))
+
+
+def _alone(verdict: Verdict, found: tuple[MissionVerdict, ...]) -> Table | None:
+    """What each mission would choose by itself, and what all share."""
+    currency = verdict.spec.currency
+    known = [one.alone for one in found if one.alone is not None]
+    design = verdict.design
+    if design is None or len(known) < len(found):
+        return None
+    rows = [_payload_row(one.name, one.alone, currency) for one in found if one.alone is not None]
+    rows.append((
+        Cell("all of them"), Cell(numbers.money(design.cost, currency), design.cost),
+        Cell(numbers.length(_worst(found)), _worst(found)), Cell(_sensors(design, found)),
+    ))  # fmt: skip
+    costs = [one.cost for one in known if one.cost is not None]
+    note = ""
+    if len(costs) == len(known) and design.cost is not None:
+        each = numbers.money(sum(costs), currency)
+        dearest = numbers.money(max(costs), currency)
+        note = f"A payload for each mission: {each} together; the dearest of them {dearest}."
+    heads = ("Payload for", "Cost #", "Largest error #", "Sensors")
+    return table("One payload for all against one for each", heads, rows, note)
+
+
+def _payload_row(name: str, one: RankedDesign, currency: str) -> tuple[Cell, Cell, Cell, Cell]:
+    return (
+        Cell(f"{name} alone"),
+        Cell(numbers.money(one.cost, currency), one.cost),
+        Cell(numbers.length(one.error_m), one.error_m),
+        Cell(_sensors(one.design)),
+    )
+
+
+def _worst(found: tuple[MissionVerdict, ...]) -> float:
+    return max(one.syncline.total_m for one in found if one.syncline is not None)
+
+
+def _sensors(design: NamedDesign, found: tuple[MissionVerdict, ...] = ()) -> str:
+    """The sensors by role; where missions have their own, each one's."""
+    named = []
+    for stage, role, one in design.roles:
+        others = {
+            other.name: mission.name
+            for mission in found
+            if mission.design is not None
+            for at, slot, other in mission.design.roles
+            if (at.name, slot) == (stage.name, role)
+        }
+        if len(others) > 1:
+            named += [f"{name} ({mission})" for name, mission in others.items()]
+        else:
+            named.append(one.name)
+    return sentence_list(named)
+
+
+def robustness(verdict: Verdict) -> list[Node]:
+    """The design beside the one that would do if every figure were as given."""
+    found = verdict.robustness
+    if found is None:
+        return []
+    return [Text(_lead(found)), Facts(tuple(_price(found, verdict)))]
+
+
+def _lead(found: Robustness) -> str:
+    if not found.figures:
+        return "No datasheet figure has an interval: what holds as given holds always."
+    plural = "figure" if found.figures == 1 else "figures"
+    if found.choose_for == "always":
+        return (
+            f"Chosen to hold wherever {found.figures} datasheet {plural} lie in their intervals: "
+            "accuracy with every error at its largest, sync with every error at its smallest."
+        )
+    return (
+        f"Chosen to hold with probability {found.choose_for}, {found.figures} datasheet {plural} "
+        "independent and uniform in their intervals, all requirements together."
+    )
+
+
+def _price(found: Robustness, verdict: Verdict) -> list[tuple[str, str]]:
+    facts = []
+    nominal = found.nominal
+    if nominal is None:
+        facts.append(("At given figures", "no design meets every requirement"))
+    else:
+        currency = verdict.spec.currency
+        amount = numbers.money(nominal.cost, currency)
+        error = numbers.length(nominal.error_m)
+        facts.append(("At given figures", f"{_sensors(nominal.design)}: {amount}, {error}"))
+    if found.price is not None:
+        facts.append(("Price of robustness", numbers.in_unit(found.price, found.unit)))
+    return facts
