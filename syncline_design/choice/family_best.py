@@ -48,6 +48,9 @@ MOST_PARTS = 2_000  # parts of a family that are searched for one design after t
 APART = 3e-11  # errors that differ by a larger share differ in their 12 figures
 
 
+Also = Callable[[FamilyDesign], bool]
+
+
 @dataclass(frozen=True, slots=True)
 class FamilyPoint:
     """One point of a family's front."""
@@ -71,21 +74,26 @@ def primary_of(family: Family) -> ResourceName:
     return "cost" if family.objective == "error" else family.objective
 
 
-def family_front(family: Family, resource: ResourceName = "cost") -> tuple[FamilyPoint, ...]:
+def family_front(
+    family: Family, resource: ResourceName = "cost", also: Also | None = None
+) -> tuple[FamilyPoint, ...]:
     """The exact front over designs that meet every requirement but accuracy.
 
-    By rising amount and falling error; errors that agree to 12 figures count as equal.
+    By rising amount and falling error; errors that agree to 12 figures count as equal.  also: what
+    a design has to satisfy besides.
     """
     if family.is_empty:
         return ()
     problems = tuple(replace(problem, objective=resource) for problem in family.problems)
     tables = tabulate_family(replace(family, problems=problems), resource)
     tables = replace(tables, accuracy=np.full(len(tables.rates), math.inf))
+    if also is not None:
+        return tuple(_step_by_step(tables, also))
     found = _merged(tables, guarded=False, least=False)
     points = _front_of(tables, found)
     if not any(broken_by_family(family, one.sums, accuracy=False) for one in points):
         return tuple(_point(tables, one) for one in points)
-    if not tables.per_sensor:
+    if tables.guards_sync:
         known = [one for one in points if not broken_by_family(family, one.sums, accuracy=False)]
         with suppress(TooLarge):
             found = _merged(tables, guarded=True, least=False, known=known)
@@ -93,10 +101,10 @@ def family_front(family: Family, resource: ResourceName = "cost") -> tuple[Famil
     return tuple(_step_by_step(tables))
 
 
-def _step_by_step(tables: FamilyTables) -> Iterator[FamilyPoint]:
+def _step_by_step(tables: FamilyTables, also: Also | None = None) -> Iterator[FamilyPoint]:
     """The front by rising amount: the least amount below the error of the point before."""
     while True:
-        one = next(_iter(tables, None, accuracy=False), None)
+        one = next(_iter(tables, also, accuracy=False), None)
         if one is None:
             return
         yield _point(tables, one)
@@ -115,9 +123,7 @@ def best_of_family(family: Family) -> Found | None:
     return next(iter_family(family), None)
 
 
-def iter_family(
-    family: Family, also: Callable[[FamilyDesign], bool] | None = None
-) -> Iterator[Found]:
+def iter_family(family: Family, also: Also | None = None) -> Iterator[Found]:
     """Designs that meet every requirement, best first, each decided exactly.
 
     also: what a design has to satisfy besides; one that does not is passed over.
@@ -126,9 +132,7 @@ def iter_family(
         yield from _iter(tabulate_family(family, primary_of(family)), also, accuracy=True)
 
 
-def _iter(
-    tables: FamilyTables, also: Callable[[FamilyDesign], bool] | None, *, accuracy: bool
-) -> Iterator[Found]:
+def _iter(tables: FamilyTables, also: Also | None, *, accuracy: bool) -> Iterator[Found]:
     """Designs in order: each part of the family without those found is solved anew.
 
     (E. L. Lawler, A procedure for computing the K best solutions, Management Science 18, 1972.)
@@ -176,7 +180,7 @@ def _best_in(tables: FamilyTables, accuracy: bool) -> Found | None:
     first = _first(tables, _merged(tables, guarded=False, least=True))
     if first is None or not broken_by_family(tables.family, first.sums, accuracy=accuracy):
         return first
-    if tables.per_sensor:
+    if not tables.guards_sync:
         return first
     try:
         found = _merged(tables, guarded=True, least=True)

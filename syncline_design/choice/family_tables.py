@@ -90,6 +90,16 @@ class FamilyTables:
         """Whether sync errors add up pair by pair."""
         return self.first.sync_model == "per_sensor"
 
+    @property
+    def guards_sync(self) -> bool:
+        """Whether a guarded merge knows all that the system's sync limit asks for.
+
+        It does not know the largest bound where errors add up pair by pair, nor the near end of a
+        stage's distances.
+        """
+        ends = any(next(iter(p.near_ends()), None) is not None for p in self.family.problems)
+        return not self.per_sensor and not ends
+
     def whole(self, k: int, amount: Fraction | None) -> int:
         """An amount of a resource in its whole numbers."""
         if amount is None:

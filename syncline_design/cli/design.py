@@ -183,7 +183,8 @@ def _write_design(found: Optimised, path: Path) -> None:
     from syncline_design.spec.edit import write_spec
     from syncline_design.verdict.optimise import pinned_text
 
-    write_spec(pinned_text(found.case, found.problem, found.designs[0]), path)
+    text = found.text or pinned_text(found.case, found.problem, found.designs[0])
+    write_spec(text, path)
     say(f"design written to {path}")
 
 

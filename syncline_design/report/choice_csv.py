@@ -16,9 +16,30 @@ from syncline_design.verdict.optimise import Optimised
 
 def optimisation_csv(found: Optimised) -> str:
     """The front with --pareto, else the designs."""
+    if found.text is not None:
+        return family_csv(found)
     if found.settings.pareto:
         return front_csv(found.problem, found.points, found.settings.resource)
     return designs_csv(found.problem, found.designs)
+
+
+def family_csv(found: Optimised) -> str:
+    """Of several missions the front or the designs, their error the largest of any mission."""
+    resource = found.settings.resource
+    listed = found.result.front if found.settings.pareto else found.result.designs
+    names = [resource] if found.settings.pareto else ["cost", "mass", "power"]
+    units = {"mass": "mass_kg", "power": "power_w"} if not found.settings.pareto else {}
+    headers = [*(units.get(name, name) for name in names), "error_m"]
+    rows: list[list[Any]] = []
+    for one in listed or ():
+        if not rows:
+            slots = [f"{s.name} {role}".replace(" ", "_") for s, role, _ in one.design.roles]
+            parts = ("sensor", "primitive", "timestamping")
+            headers += [f"{slot}_{part}" for slot in slots for part in parts]
+        cells = [part for *_, r in one.design.roles
+                 for part in (r.sensor, r.primitive, r.timestamping)]  # fmt: skip
+        rows.append([*(getattr(one, name) for name in names), one.error_m, *cells])
+    return plain_csv(headers, rows)
 
 
 def front_csv(problem: Problem, points: Sequence[FrontPoint], resource: ResourceName) -> str:

@@ -34,14 +34,17 @@ from syncline_design.report.verdict_words import qualification, warning_nodes
 from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
-from syncline_design.verdict.named import RankedDesign
+from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
 from syncline_design.verdict.optimise import Optimisation, Optimised
 
 
 def on_choice(found: Optimised) -> Document:
     """The best designs of a spec as a document, or why there is none."""
     currency, result = found.case.spec.currency, found.result
-    designs = designs_table(found.problem, found.designs, currency, result.designs)
+    if found.text is None:
+        designs = designs_table(found.problem, found.designs, currency, result.designs)
+    else:
+        designs = family_designs_table(result.designs, currency)
     without = alternatives_table(result.alternatives or (), currency)
     return Document(
         family="Optimisation",
@@ -86,7 +89,7 @@ def _sentences(found: Optimised) -> list[str]:
     """How it is known, or why it is not."""
     if found.result.message is not None:
         return [found.result.message]
-    return [_proof(found.result, found.case.spec.objective)] if found.designs else []
+    return [_proof(found.result, found.case.spec.objective)] if found.result.designs else []
 
 
 def _proof(result: Optimisation, objective: str) -> str:
@@ -162,6 +165,47 @@ def designs_table(
     return table("Best designs", heads, rows)
 
 
+def family_designs_table(designs: Sequence[RankedDesign], currency: str) -> Table:
+    """Payloads for several missions, best first; the error is the largest of any mission."""
+    rows = [
+        [
+            Cell(str(place), float(place)),
+            *(amount_cell(getattr(one, name), name, currency) for name in _RESOURCES),
+            Cell(numbers.length(one.error_m), one.error_m),
+            *_named_cells(one.design),
+        ]
+        for place, one in enumerate(designs, 1)
+    ]
+    heads = ("Place", "Cost #", "Mass #", "Power #", "Largest error #")
+    return table("Best designs", (*heads, *_named_heads(designs[:1])), rows)
+
+
+def family_front_table(
+    front: Sequence[FrontDesign], resource: ResourceName, currency: str
+) -> Table:
+    """The front of several missions, a row per point."""
+    rows = [
+        [
+            amount_cell(getattr(one, resource), resource, currency),
+            Cell(numbers.length(one.error_m), one.error_m),
+            *_named_cells(one.design),
+        ]
+        for one in front
+    ]
+    heads = (f"{resource.capitalize()} #", "Largest error #", *_named_heads(front[:1]))
+    return table("Exact front", heads, rows)
+
+
+def _named_heads(designs: Sequence[RankedDesign | FrontDesign]) -> list[str]:
+    return [f"{stage.name} {role}" for one in designs for stage, role, _ in one.design.roles]
+
+
+def _named_cells(design: NamedDesign) -> list[Cell]:
+    return [
+        Cell(f"{one.sensor} by {one.primitive}, {one.timestamping}") for _, _, one in design.roles
+    ]
+
+
 _RESOURCES: tuple[ResourceName, ...] = ("cost", "mass", "power")
 
 
@@ -194,6 +238,9 @@ def _front(found: Optimised) -> list[Section]:
     """The exact front and what each accuracy costs on it."""
     resource, currency = found.settings.resource, found.case.spec.currency
     nodes: list[Node] = []
+    if found.text is not None and found.result.front:
+        nodes += show(family_front_table(found.result.front, resource, currency), silent=True)
+        nodes += show(staircase_table(found.result.staircase or (), currency, resource))
     if found.points:
         nodes += show(front_table(found.problem, found.points, resource, currency), silent=True)
         nodes += show(staircase_table(found.result.staircase or (), currency, resource))

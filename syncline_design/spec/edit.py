@@ -45,7 +45,7 @@ def pinned(
     for one in roles:
         choice = stages[one.stage].role(one.role)
         assert choice is not None
-        keys = choice.model_copy(update=_pinned_keys(case, one))
+        keys = choice.model_copy(update=pinned_keys(case, one))
         stages[one.stage] = stages[one.stage].model_copy(update={one.role: keys})
     for index, clock in (clocks or {}).items():
         only = ClockChoice(candidates=(clock,))
@@ -60,13 +60,14 @@ def pinned_spec_text(
     changes: list[tuple[KeyPath, dict[str, Any]]] = []
     for pinned in roles:
         path: KeyPath = ("stages", pinned.stage, pinned.role)
-        changes.append((path, _pinned_keys(case, pinned)))
+        changes.append((path, pinned_keys(case, pinned)))
     for stage, clock in sorted((clocks or {}).items()):
         changes.append((("stages", stage), {"clock": clock}))
-    return _changed(case, changes, "with the chosen design pinned")
+    return changed_text(case, changes, "with the chosen design pinned")
 
 
-def _pinned_keys(case: Case, pinned: PinnedRole) -> dict[str, Any]:
+def pinned_keys(case: Case, pinned: PinnedRole) -> dict[str, Any]:
+    """Keys of a role that pin what was chosen; None: a key that goes."""
     choice = case.spec.stages[pinned.stage].role(pinned.role)
     inline = choice is not None and choice.sensor is not None and not isinstance(choice.sensor, str)
     keys: dict[str, Any] = {"candidates": None}
@@ -92,7 +93,7 @@ def with_timestamping_text(case: Case, errors: Sequence[tuple[int, RoleName, flo
         error = {"distribution": "uniform", "low": f"{-bound_s:.6g} s", "high": "0 s"}
         keys = {"timestamping": {"error": error}, "note": f"{own}; {said}" if own else said}
         changes.append((("stages", stage, role), keys))
-    return _changed(case, changes, "with the residuals that `audit` found")
+    return changed_text(case, changes, "with the residuals that `audit` found")
 
 
 def with_effects(case: Case, effects: Sequence[EffectChoice]) -> Case:
@@ -105,14 +106,16 @@ def with_effects_text(case: Case, effects: Sequence[EffectChoice]) -> str:
     """The spec with entries added at the end of its `effects:`."""
     data = parse(case.text, str(case.path)).data
     entries = (*data.get("effects", ()), *(effect_entry(effect) for effect in effects))
-    return _changed(case, [((), {"effects": entries})], "with effects that `diagnose` found")
+    return changed_text(case, [((), {"effects": entries})], "with effects that `diagnose` found")
 
 
 def with_log_text(case: Case, log: Mapping[str, Any]) -> str:
     """The spec with a mapping of streams in its `log:`, beside what stands there already."""
     data = parse(case.text, str(case.path)).data
     whole = {**data.get("log", {}), **log}
-    return _changed(case, [((), {"log": whole})], "with the mapping that `log inspect` proposes")
+    return changed_text(
+        case, [((), {"log": whole})], "with the mapping that `log inspect` proposes"
+    )
 
 
 def effect_entry(effect: EffectChoice) -> dict[str, Any]:
@@ -141,7 +144,7 @@ def write_spec(text: str, path: str | Path, builtin: bool = True) -> Case:
     return case
 
 
-def _changed(case: Case, changes: list[tuple[KeyPath, dict[str, Any]]], reason: str) -> str:
+def changed_text(case: Case, changes: list[tuple[KeyPath, dict[str, Any]]], reason: str) -> str:
     """The spec's text with keys of mappings set (or, for None, dropped)."""
     data, text = parse(case.text, str(case.path)).data, case.text
     for path, keys in changes:

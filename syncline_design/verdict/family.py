@@ -7,8 +7,8 @@ tau_crit), so that what holds at both ends holds everywhere between.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Literal
 
 from syncline_design.choice.family import Family, FamilyDesign, family_of
@@ -144,6 +144,29 @@ def choose_family(work: Work) -> Chosen | None:
     Where simulation leaves open every design that keeps the sums, the first of those.
     """
     left_open: list[FamilyDesign] = []
+    problems = work.family.problems
+    one = next(accepted(work, left_open), None)
+    if one is not None:
+        return Chosen(work.family.designs(one.design), problems, one)
+    if left_open:
+        return Chosen(work.family.designs(left_open[0]), problems, None, undecided=True)
+    return None
+
+
+def accepted(work: Work, left_open: list[FamilyDesign] | None = None) -> Iterator[Found]:
+    """Designs that meet every requirement of every mission, best first.
+
+    left_open: takes in those that simulation leaves open.
+    """
+    return iter_family(work.family, passing(work, left_open))
+
+
+def passing(
+    work: Work, left_open: list[FamilyDesign] | None = None
+) -> Callable[[FamilyDesign], bool] | None:
+    """Whether what is no sum accepts a design in every mission; None where nothing asks it."""
+    if all(problem.judge is None for problem in work.family.problems):
+        return None
 
     def passes(design: FamilyDesign) -> bool:
         designs = work.family.designs(design)
@@ -151,17 +174,12 @@ def choose_family(work: Work) -> Chosen | None:
         if any(one.failed for one in found):
             return False
         if any(one.undecided for one in found):
-            left_open.append(design)
+            if left_open is not None:
+                left_open.append(design)
             return False
         return True
 
-    problems = work.family.problems
-    one = next(iter_family(work.family, passes), None)
-    if one is not None:
-        return Chosen(work.family.designs(one.design), problems, one)
-    if left_open:
-        return Chosen(work.family.designs(left_open[0]), problems, None, undecided=True)
-    return None
+    return passes
 
 
 def pinned_family(work: Work) -> Chosen | None:
@@ -171,10 +189,3 @@ def pinned_family(work: Work) -> Chosen | None:
     if len(given) < len(soles):
         return None
     return Chosen(tuple(design for _, design in given), tuple(problem for problem, _ in given))
-
-
-def alone(work: Work, mission: Mission, build: Callable[[], Build]) -> tuple[Work, Chosen | None]:
-    """What a mission would choose by itself."""
-    case = replace(mission.case, missions=())
-    own = work_of(case, build)
-    return own, choose_family(own)

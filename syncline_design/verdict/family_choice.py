@@ -5,13 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
+from typing import Any
 
 from syncline_design.choice.family_best import FamilyPoint, family_front
 from syncline_design.choice.front import staircase
+from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint, Proof
 from syncline_design.machine.deadline import in_force
 from syncline_design.verdict.choice_data import full_design, ruled_out
-from syncline_design.verdict.family import Build, Chosen, Work, choose_family, intervals, work_of
+from syncline_design.verdict.family import (
+    Build,
+    Chosen,
+    Work,
+    choose_family,
+    intervals,
+    passing,
+    work_of,
+)
 from syncline_design.verdict.named import ChoiceResult, FrontDesign, RankedDesign
 from syncline_design.verdict.recheck_sums import BUDGETS, Budget
 from syncline_design.verdict.tree import Robustness
@@ -56,26 +66,28 @@ def robustness_of(work: Work, sums: Sums, build: Callable[[], Build]) -> Robustn
 def choice_of_family(work: Work) -> ChoiceResult:
     """The proof, the front of the family, what was ruled out in any mission."""
     in_force().doing("working out the front")
-    points = family_front(work.family)
+    points = family_front(work.family, also=passing(work))
     excluded, count = ruled_out(work.scenarios[0].problem)
     return ChoiceResult(
         proof=Proof("front", optimal=True, rechecked=True),
-        front=tuple(_front_design(work, point) for point in points),
-        staircase=staircase([_as_point(work, point) for point in points]),
+        front=tuple(front_design(work, point) for point in points),
+        staircase=staircase([as_point(work, point) for point in points]),
         excluded=excluded,
         excluded_count=count,
     )
 
 
-def _as_point(work: Work, point: FamilyPoint) -> FrontPoint:
+def as_point(work: Work, point: FamilyPoint) -> FrontPoint:
+    """A point with the design of the first mission."""
     return FrontPoint(point.amount, point.error_m, work.family.designs(point.design)[0])
 
 
-def _front_design(work: Work, point: FamilyPoint) -> FrontDesign:
+def front_design(work: Work, point: FamilyPoint, resource: ResourceName = "cost") -> FrontDesign:
+    """A point of a front in names; amount and error are the family's."""
     designs, scenario = work.family.designs(point.design), work.scenarios[0]
     shown = full_design(scenario.case, scenario.problem, designs[0])
-    cost = float(point.amount)
-    return FrontDesign(cost=cost, error_m=point.error_m, design=replace(shown, cost=cost))
+    amounts: dict[str, Any] = {resource: float(point.amount)}
+    return FrontDesign(**amounts, error_m=point.error_m, design=replace(shown, **amounts))
 
 
 def cannot_share(work: Work, build: Callable[[], Build]) -> tuple[str, ...]:

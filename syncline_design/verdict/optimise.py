@@ -48,6 +48,7 @@ from syncline_design.verdict.choice_data import (
     ranked_designs,
     ruled_out,
 )
+from syncline_design.verdict.family import is_family, refuse_missions
 from syncline_design.verdict.named import Alternative, Bargain, Exclusion, FrontDesign, RankedDesign
 from syncline_design.verdict.open_choice import Picked, pick
 from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
@@ -161,10 +162,15 @@ class Optimised:
     points: tuple[FrontPoint, ...]
     result: Optimisation
     verdict: Verdict | None = None
+    text: str | None = None  # of a family: the spec with its design pinned
 
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best designs of a spec; pinned roles stay as they are."""
+    if is_family(case):
+        from syncline_design.verdict.optimise_family import optimize_family
+
+        return optimize_family(case, settings)
     questions = _questions(case, settings)
     build = Simulations(settings.seed).problem_of
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
@@ -360,6 +366,7 @@ def pinned_text(case: Case, problem: Problem, design: Design) -> str:
 
 def as_measured(case: Case, seed: int = 0) -> Case:
     """The spec of the system that made a log: with choices open, its best design pinned."""
+    refuse_missions(case)
     if sole_design(build_problem(case)) is not None:
         return case
     problem, design = picked_design(case, seed)
@@ -377,7 +384,7 @@ def _pins(case: Case, problem: Problem, design: Design) -> tuple[list[PinnedRole
     """Roles and, by stage, clocks of a design."""
     selected = selection_of(problem, design)
     index = {stage.choice.name: stage for stage in case.stages}
-    roles = [_pinned(index[one.stage], one) for one in selected.roles]
+    roles = [pinned_role(index[one.stage], one) for one in selected.roles]
     clocks = {
         stage.index: identity
         for stage in case.stages
@@ -386,7 +393,7 @@ def _pins(case: Case, problem: Problem, design: Design) -> tuple[list[PinnedRole
     return roles, clocks
 
 
-def _pinned(stage: StageCase, one: RoleSelection) -> PinnedRole:
+def pinned_role(stage: StageCase, one: RoleSelection) -> PinnedRole:
     """What to write for one role; an error given in place stays, with its primitive if it has."""
     role = stage.role(one.role)
     assert role is not None
