@@ -5,25 +5,37 @@ from __future__ import annotations
 import itertools
 import random
 
-import pytest
-
 from random_families import plain_front, plain_order, random_family
 from syncline_design.choice.evaluate import error_key
 from syncline_design.choice.family_best import family_front, iter_family
 
-FAMILIES = 150
+FAMILIES = 60  # 10 000 in benchmarks/missions.py
 
 
-@pytest.mark.parametrize("start", range(0, FAMILIES, 50))
-def test_front_and_order_are_those_of_enumeration(start: int) -> None:
-    feasible = 0
-    for seed in range(start, start + 50):
+def test_front_and_order_are_those_of_enumeration() -> None:
+    feasible = broken = 0
+    for seed in range(FAMILIES):
         rng = random.Random(seed)
-        family = random_family(rng)
+        family = random_family(rng, 24)
         resource = rng.choice(["cost", "mass", "power"])
         found = [(p.amount, error_key(p.error_m)) for p in family_front(family, resource)]
         assert found == plain_front(family, resource), seed
-        ranked = [one.rank[:2] for one in itertools.islice(iter_family(family), 4)]
-        assert ranked == plain_order(family)[:4], seed
+        ranked = [one.rank[:2] for one in itertools.islice(iter_family(family), 2)]
+        assert ranked == plain_order(family)[:2], seed
         feasible += bool(ranked)
-    assert 10 < feasible < 50
+        broken += not ranked
+    assert feasible > 15
+    assert broken > 5
+
+
+def test_a_design_that_something_else_refuses_is_passed_over() -> None:
+    family = next(
+        one
+        for seed in range(100)
+        if len(plain_order(one := random_family(random.Random(seed)))) > 5
+    )
+    first, second, third, *_ = itertools.islice(iter_family(family), 5)
+    refused = {first.design, third.design}
+    left = list(itertools.islice(iter_family(family, lambda one: one not in refused), 2))
+    assert left[0].design == second.design
+    assert left[1].rank >= third.rank

@@ -229,7 +229,8 @@ def _role_disagreements(
     for mission, role in zip(missions, roles, strict=True):
         assert role is not None
         known = {one.id: one.entry for one in role.sensors}
-        place = mission.case.position(("stages", stage, role.role))
+        key = "candidates" if role.choice.sensor is None else "sensor"
+        place = mission.case.position(("stages", stage, role.role, key))
         named = f"mission {mission.name}: stages[{stage}].{role.role}"
         if mission is not missions[0] and not common.keys() & known.keys():
             message = "no sensor that earlier missions may use too"

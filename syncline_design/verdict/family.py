@@ -78,6 +78,15 @@ def refuse_missions(case: Case) -> None:
         raise BadInput((Flaw(str(case.path), *place, "missions", message, hint=hint),))
 
 
+def refuse_share(case: Case) -> None:
+    """BadInput where a design is asked for that holds with a probability."""
+    if case.spec.choose_for not in ("nominal", "always"):
+        place = case.position(("choose_for",))
+        message = "a choice for a probability is not worked out"
+        hint = "say nominal, or always for any figures in their intervals"
+        raise BadInput((Flaw(str(case.path), *place, "choose_for", message, hint=hint),))
+
+
 def missions_of(case: Case) -> tuple[Mission, ...]:
     """The missions of a spec; the spec itself where it has none."""
     return case.missions or (Mission(ALL, case),)
@@ -88,6 +97,7 @@ def work_of(case: Case, build: Callable[[], Build], *, nominal: bool = False) ->
 
     nominal: with figures as given, whatever the spec asks for.
     """
+    refuse_share(case)
     missions = missions_of(case)
     scenarios = [
         Scenario(one.name, end, own, build()(own))
