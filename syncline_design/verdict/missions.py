@@ -217,7 +217,8 @@ def _worst_rows(rows: Sequence[Sequence[RequirementResult]]) -> tuple[Requiremen
 def _at_worst(row: RequirementResult, given: RequirementResult | None) -> RequirementResult:
     if given is None or given.value is None or given.value == row.value:
         return row
-    told = f"at the worst end of the datasheet intervals; {given.value:.6g} at given figures"
+    unit = "" if given.unit == "1" else f" {given.unit}"
+    told = f"at the worst end of the datasheet intervals; {given.value:.6g}{unit} at given figures"
     return replace(row, note="; ".join(part for part in (row.note, told) if part))
 
 
