@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 import random
 from pathlib import Path
@@ -10,7 +11,10 @@ from pathlib import Path
 import pytest
 
 from checked import check_file
+from syncline_design.machine.records import read_as
+from syncline_design.report.checks import render_checks
 from syncline_design.spec.load import BadInput, load_text
+from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings
 
 QUICK = CheckSettings(monte_carlo=False)
@@ -153,6 +157,10 @@ def test_the_worst_end_is_shown_beside_the_given_figures(tmp_path: Path) -> None
     assert rows["ACC"].value is not None
     assert rows["ACC"].value >= found.syncline.total_m
     assert "at given figures" in rows["ACC"].note
+    text = render_checks("json", [found])
+    assert json.loads(text)["robustness"]["choose_for"] == "always"
+    assert read_as(Verdict, text) == found
+    assert "What robustness costs" in render_checks("markdown", [found])
 
 
 @pytest.mark.parametrize("value", ["alwas", "1.5", "0", "[0.9]"])

@@ -10,13 +10,16 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import jsonschema
 import pytest
 import yaml
 
 from checked import check_file
 from command import run
 from plain_enumeration import Enumeration, Outcome, number
+from syncline_design.machine.records import read_as
 from syncline_design.report.checks import render_checks
+from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings
@@ -118,6 +121,12 @@ def test_each_mission_is_judged_at_its_own_limit_and_line(shipped: Verdict) -> N
         if row.id == "ACC-1" and row.value is not None
     }
     assert f"in mission {max(shares, key=lambda name: shares[name])}" in worst.note
+
+
+def test_the_verdict_is_as_its_schema_says(shipped: Verdict) -> None:
+    text = render_checks("json", [shipped])
+    jsonschema.validate(json.loads(text), result_schema("verdict"))
+    assert read_as(Verdict, text) == shipped
 
 
 def test_the_bill_adds_up_to_what_the_family_costs(shipped: Verdict) -> None:

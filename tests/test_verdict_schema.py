@@ -56,8 +56,9 @@ def test_the_shipped_specs_show_every_part_of_a_verdict() -> None:
     """So the tests above test them all; `fails` is among the words, `meets` and `infeasible`."""
     found = [verdict_of(spec) for spec in SPECS]
     assert {verdict.verdict for verdict in found} >= {"meets", "fails", "infeasible"}
-    # by a user's own logs and earlier verdicts: test_measured_entries.py and test_baseline.py
-    elsewhere = ("measured", "baseline")  # write and read them
+    # by a user's own logs, earlier verdicts, missions and intervals: test_measured_entries.py,
+    # test_baseline.py, test_missions.py and test_choose_for.py write and read them
+    elsewhere = ("measured", "baseline", "missions", "robustness")
     for part in fields(Verdict):
         assert part.name in elsewhere or any(
             getattr(verdict, part.name) is not None for verdict in found
