@@ -50,7 +50,7 @@ def iter_judged(
     smaller = promising(problem)
     if smaller.is_empty:
         return
-    for inner in iter_best(smaller.problem, deadline):
+    for inner in iter_best(smaller.problem, deadline, cuts=True):
         design = smaller.whole(inner)
         if design not in known:
             yield design, judgement(problem, design)

@@ -111,7 +111,7 @@ def _sensor(vehicle: str, role: RoleCase, option: Option) -> Sensor:
     return Sensor(
         id=option.sensor,
         role=role.role,
-        sigma=_sigma(entry, role.role),
+        sigma=sigma_of(entry, role.role),
         timing=timing_error(stamping.error),
         timeline=UTC if option.timeline == "utc" else host_timeline(vehicle),
         lever_arm_m=_vector(role.choice.lever_arm),
@@ -119,7 +119,7 @@ def _sensor(vehicle: str, role: RoleCase, option: Option) -> Sensor:
     )
 
 
-def _sigma(entry: SensorEntry, role: RoleName) -> Vector:
+def sigma_of(entry: SensorEntry, role: RoleName) -> Vector:
     """Standard deviations per axis; one figure holds for each of them."""
     if role == "ranging":
         azimuth, elevation = _axes(entry.sigma_bearing, 2)

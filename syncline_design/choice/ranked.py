@@ -36,28 +36,35 @@ from syncline_design.choice.table import Design, Problem, VehicleTable, is_empty
 from syncline_design.machine.deadline import in_force
 
 PATIENCE = 4000  # steps without a further design before splitting takes over
+CUT_PATIENCE = 100_000  # the same where what has failed limits the search
 MOST_ROWS = 2_000_000  # options in the blocks of a search: about 200 MB
 
 Key = tuple[Amount, float, Amount, Amount, Amount, tuple[int, ...]]
 
 
 def iter_best(
-    problem: Problem, deadline: Deadline | None = None, most_steps: int | None = None
+    problem: Problem,
+    deadline: Deadline | None = None,
+    most_steps: int | None = None,
+    *,
+    cuts: bool = False,
 ) -> Iterator[Design]:
     """Every design that meets all requirements, best first, each decided exactly.
 
-    Raises NoVerdict after the deadline, TooLarge after `most_steps` partial designs; without
-    `most_steps`, a search that grows without finding anything gives way to splitting.
+    cuts: without those that the judge has learned to fail by their sums.  Raises NoVerdict
+    after the deadline, TooLarge after `most_steps` partial designs; without `most_steps`, a search
+    that grows without finding anything gives way to splitting.
     """
     if is_empty(problem):
         return
     end = deadline or in_force()
     if most_steps is not None:
-        yield from _Search(problem).run(end, most_steps)
+        yield from _Search(problem, cuts=cuts).run(end, most_steps)
         return
     seen: set[Design] = set()
     try:
-        for design in _Search(problem).run(end, PATIENCE, patient=True):
+        patience = CUT_PATIENCE if cuts else PATIENCE
+        for design in _Search(problem, cuts=cuts).run(end, patience, patient=True):
             seen.add(design)
             yield design
     except TooLarge:
@@ -95,8 +102,20 @@ class _Block:
 Entry = tuple[Key, int, _Block | None, int, Design | None]
 
 
+@dataclass(frozen=True, slots=True)
+class _Limit:
+    """A sum with a limit: what each option adds, by role; of all roles after each one the sums
+    (rising) and least objective amounts."""
+
+    added: list[Floats]
+    most: float
+    suffixes: list[tuple[Floats, Column]]
+
+
 class _Search:
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, *, cuts: bool = False) -> None:
+        self.judge = problem.judge if cuts else None
+        self.limits: list[_Limit] = []
         self.problem = problem
         self.objective: ResourceName = "cost" if problem.objective == "error" else problem.objective
         self.main = RESOURCES.index(self.objective)
@@ -112,7 +131,7 @@ class _Search:
         self.least_sums = [[c.min() for c in columns] for columns in self.columns]
         self.least_error = [float(role.error.min()) for role in tables.roles]
         self.least_tau = [float(role.tau.min()) for role in tables.roles]
-        self.suffixes = self._suffix_fronts()
+        self.suffixes = self._suffix_fronts([role.error for role in tables.roles])
         self.counter = itertools.count()
         self.rows = 0  # options held in blocks so far
         self.clock_order = [_by_id(vehicle) for vehicle in problem.vehicles]
@@ -174,15 +193,15 @@ class _Search:
             for s in self.scales
         )
 
-    def _suffix_fronts(self) -> list[tuple[Floats, Column]]:
-        """For each role: errors (rising) and least objective amounts of all roles after it."""
+    def _suffix_fronts(self, added: list[Floats]) -> list[tuple[Floats, Column]]:
+        """For each role: sums (rising) and least objective amounts of all roles after it."""
         amount: Column = np.zeros(1, dtype=np.int64)
         error: Floats = np.zeros(1)
         fronts = [(error, amount)]
         for r in range(len(self.tables.roles) - 1, 0, -1):
             own = self.columns[r][self.main]
-            rows = undominated(Columns((self.tables.roles[r].error, own)))
-            errors = np.add.outer(self.tables.roles[r].error[rows], error).ravel()
+            rows = undominated(Columns((added[r], own)))
+            errors = np.add.outer(added[r][rows], error).ravel()
             amounts = np.add.outer(own[rows], amount).ravel()
             kept = undominated(Columns((errors, amounts)))
             kept = kept[np.argsort(errors[kept], kind="stable")]
@@ -208,18 +227,26 @@ class _Search:
         accuracy = self.problem.limits.accuracy_m
         if accuracy is not None:
             slack = accuracy * (1.0 + MARGIN) - (error + fixed + caused)
-            reach, amount = self._least_within(r, slack)
+            reach, amount = _least_within(self.suffixes[r], slack)
             keep &= reach
             least[self.main] = sums[self.main] + amount
+        for limit in self._learned():
+            spent = sum(float(own[at]) for own, at in zip(limit.added, node.places, strict=False))
+            reach, amount = _least_within(limit.suffixes[r], limit.most - spent - limit.added[r])
+            keep &= reach
+            least[self.main] = np.maximum(least[self.main], sums[self.main] + amount)
         order = self._sorted(total, least, np.flatnonzero(keep))
         self.rows += len(role)
         return _Block(node, order, error, total, sums, tuple(least))
 
-    def _least_within(self, r: int, slack: Floats) -> tuple[Bools, Column]:
-        """Whether the later roles fit into an error, and the least objective amount at which."""
-        errors, amounts = self.suffixes[r]
-        place = np.searchsorted(errors, slack + np.abs(slack) * MARGIN, side="right") - 1
-        return place >= 0, amounts[np.maximum(place, 0)]
+    def _learned(self) -> list[_Limit]:
+        """The judge's cuts, those that came since the last look made into limits."""
+        if self.judge is not None:
+            for cut in self.judge.cuts(self.problem, len(self.limits)):
+                pairs = zip(cut.weights, self.tables.order, strict=True)
+                added = [own[order] for own, order in pairs]
+                self.limits.append(_Limit(added, cut.most, self._suffix_fronts(added)))
+        return self.limits
 
     def _sorted(self, total: Floats, least: Sequence[Column], rows: Indices) -> Indices:
         error = _twelve_figures(total[rows])
@@ -309,6 +336,13 @@ class _Search:
         ranked = rank(self.problem, design, found)
         key: Key = (*ranked[:5], (*node.places, *node.clocks))
         heapq.heappush(heap, (key, next(self.counter), None, 0, design))
+
+
+def _least_within(suffix: tuple[Floats, Column], slack: Floats) -> tuple[Bools, Column]:
+    """Whether the later roles fit into what is left, and the least objective amount at which."""
+    sums, amounts = suffix
+    place = np.searchsorted(sums, slack + np.abs(slack) * MARGIN, side="right") - 1
+    return place >= 0, amounts[np.maximum(place, 0)]
 
 
 def _plain(whole: Any) -> int | float:

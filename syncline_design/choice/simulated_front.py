@@ -71,7 +71,7 @@ def _next(
     """The cheapest accepted design of a smaller error, after those that are left open."""
     limits = replace(problem.limits, accuracy_m=None if math.isinf(least_m) else least_m)
     smaller = promising(replace(problem, limits=limits, objective=resource))
-    for inner in iter_best(smaller.problem):
+    for inner in iter_best(smaller.problem, cuts=True):
         design = smaller.whole(inner)
         sums = evaluate(problem, design)
         amount = sums.amount(resource)

@@ -8,7 +8,7 @@ these tables from a loaded spec.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Literal, Protocol
@@ -18,6 +18,7 @@ import numpy as np
 from syncline_design.choice.exclusions import Exclusions
 from syncline_design.choice.options import (
     Bools,
+    Floats,
     Options,
     Requires,
     ResourceName,
@@ -200,6 +201,18 @@ class Judgement:
         return not self.failed and not self.undecided
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Cut:
+    """A sum over the roles that no design keeping a requirement exceeds.
+
+    weights: of each role what each of its options adds; most: the sum's limit.
+    """
+
+    requirement: str
+    weights: tuple[Floats, ...]
+    most: float
+
+
 class Judge(Protocol):
     """Requirements that sums do not decide: those on simulated quantiles.
 
@@ -216,6 +229,10 @@ class Judge(Protocol):
 
     def hopeless(self, problem: Problem, role: int, place: int) -> bool:
         """Whether an option's sensor alone, by its noise, fails a limit whatever joins it."""
+        ...
+
+    def cuts(self, problem: Problem, known: int = 0) -> Sequence[Cut]:
+        """Sums that rule designs out, as learned so far, those after the first `known`."""
         ...
 
     def judge(self, problem: Problem, design: Design) -> Judgement:

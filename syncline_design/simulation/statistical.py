@@ -135,6 +135,11 @@ def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0
     return rays(moments, wanted, situations.dimensions).within(least) < wanted.p
 
 
+def worst_point(system: System, wanted: Wanted, seed: int = 0) -> Array:
+    """A situation (p,) in which a figure is about as large as anywhere."""
+    return _worst_points(Situations(system), (wanted,), seed)[:, 0]
+
+
 def _worst_points(situations: Situations, wanted: Sequence[Wanted], seed: int) -> Array:
     """For each figure the point that the best ascent of its approximation ends in, (p, figures).
 

@@ -6,6 +6,8 @@ a what-if (another distance, another limit) meets the same random numbers as the
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import date
 from fractions import Fraction
@@ -15,7 +17,7 @@ from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.options import Option
 from syncline_design.choice.outcome import Unfinished
-from syncline_design.choice.table import Design, Judge, Judgement, Problem, RoleTable
+from syncline_design.choice.table import Cut, Design, Judge, Judgement, Problem, RoleTable
 from syncline_design.effects import registry
 from syncline_design.machine.input_files import FileContent
 from syncline_design.model.roles import ROLES, RoleName
@@ -31,9 +33,11 @@ from syncline_design.model.timing import (
 )
 from syncline_design.simulation import Decision, SimulationError, SimulationSettings, decide
 from syncline_design.simulation.run import DEFAULT_CAP
+from syncline_design.simulation.statistical import Wanted
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS, Requirement
+from syncline_design.verdict.cuts import MOST_LEARNED, Learned, learned
 from syncline_design.verdict.stated import keeps, value_m, wanted_of
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
@@ -86,6 +90,7 @@ class Simulations:
     systems: set[System] = field(default_factory=set)
     refusals: int = 0  # of systems beyond the most
     asked: Case | None = None  # the spec itself; every other one is a what-if
+    learned: list[Learned] = field(default_factory=list)
 
     def decide(
         self, case: Case, system: System, quantile: float, limit_m: float, *, what_if: bool
@@ -176,14 +181,30 @@ class _SpecJudge:
         kinds = [registry()[one.effect].kind for one in self.case.effects]
         return "stochastic" in kinds
 
+    def cuts(self, problem: Problem, known: int = 0) -> Sequence[Cut]:
+        """Sums of noise that rule designs out, from those that have failed."""
+        limits = dict(self.limits)
+        own = [one for one in self.simulations.learned if one.case is self.case]
+        return [one.cut(problem, limits.get(one.requirement, math.inf)) for one in own[known:]]
+
     def judge(self, problem: Problem, design: Design) -> Judgement:
         """Every limit in turn; the first that fails settles it."""
+        limits = dict(self.limits)
+        for one in self.simulations.learned:
+            limit = limits.get(one.requirement)
+            if (
+                one.case is self.case
+                and limit is not None
+                and one.rules_out(problem, design, limit)
+            ):
+                return Judgement(failed=(one.requirement,))
         left_open: list[str] = []
         system, grown = self._system(problem, design)
         what_if = grown or self.case is not self.simulations.asked
         for name, limit in self.limits:
             status = self._status(system, name, limit, what_if=what_if)
             if status == "fail":
+                self._learn(system, name)
                 return Judgement(failed=(name,))
             left_open += [name] if status == "indeterminate" else []
         return Judgement(undecided=tuple(left_open))
@@ -219,6 +240,21 @@ class _SpecJudge:
             if self.case.spec.monte_carlo.trajectory is not None:
                 refuse_trajectory(self.case, str(error))
             return "indeterminate"
+
+    def _learn(self, system: System, name: str) -> None:
+        """Remember where a system failed a figure, for all that come after it.
+
+        With known effects errors have a mean of their own, and sums of noise alone say little.
+        """
+        known, requirement = self.simulations.learned, self._requirement(name)
+        if requirement.kind not in STATED_KINDS or self.case.effects:
+            return
+        wanted = wanted_of(requirement)
+        alike = (one for one in known if one.case is self.case and one.requirement == name)
+        if isinstance(wanted, Wanted) and sum(1 for _ in alike) < MOST_LEARNED:
+            bare = _nameless(system)
+            seed = self.simulations.seed
+            known.append(learned(self.case, self.asked, bare, name, wanted, seed))
 
     def _requirement(self, name: str) -> Requirement:
         return next(one for one in self.requirements if one.id == name)

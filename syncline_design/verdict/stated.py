@@ -9,6 +9,7 @@ from functools import lru_cache
 from syncline_design.model.system import UTC, Sensor, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.figures import worst_case_m
+from syncline_design.simulation.noise_shares import surely_keeps
 from syncline_design.simulation.statistical import Wanted, figure, surely_exceeds
 from syncline_design.spec.requirement import DistanceLimit, Requirement
 
@@ -112,6 +113,8 @@ def keeps(system: System, wanted: Wanted | Certified, limit_m: float, seed: int)
     Designs that differ in timestamps alone share the verdict on their noise: independent errors
     never make a symmetric, unimodal one less dispersed (T. W. Anderson, Proc. AMS 6, 1955).
     """
+    if isinstance(wanted, Wanted) and surely_keeps(system, wanted, limit_m):
+        return True
     if not system.effects and _noise_fails(_well_timed(system), wanted, limit_m, seed):
         return False
     if isinstance(wanted, Wanted) and surely_exceeds(system, wanted, limit_m, seed):

@@ -1,0 +1,147 @@
+"""Choice under figures of the error against plain enumeration, and the bounds that it rests on."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from figure_problems import Raw, drawn, rmse_3d_m, written
+from syncline_design.choice.chosen_system import system_of
+from syncline_design.choice.decide import choose
+from syncline_design.choice.enumerate import all_designs
+from syncline_design.choice.outcome import Choice
+from syncline_design.choice.table import Problem
+from syncline_design.model.system import System
+from syncline_design.model.timing import TimingError, Uniform
+from syncline_design.simulation.noise_shares import (
+    least_quantile,
+    most_noise,
+    noise_at,
+    surely_keeps,
+)
+from syncline_design.simulation.situations import Situations
+from syncline_design.simulation.statistical import Wanted, statistical_figures
+from syncline_design.spec.case import Case
+from syncline_design.spec.load import load_text
+from syncline_design.verdict.acceptance import Simulations
+from syncline_design.verdict.stated import Certified, value_m, wanted_of
+from test_statistical_figures import chain
+
+
+def loaded(raw: Raw, folder: Path) -> tuple[Case, Problem]:
+    case = load_text(written(raw, folder), folder / "spec.yaml")
+    return case, Simulations().problem_of(case)
+
+
+def cost_of(problem: Problem, design: object) -> float | None:
+    if not isinstance(design, Choice):
+        return None
+    options = zip(problem.roles, design.design.options, strict=True)
+    return float(sum(table.options[i].resources.cost or 0 for table, i in options))
+
+
+def cheapest_by_hand(raw: Raw) -> float | None:
+    """The cheapest of all designs by the closed form of the root mean square."""
+    by_role: dict[str, list[str]] = {"position": [], "attitude": [], "ranging": []}
+    for name, one in raw["sensors"].items():
+        by_role[one["role"]].append(name)
+    stamp = min(cost for _, cost in raw["methods"].values())
+    limit = min(limit for _, limit in raw["requirements"])
+    return min(
+        (
+            float(sum(raw["sensors"][name]["cost"] + stamp for name in names))
+            for names in itertools.product(*by_role.values())
+            if rmse_3d_m(raw, names) <= limit
+        ),
+        default=None,
+    )
+
+
+def test_the_root_mean_square_decides_as_by_hand(tmp_path: Path) -> None:
+    found, impossible = 0, 0
+    for seed in range(30):
+        raw = drawn(seed, ("rmse",))
+        wanted = cheapest_by_hand(raw)
+        _, problem = loaded(raw, tmp_path)
+        assert cost_of(problem, choose(problem)) == wanted, seed
+        found, impossible = found + (wanted is not None), impossible + (wanted is None)
+    assert found > 10
+    assert impossible > 0
+
+
+@pytest.mark.parametrize("kinds", [("thu", "tvu"), ("quantile", "worst_case")])
+def test_other_figures_decide_as_when_all_designs_are_judged(
+    kinds: tuple[str, ...], tmp_path: Path
+) -> None:
+    """Every design's figures, one by one by their own search, no bound between."""
+    for seed in (102,):
+        raw = drawn(seed, kinds)
+        case, problem = loaded(raw, tmp_path)
+        asked = [(wanted_of(one), float(one.limit)) for one in case.spec.requirements[:-1]]
+        best = None
+        ordered = sorted(all_designs(problem), key=lambda pair: pair[1].cost or 0)
+        for design, sums in ordered:
+            system = system_of(case, problem, design)
+            if all(value_m(system, wanted, limit, 0) <= limit for wanted, limit in asked):
+                best = float(sums.cost or 0)
+                break
+        assert cost_of(problem, choose(problem)) == best, seed
+        assert any(isinstance(one, Certified) for one, _ in asked) == ("worst_case" in kinds)
+
+
+def exact_stamps(seed: int) -> System:
+    """A random chain with short shifts."""
+    system = chain(seed)
+    short = TimingError(Uniform(-1e-4, 1e-4))
+    stages = tuple(
+        replace(stage, **{
+            role: replace(sensor, timing=short)
+            for role in ("position", "attitude", "ranging")
+            if (sensor := getattr(stage, role)) is not None
+        })
+        for stage in system.stages
+    )  # fmt: skip
+    return replace(system, stages=stages, clock_offsets=())
+
+
+@pytest.mark.parametrize(
+    "wanted",
+    [Wanted("3d"), Wanted("horizontal", 0.95), Wanted("vertical", 0.9), Wanted("3d", 0.5)],
+)
+def test_noise_of_a_situation_is_never_more_than_a_figure(wanted: Wanted) -> None:
+    """The sum over sensors at any situation, put as a figure, against the figure's own search;
+    a quick yes against the same."""
+    for seed in (0, 1, 2):
+        system = exact_stamps(seed)
+        value = statistical_figures(system, (wanted,))[0].value_m
+        points = Situations(system).starting_points(seed, 12)
+        for point in points.T:
+            noise = noise_at(system, wanted, point)
+            total = sum(
+                float(
+                    np.array(sensor.sigma) ** 2 @ noise.least((k, sensor.role), {0: 2e-4, 1: 2e-4})
+                )
+                for k, stage in enumerate(system.stages)
+                for sensor in stage.sensors()
+            )
+            assert total <= most_noise(wanted, 1.005 * value)
+        assert not surely_keeps(system, wanted, 0.999 * value)
+        assert surely_keeps(system, wanted, 4.0 * value)
+
+
+def test_quantiles_of_unit_trace_by_sampling() -> None:
+    """No split of the trace over the axes has a smaller quantile, by 400 000 normal numbers."""
+    z = np.random.default_rng(1).standard_normal((3, 400_000)) ** 2
+    for axis, size in (("vertical", 1), ("horizontal", 2), ("3d", 3)):
+        splits = np.random.default_rng(2).dirichlet(np.ones(size), 12)
+        found = min(float(np.quantile(split @ z[:size], 0.95)) for split in splits)
+        least = least_quantile(axis, 0.95)  # type: ignore[arg-type]
+        isotropic = float(np.quantile(np.full(size, 1.0 / size) @ z[:size], 0.95))
+        assert least <= min(found, isotropic) * 1.001
+        assert least >= 0.97 * min(found, isotropic)
+    assert math.isclose(least_quantile("vertical", 0.95), 0.99 * 1.959964**2, rel_tol=1e-3)
