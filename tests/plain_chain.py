@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 Array = NDArray[np.float64]
 AGES, SHARES = np.polynomial.laguerre.laggauss(8)
 GRAVITY = 9.80665
+SOUND_MPS = 1500.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,7 @@ SIZES = {
     "v": 3, "w": 3, "n": 3, "arm": 3, "position": 3, "attitude": 3, "bearing": 2, "range": 1,
     "shift_p": 1, "shift_a": 1, "lean": 2, "yaw": 1, "scatter": 3, "wander": 3, "packet_p": 1,
     "packet_a": 1, "jitter_p": 1, "jitter_a": 1,
+    "packet_r": 1, "jitter_r": 1,
 }  # fmt: skip
 SPHERES = ("n", "arm")
 SHARED = 3  # time, place
@@ -101,25 +103,24 @@ def _stage(
     pose = Rotation.from_rotvec(lean) * Rotation.from_rotvec(yaw[:, None] * [0.0, 0.0, 1.0])
     antenna = s.b * c["arm"] if s.arm is None else np.tile(s.arm, (len(yaw), 1))
     azimuth, _ = _angles(c["n"])
-    late_r = s.of("latency", "ranging", "latency_s")
+    way = s.of("echo_delay", "ranging", "share") * s.d / SOUND_MPS
     scan = s.of("scan_distortion", "ranging", "period_s") * azimuth / (2.0 * math.pi)
-    reference = scan - late_r
+    reference = scan - way + _late(s, "ranging", time, c)
     shift_p = tau * c["shift_p"][:, 0] + _late(s, "position", time, c) + stamped - reference
     shift_a = tau * c["shift_a"][:, 0] + _late(s, "attitude", time, c) - reference
     reading = _antenna(pose, v, w, shift_p, antenna + s.vector("lever_arm", "position", "_m"))
-    reading += _position_errors(s, pose, v, w, antenna, c) + carried
+    reading += _position_errors(s, pose, v, w, antenna, c, time) + carried
     measured = pose * Rotation.from_rotvec(w * shift_a[:, None])
     body = s.vector("mounting", "attitude", "_rad") + _lean_of_acceleration(s, pose, v, w)
     measured = measured * Rotation.from_rotvec(body)
     euler = measured.as_euler("ZYX")[:, ::-1]
-    factor = s.effects.get(("noise_understated", "attitude"), {}).get("factor", 1.0)
-    euler = euler + s.attitude * factor * c["attitude"]
+    euler = euler + s.attitude * _noise(s, "attitude", time) * c["attitude"]
     euler[:, 2] += _heading(s, time, _true_yaw(pose))
     measured = Rotation.from_euler("ZYX", euler[:, ::-1])
     force = np.cross(w, v) - pose.inv().apply([0.0, 0.0, GRAVITY])
     flexed = force * [s.of("flexure", "ranging", axis) for axis in "xyz"]
     mount = np.array(s.ranging_arm) + s.vector("lever_arm", "ranging", "_m") + flexed
-    seen = _seen(s, c)
+    seen = _seen(s, c, time)
     estimate = reading + measured.apply(np.array(s.ranging_arm) - antenna + seen)
     truth = pose.apply(mount + s.d * c["n"])
     return estimate - truth - _survey(s, place), reference
@@ -149,10 +150,17 @@ def _late(s: PlainStage, sensor: str, time: Array, c: dict[str, Array]) -> Array
 
 
 def _position_errors(
-    s: PlainStage, pose: Rotation, v: Array, w: Array, antenna: Array, c: dict[str, Array]
+    s: PlainStage,
+    pose: Rotation,
+    v: Array,
+    w: Array,
+    antenna: Array,
+    c: dict[str, Array],
+    time: Array,
 ) -> Array:
-    factor = s.effects.get(("noise_understated", "position"), {}).get("factor", 1.0)
-    error = s.position * factor * c["position"]
+    error = s.position * _noise(s, "position", time) * c["position"]
+    error[:, 2] += s.of("tide", "position", "rate_mps") * time
+    error[:, 2] -= s.of("squat", "position", "gain") * np.sum(v * v, axis=1)
     wander = math.sqrt(3.0) * s.of("correlated_noise", "position", "std_m")
     error = error + wander * c["scatter"]
     error[:, 2] += s.of("height_drift", "position", "std_m") * c["wander"][:, 2]
@@ -178,12 +186,14 @@ def _true_yaw(pose: Rotation) -> Array:
 
 
 def _heading(s: PlainStage, time: Array, yaw: Array) -> Array:
-    iron = ("heading_hard_iron", "attitude")
+    iron, soft = ("heading_hard_iron", "attitude"), ("heading_soft_iron", "attitude")
     return (
         s.of("heading_bias", "attitude", "bias_rad")
         + s.of("heading_drift", "attitude", "rate_radps") * time
         + s.of(*iron, "sin_rad") * np.sin(yaw)
         + s.of(*iron, "cos_rad") * np.cos(yaw)
+        + s.of(*soft, "sin_rad") * np.sin(2.0 * yaw)
+        + s.of(*soft, "cos_rad") * np.cos(2.0 * yaw)
     )
 
 
@@ -191,11 +201,22 @@ def _angles(n: Array) -> tuple[Array, Array]:
     return np.arctan2(n[:, 1], n[:, 0]), np.arcsin(np.clip(-n[:, 2], -1.0, 1.0))
 
 
-def _seen(s: PlainStage, c: dict[str, Array]) -> Array:
+def _noise(s: PlainStage, sensor: str, time: Array) -> Array:
+    """Standard deviations over the stated ones (n, 1)."""
+    factor = s.effects.get(("noise_understated", sensor), {}).get("factor", 1.0)
+    for_a_while = s.effects.get(("noise_episode", sensor))
+    grown = np.full(time.shape, factor)
+    if for_a_while:
+        inside = (time >= for_a_while["from_s"]) & (time <= for_a_while["to_s"])
+        grown = np.where(inside, for_a_while["factor"] * factor, factor)
+    return grown[:, None]
+
+
+def _seen(s: PlainStage, c: dict[str, Array], time: Array) -> Array:
     """Measured vector to the object in the axes that the spec believes."""
     turned = Rotation.from_rotvec(-s.vector("boresight", "ranging", "_rad")).apply(c["n"])
     azimuth, elevation = _angles(turned)
-    factor = s.effects.get(("noise_understated", "ranging"), {}).get("factor", 1.0)
+    factor = _noise(s, "ranging", time)[:, 0]
     sound = s.of("sound_speed", "ranging", "relative_error")
     if sound:
         level = np.minimum(np.cos(_angles(c["n"])[1]) * (1.0 + sound), 1.0)

@@ -34,6 +34,11 @@ CASES: tuple[tuple[str, str, dict[str, float]], ...] = (
     ("clock_drift", "attitude", {"rate": 2e-3}),
     ("timestamp_step", "position", {"step_s": 0.07, "time_s": 17.0}),
     ("timestamp_step", "attitude", {"step_s": 0.07, "time_s": 17.0}),
+    ("clock_drift", "ranging", {"rate": 2e-3}),
+    ("timestamp_step", "ranging", {"step_s": 0.07, "time_s": 17.0}),
+    ("heading_soft_iron", "attitude", {"sin_rad": 0.02, "cos_rad": -0.01}),
+    ("squat", "position", {"gain": 0.01}),
+    ("tide", "position", {"rate_mps": 1e-3}),
     ("filter_lag", "position", {"time_constant_s": 0.1}),
     ("lever_arm", "position", {"x_m": 0.4, "y_m": -0.3, "z_m": 0.2}),
     ("lever_arm", "ranging", {"x_m": 0.4, "y_m": -0.3, "z_m": 0.2}),
@@ -54,7 +59,7 @@ CASES: tuple[tuple[str, str, dict[str, float]], ...] = (
     ("scan_distortion", "ranging", {"period_s": 0.1}),
     ("induced_heave", "position", {"x_m": 3.0, "y_m": -2.0, "z_m": 1.0}),
 )
-OF_VESSELS = {"induced_heave"}
+OF_VESSELS = {"induced_heave", "squat", "tide"}
 
 
 @cache

@@ -361,3 +361,21 @@ def test_jitter_is_covered_as_every_normal_error(k: str, tmp_path: Path) -> None
     path.write_text(SPEC.format(k=k))
     found = check_file(path, CheckSettings(monte_carlo=False)).to_json()["syncline"]["total_m"]
     assert found == pytest.approx(math.sqrt(3) * 0.01 + 20.0 * float(k) * (1e-3 + 2e-3), rel=1e-12)
+
+
+# ------------------------------------------------------------------ echoes
+
+
+def test_an_echo_stamped_at_its_return_is_of_the_moment_before() -> None:
+    """A boat at 5 m/s over a target 300 m below: an echo back 0.2 s later was there 1 m before.
+
+    The vector of then is added to the place of now, so the target comes out ahead.
+    """
+    rows = state(
+        velocity_mps=np.array([[5.0, 0.0, 0.0]]),
+        range_m=np.array([300.0]),
+        elevation_rad=np.array([-0.5 * math.pi]),
+        target_m=np.array([[0.0, 0.0, 300.0]]),
+    )
+    found = error_of(rows, "echo_delay", "ranging", {"share": 1.0})
+    np.testing.assert_allclose(found, [5.0 * 300.0 / 1500.0, 0.0, 0.0], atol=1e-9)

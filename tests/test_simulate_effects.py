@@ -109,6 +109,15 @@ def sin_density(s: float) -> float:
 
 
 SMALL = 0.004  # rad
+A_WHILE = {"from_s": 0.3 * T, "to_s": 0.5 * T}
+
+
+def for_a_while(law: Callable[[float], Oracle], sigma: float) -> Oracle:
+    """Three times as large in a fifth of the mission."""
+    usual, grown = law(sigma), law(3.0 * sigma)
+    return lambda x: 0.8 * usual(x) + 0.2 * grown(x)
+
+
 STRAIGHT, TURN = {"v": V, "w": 0.0}, {"v": 0.0, "w": W}
 NOISY = {"position": (0.02,) * 3, "attitude": (1e-4,) * 3, "ranging": (0.03, 0.0, 0.0)}
 ROTATION = {"x_rad": SMALL * 2 / 7, "y_rad": SMALL * 3 / 7, "z_rad": -SMALL * 6 / 7}
@@ -127,6 +136,28 @@ CASES: dict[tuple[str, str], Case] = {
     ),
     ("timestamp_step", "attitude"): (
         {"step_s": 0.02, "time_s": 0.3 * T}, TURN, lambda x: 0.3 + 0.7 * swept(W * 0.02)(x)
+    ),
+    ("clock_drift", "ranging"): ({"rate": 1e-4}, STRAIGHT, uniform(V * 1e-4 * T)),
+    ("timestamp_step", "ranging"): (
+        {"step_s": 0.2, "time_s": 0.3 * T}, STRAIGHT, lambda x: 0.3 if x < 0.2 * V - 1e-9 else 1.0
+    ),
+    ("timestamp_jitter", "ranging"): ({"std_s": 0.01}, STRAIGHT, half_normal(0.01 * V)),
+    ("echo_delay", "ranging"): ({"share": 1.5}, STRAIGHT, constant(V * 1.5 * D / 1500.0)),
+    ("squat", "position"): ({"gain": 0.01}, STRAIGHT, constant(0.01 * V**2)),
+    ("tide", "position"): ({"rate_mps": 5e-4}, STRAIGHT, uniform(5e-4 * T)),
+    ("noise_episode", "position"): ({"factor": 3.0, **A_WHILE}, NOISY, for_a_while(maxwell, 0.02)),
+    ("noise_episode", "attitude"): (
+        {"factor": 3.0, **A_WHILE},
+        NOISY,
+        for_a_while(lambda s: lambda x: float(stats.chi(2).cdf(x / s)), 1e-4 * D),
+    ),
+    ("noise_episode", "ranging"): (
+        {"factor": 3.0, **A_WHILE}, NOISY, for_a_while(half_normal, 0.03)
+    ),
+    ("heading_soft_iron", "attitude"): (
+        {"sin_rad": 3e-4, "cos_rad": 4e-4},
+        STRAIGHT,
+        times(lambda x: half_cosine(x / (D * 5e-4)), sin_density, 1.0),
     ),
     ("integer_second_slip", "position"): ({"seconds": -2.0}, STRAIGHT, constant(2.0 * V)),
     ("timestamp_jitter", "position"): ({"std_s": 0.01}, STRAIGHT, half_normal(0.01 * V)),

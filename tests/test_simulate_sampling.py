@@ -421,7 +421,7 @@ def test_every_effect_of_the_dictionary_acts_and_is_bounded(name: str) -> None:
             if parameter.choices:
                 size = {"position": "enu", "attitude": "yaw_180"}.get(role, "azimuth_sign")
             elif parameter.located:
-                size = 0.5  # a moment within the manoeuvre
+                size = 1e6 if parameter.name == "to_s" else 0.5  # a moment within the manoeuvre
             elif parameter.whole:
                 size = float(round(size))
             parameters.append((parameter.name, size))

@@ -24,7 +24,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
 
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
-    """d error / d rate = -V (t - t0) or -W (t - t0) [m]; (n, 3, 1)."""
+    """d error / d rate = -V, -W or V + W times (t - t0) [m]; (n, 3, 1)."""
     return (-shift_slope(rows, sensor) * elapsed(rows)[:, None])[:, :, None]
 
 
@@ -35,7 +35,7 @@ def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> C
 
 EFFECT = Effect(
     name="clock_drift",
-    sensors=("position", "attitude"),
+    sensors=("position", "attitude", "ranging"),
     kind="deterministic",
     parameters=(Parameter("rate", 1e-7, 1e-2),),
     sentence="the clock that stamps the {sensor} data runs fast by {rate}",

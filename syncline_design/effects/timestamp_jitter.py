@@ -37,7 +37,7 @@ def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> C
 
 EFFECT = Effect(
     name="timestamp_jitter",
-    sensors=("position", "attitude"),
+    sensors=("position", "attitude", "ranging"),
     kind="stochastic",
     parameters=(Parameter("std_s", 1e-5, 0.5, "s", signed=False),),
     sentence="the {sensor} stamps scatter by {std_s} (standard deviation)",

@@ -32,7 +32,7 @@ def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departur
 
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
-    """d error / d step = -V or -W from time_s on [m/s]; (n, 3, 1)."""
+    """d error / d step = -V, -W or V + W from time_s on [m/s]; (n, 3, 1)."""
     return (-shift_slope(rows, sensor) * _after(rows, values)[:, None])[:, :, None]
 
 
@@ -43,7 +43,7 @@ def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> C
 
 EFFECT = Effect(
     name="timestamp_step",
-    sensors=("position", "attitude"),
+    sensors=("position", "attitude", "ranging"),
     kind="deterministic",
     parameters=(
         Parameter("step_s", 1e-4, 2.0, "s"),

@@ -151,6 +151,22 @@ def _hard_iron(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> N
     faults.yaw_added.append(lambda t, yaw: sine * np.sin(yaw) + cosine * np.cos(yaw))
 
 
+def _soft_iron(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:
+    sine, cosine = effect.number("sin_rad"), effect.number("cos_rad")
+    faults.yaw_added.append(lambda t, yaw: sine * np.sin(2.0 * yaw) + cosine * np.cos(2.0 * yaw))
+
+
+def _squat(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:
+    """The hull sinks, the height that is used does not: it is too high."""
+    gain = effect.number("gain")
+    faults.height_lost.append(lambda t, speed: -gain * speed**2)
+
+
+def _tide(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:
+    rate, start = effect.number("rate_mps"), stamps_s[0]
+    faults.height_lost.append(lambda t, speed: rate * (t - start))
+
+
 def _heading_drift(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:
     rate, start = effect.number("rate_radps"), stamps_s[0]
     faults.yaw_added.append(lambda t, yaw: rate * (t - start))
@@ -230,11 +246,14 @@ CONSTRUCTIONS: dict[tuple[str, str], Construction] = {
     ("latency", "ranging"): _latency,
     ("clock_drift", "position"): _clock_drift,
     ("clock_drift", "attitude"): _clock_drift,
+    ("clock_drift", "ranging"): _clock_drift,
     ("timestamp_step", "position"): _timestamp_step,
     ("timestamp_step", "attitude"): _timestamp_step,
+    ("timestamp_step", "ranging"): _timestamp_step,
     ("integer_second_slip", "position"): _integer_second_slip,
     ("timestamp_jitter", "position"): _timestamp_jitter,
     ("timestamp_jitter", "attitude"): _timestamp_jitter,
+    ("timestamp_jitter", "ranging"): _timestamp_jitter,
     ("packetised_timestamps", "position"): _packetised,
     ("packetised_timestamps", "attitude"): _packetised,
     ("filter_lag", "position"): _filter_lag,
@@ -248,6 +267,7 @@ CONSTRUCTIONS: dict[tuple[str, str], Construction] = {
     ("elevation_bias", "ranging"): _elevation_bias,
     ("heading_bias", "attitude"): _heading_bias,
     ("heading_hard_iron", "attitude"): _hard_iron,
+    ("heading_soft_iron", "attitude"): _soft_iron,
     ("heading_drift", "attitude"): _heading_drift,
     ("acceleration_tilt", "attitude"): _acceleration_tilt,
     ("flexure", "ranging"): _flexure,
@@ -267,6 +287,8 @@ CONSTRUCTIONS: dict[tuple[str, str], Construction] = {
     ("sound_speed", "ranging"): _sound_speed,
     ("turnaround_delay", "ranging"): _turnaround,
     ("induced_heave", "position"): _heave_arm,
+    ("squat", "position"): _squat,
+    ("tide", "position"): _tide,
 }
 
 

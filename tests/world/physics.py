@@ -40,6 +40,7 @@ class Faults:
     ranging_turned: Rotation = field(default_factory=Rotation.identity)
     attitude_turned: Rotation = field(default_factory=Rotation.identity)
     heave_sensor_moved_m: Array = field(default_factory=_zero)
+    height_lost: list[PerRow] = field(default_factory=list)  # of the output; channel: speed
     lag_s: float = 0.0  # first-order low pass of the position output
     pendulum_gain: float = 0.0  # share of the apparent vertical in the attitude's vertical
     scan_period_s: float = 0.0

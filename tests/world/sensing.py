@@ -61,6 +61,9 @@ def read_position(carrier: Carrier, faults: Faults, stamps_s: Array) -> Array:
         # heave is read where the sensor sits, relative to its own level at rest
         turned = carrier.path.rotation(when).apply(faults.heave_sensor_moved_m)
         place[:, 2] += turned[:, 2] - faults.heave_sensor_moved_m[2]
+    speed = np.linalg.norm(carrier.path.velocity(when), axis=1)
+    for lost in faults.height_lost:
+        place[:, 2] += lost(stamps_s, speed)
     return np.asarray(place)
 
 

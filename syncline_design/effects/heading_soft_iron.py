@@ -1,0 +1,63 @@
+"""Iron that the field magnetises bends headings twice a turn."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from syncline_design.effects.kinematics import down_axis_sweep
+from syncline_design.effects.record import (
+    Array,
+    Basis,
+    Contribution,
+    Departures,
+    Effect,
+    Parameter,
+    Rng,
+    StageRows,
+    Target,
+    Values,
+)
+from syncline_design.model.system import Stage
+
+
+def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+    """measured yaw = true + D sin(2 yaw) + E cos(2 yaw) [rad]."""
+    yaw = rows.euler_rad[:, 2]
+    added = np.zeros((len(rows), 3))
+    added[:, 2] = values["sin_rad"] * np.sin(2.0 * yaw) + values["cos_rad"] * np.cos(2.0 * yaw)
+    return Departures(attitude_euler_rad=added)
+
+
+def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
+    """d error / d (D, E) = (z x R q) (sin 2 yaw, cos 2 yaw) [m/rad]; (n, 3, 2)."""
+    yaw = rows.euler_rad[:, 2]
+    wave = np.stack([np.sin(2.0 * yaw), np.cos(2.0 * yaw)], axis=-1)
+    slope: Array = down_axis_sweep(rows)[:, :, None] * wave[:, None, :]
+    return slope
+
+
+def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """sqrt(D^2 + E^2): the worst heading."""
+    return Contribution(turn_rad=math.hypot(values["sin_rad"], values["cos_rad"]))
+
+
+EFFECT = Effect(
+    name="heading_soft_iron",
+    sensors=("attitude",),
+    kind="deterministic",
+    parameters=(
+        Parameter("sin_rad", 1e-5, 0.3, "rad"),
+        Parameter("cos_rad", 1e-5, 0.3, "rad"),
+    ),
+    sentence="headings err with twice the heading: {sin_rad} times its sine, {cos_rad} times its "
+    "cosine",
+    confused_with="attitude latency on reciprocal lines; heading_bias on few headings",
+    separated_by="full circles both ways",
+    source="magnetic compass deviation, coefficients D and E (two turns per circle)",
+    depart=_depart,
+    sensitivity=_sensitivity,
+    contribute=_contribute,
+    by_heading=True,
+)
