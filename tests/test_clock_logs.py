@@ -247,6 +247,22 @@ def test_what_is_cut_off_is_said(tmp_path: Path) -> None:
     assert "cut off" in read.notes[0]
 
 
+def test_a_number_that_lost_figures_is_left_out(tmp_path: Path) -> None:
+    """0.000123456 cut to 0.00 still reads as a number; whole lines need no end."""
+    rows = [f"{1.7e9 + 10.0 * k:.3f},{1.23456e-4 + 1e-9 * k:.9f}" for k in range(100)]
+    table = tmp_path / "table.csv"
+    table.write_text("\n".join(["time_s,offset_s", *rows]))
+    assert len(read_logs([table]).series[0]) == 100
+    table.write_text("\n".join(["time_s,offset_s", *rows])[:-7])
+    read = read_logs([table])
+    assert len(read.series[0]) == 99
+    assert read.notes == (f"{table}: the last line is cut off and left out",)
+    log = tmp_path / "tracking.log"
+    text = "\n".join(made.tracking(START + 16.0 * np.arange(200), np.full(200, 1e-5)))
+    log.write_text(text[: text.rindex(" ") - 2])  # three columns are gone, the offset is there
+    assert len(read_logs([log]).series[0]) == 199
+
+
 def test_a_bomb_is_refused_before_it_bursts(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

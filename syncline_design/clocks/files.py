@@ -18,10 +18,12 @@ from syncline_design.spec.yaml_text import Flaw
 MOST_BYTES: Final = 2**28
 MOST_UNPACKED: Final = 2**29
 MOST_LINE: Final = 2**16  # characters; longer lines are no line of any of these logs
+LINES_COMPARED: Final = 20  # before a last line without an end
 _PIECE: Final = 2**22
 _GZIP: Final = b"\x1f\x8b"
 _OTHER_PACKING: Final = {b"\xfd7zXZ": "xz", b"BZh": "bzip2", b"PK\x03\x04": "zip",
                          b"(\xb5/\xfd": "zstd"}  # fmt: skip
+_ENDS: Final = ("\n", "\r", "\x0b", "\x0c", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029")
 # tracking.log.1, tracking.log-20261121, loopstats.20261121, each perhaps with .gz
 _ROTATED: Final = re.compile(r"(?P<stem>.+?)[.-](?P<rank>[0-9]{8}(?:[-_]?[0-9]+)?|[0-9]{1,3})")
 
@@ -83,9 +85,19 @@ def _read(path: Path) -> LogFile:
         content, cut_short = _unpacked(path, content)
     text = _text(path, content)
     lines = tuple(text.splitlines())
+    if not text.endswith(_ENDS) and not _is_whole(lines):
+        lines = lines[:-1]
+        cut_short = cut_short or "the last line is cut off and left out"
     _demand_lines(path, lines)
     log, order = _rotation(path)
     return LogFile(path, digest, lines, log, order, cut_short)
+
+
+def _is_whole(lines: Sequence[str]) -> bool:
+    """Whether a last line without an end is as long as those before it: a shorter one may have
+    lost figures, and a number that has still reads as one."""
+    before = lines[-1 - LINES_COMPARED : -1]
+    return not before or len(lines[-1]) >= max(map(len, before))
 
 
 def _unpacked(path: Path, content: bytes) -> tuple[bytes, str]:

@@ -20,13 +20,13 @@ from syncline_design.comparison.acceptance import (
     worst,
 )
 from syncline_design.comparison.assumptions import Assumed, assumptions
-from syncline_design.comparison.by_clock import by_clock
-from syncline_design.comparison.by_log import by_log
+from syncline_design.comparison.by_clock import Resting, by_clock
+from syncline_design.comparison.by_log import LogEvidence, by_log
 from syncline_design.comparison.by_stamps import by_stamps
 from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_files
 from syncline_design.comparison.judgement import Judgement, together
+from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.comparison.stamp_meaning import held_against
-from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import diagnose
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
@@ -57,7 +57,7 @@ class _Evidence:
 
     clocks: Mapping[str, TimingStudy]
     stamps: Audit | None
-    log: Diagnosis | None
+    log: LogEvidence | None
 
 
 def accept(
@@ -72,11 +72,13 @@ def accept(
     verdict = check_loaded(case, CheckSettings(seed=seed))
     files = evidence_files(case, logs, settings.assigned)
     rests_on = [one for one in assumptions(case, verdict) if one.name in settings.asked]
-    evidence = _evidence(case, files, settings, seed)
-    rows = tuple(_row(case, one, evidence, rests_on) for one in rests_on)
+    evidence = _evidence(case, files, settings, rests_on, seed)
+    in_force().doing("weighing the evidence")
+    rows = tuple(_row(case, one, evidence) for one in rests_on)
     sound = verdict.verdict == "meets"
     return Acceptance(
         verdict=worst(row.status for row in rows) if sound else "broken",
+        broken_by=tuple(_broken_by(sound, rows)),
         spec=AcceptedSpec(verdict.name, verdict.file, verdict.verdict),
         asked=settings.asked,
         assumptions=rows,
@@ -87,50 +89,65 @@ def accept(
     )
 
 
-def _evidence(case: Case, files: EvidenceFiles, settings: AcceptSettings, seed: int) -> _Evidence:
+def _evidence(
+    case: Case, files: EvidenceFiles, settings: AcceptSettings, rests_on: Sequence[Assumed],
+    seed: int,
+) -> _Evidence:  # fmt: skip
     share = max(settings.timing.coverage, coverage_of(case))
     timing = replace(settings.timing, coverage=share)
     studies = {name: study_logs(paths, timing) for name, paths in files.clocks.items()}
     audited = None
     if files.stamps and "timing" in settings.asked:
         audited = held_against(audit(files.stamps), case, seed)
-    return _Evidence(studies, audited, _diagnosed(case, files, settings, seed))
+    return _Evidence(studies, audited, _diagnosed(case, files, settings, rests_on, seed))
 
 
 def _diagnosed(
-    case: Case, files: EvidenceFiles, settings: AcceptSettings, seed: int
-) -> Diagnosis | None:
+    case: Case, files: EvidenceFiles, settings: AcceptSettings, rests_on: Sequence[Assumed],
+    seed: int,
+) -> LogEvidence | None:  # fmt: skip
     """Of the measured logs given, or of those that the spec names where they are asked for."""
     wanted = any(name not in CLOCKS for name in settings.asked)
     places = [path for path in files.places if wanted or path not in files.stamps]
     named = case.spec.log is not None and bool(case.spec.log.files)
     if not places and not (wanted and named):
         return None
-    return diagnose(as_measured(case, seed), places, DiagnosisSettings(seed=seed))
+    pinned = as_measured(case, seed)
+    found = diagnose(pinned, places, DiagnosisSettings(seed=seed))
+    paper = OnPaper.beside(pinned, found, seed)
+    return LogEvidence(found, paper, case.stages[-1].choice.name, _clocks(case, rests_on))
 
 
-def _row(
-    case: Case, one: Assumed, evidence: _Evidence, rests_on: Sequence[Assumed]
-) -> AssumptionResult:
-    said = list(_said(case, one, evidence, rests_on))
-    return together(case, one, said)
+def _broken_by(sound: bool, rows: Sequence[AssumptionResult]) -> Iterator[str]:
+    if not sound:
+        yield "spec"
+    broken = [row for row in rows if row.status == "broken"]
+    yield from (f"{row.stage}/{row.role}/{row.assumption}" for row in broken)
 
 
-def _said(
-    case: Case, one: Assumed, evidence: _Evidence, rests_on: Sequence[Assumed]
-) -> Iterator[Judgement]:
+def _clocks(case: Case, rests_on: Sequence[Assumed]) -> dict[str, str]:
+    """Of every stage whose vehicle has a clock among the assumptions, the stage of that row."""
+    vehicles = {stage.choice.name: stage.choice.vehicle_name for stage in case.stages}
+    rows = {vehicles[one.stage]: one.stage for one in rests_on if one.name == "clock"}
+    return {name: rows[vehicle] for name, vehicle in vehicles.items() if vehicle in rows}
+
+
+def _row(case: Case, one: Assumed, evidence: _Evidence) -> AssumptionResult:
+    return together(case, one, list(_said(case, one, evidence)))
+
+
+def _said(case: Case, one: Assumed, evidence: _Evidence) -> Iterator[Judgement]:
     vehicles = {stage.choice.name: stage.choice.vehicle_name for stage in case.stages}
     vehicle = vehicles[one.stage]
     if one.name == "clock" and vehicle in evidence.clocks:
-        yield by_clock(one, evidence.clocks[vehicle], coverage_of(case))
+        yield by_clock(one, evidence.clocks[vehicle], Resting.of(case))
     if one.name == "timing" and f"{one.stage}/{one.role}" in evidence.clocks:
-        yield by_clock(one, evidence.clocks[f"{one.stage}/{one.role}"], coverage_of(case))
+        yield by_clock(one, evidence.clocks[f"{one.stage}/{one.role}"], Resting.of(case))
     stamped = None if evidence.stamps is None else by_stamps(one, evidence.stamps)
     if one.name == "timing" and stamped is not None:
         yield stamped
     if evidence.log is not None:
-        clocked = any(a.name == "clock" and vehicles[a.stage] == vehicle for a in rests_on)
-        yield by_log(one, evidence.log, last_stage=case.stages[-1].choice.name, has_clock=clocked)
+        yield by_log(one, evidence.log)
 
 
 def _notes(verdict: Verdict, evidence: _Evidence) -> Iterator[str]:
@@ -141,5 +158,5 @@ def _notes(verdict: Verdict, evidence: _Evidence) -> Iterator[str]:
     if evidence.stamps is not None:
         yield from evidence.stamps.notes
     if evidence.log is not None:
-        yield from evidence.log.log.notes
-        yield from (c.message for c in evidence.log.checks)
+        yield from evidence.log.found.log.notes
+        yield from (c.message for c in evidence.log.found.checks)

@@ -78,11 +78,13 @@ class AcceptedSpec(Record):
 class Acceptance(Record):
     """The outcome: `broken` wins over `not_shown`; a spec that fails on paper is broken as well.
 
-    asked: the assumptions that were asked for, which alone are listed.
+    asked: the assumptions that were asked for, which alone are listed.  broken_by: what makes it
+    broken, `spec` for a spec that fails on paper, else stage/role/assumption.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
     verdict: Status
+    broken_by: tuple[str, ...] = ()
     spec: AcceptedSpec
     asked: tuple[AssumptionName, ...]
     assumptions: tuple[AssumptionResult, ...]

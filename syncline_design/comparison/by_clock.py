@@ -2,20 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Final
+
 from syncline_design.clocks.result import Timing
 from syncline_design.clocks.study import TimingStudy
 from syncline_design.comparison.acceptance import MeasuredFigure, Status
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.model.quantity import format_duration
-from syncline_design.verdict.measured import COMMONLY
+from syncline_design.spec.case import Case
+from syncline_design.verdict.measured import COMMONLY, coverage_of
+
+LONGER: Final = 1.001  # than the sessions: a horizon that they do not show
 
 
-def by_clock(one: Assumed, study: TimingStudy, coverage: float) -> Judgement:
-    """Holds only with a claim about future sessions; beyond the assumed bound it is broken.
+@dataclass(frozen=True, slots=True)
+class Resting:
+    """What a spec rests its clocks' bounds on: for which share of the time, and for how long."""
 
-    coverage: share of the time for which the spec takes its bounds to hold.
-    """
+    coverage: float
+    horizon_s: float
+
+    @classmethod
+    def of(cls, case: Case) -> Resting:
+        """Of one spec."""
+        return cls(coverage_of(case), float(case.spec.horizon.duration))
+
+
+def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
+    """Holds only with a claim about future sessions; beyond the assumed bound it is broken."""
     found = study.timing
     if found.doubts:
         return Judgement("not_shown", f"the clock logs are in doubt: {found.doubts[0]}")
@@ -27,19 +43,33 @@ def by_clock(one: Assumed, study: TimingStudy, coverage: float) -> Judgement:
         times = f"{found.bound_s / one.value:.3g} times" if one.value else "not"
         said = f"measured bound {measured}, {times} the {asked} assumed"
         return Judgement("broken", said, figure)
-    why = _why_not(one.value, found, coverage)
+    why = _why_not(one.value, found, resting)
     status: Status = "not_shown" if why else "holds"
-    return Judgement(status, f"measured bound {measured} within the {asked} assumed{why}", figure)
+    lead = f"measured bound {measured} within the {asked} assumed"
+    return Judgement(status, lead + (why or _rests_on(found)), figure)
 
 
-def _why_not(bound_s: float, found: Timing, coverage: float) -> str:
+def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:
     """Why a bound within the assumed one does not bear it out; "" where it does."""
-    if not found.claim.made:
-        return f", but no claim: {found.claim.why_not}"
+    claim = found.claim
+    if not claim.made:
+        return f", but no claim: {claim.why_not}"
     if found.event_bound_s is not None and found.event_bound_s > bound_s:
         most = format_duration(found.event_bound_s)
         return f", but {most} with the steps, unlocks and holdover in these logs"
-    if 1.0 - found.claim.coverage > COMMONLY * (1.0 - coverage):
-        return (f", but for {100.0 * found.claim.coverage:.4g} % of the time, where the spec's "
-                f"coverage_factor asks for {100.0 * coverage:.4g} %")  # fmt: skip
+    if 1.0 - claim.coverage > COMMONLY * (1.0 - resting.coverage):
+        return (f", but for {100.0 * claim.coverage:.4g} % of the time, where the spec's "
+                f"coverage_factor asks for {100.0 * resting.coverage:.4g} %")  # fmt: skip
+    if claim.session_s is not None and resting.horizon_s > LONGER * claim.session_s:
+        lasts, asked = format_duration(claim.session_s), format_duration(resting.horizon_s)
+        return f", but in sessions of {lasts}, where the spec's horizon is {asked}"
+    if claim.rests_on == "servo" and found.hard_bound_s is None:
+        return ", but by the servo's own offsets, which hide a constant error of the path"
+    return ""
+
+
+def _rests_on(found: Timing) -> str:
+    """What a bound that holds still takes on trust."""
+    if found.claim.rests_on == "unknown":
+        return ", if these offsets are not what steers the clock"
     return ""

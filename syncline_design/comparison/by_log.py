@@ -3,49 +3,71 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
-from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding
+from syncline_design.comparison.on_paper import OnPaper, size_of
+from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Smallest
 from syncline_design.effects import registry
-from syncline_design.machine.sentences import sentence_list
+from syncline_design.model.quantity import format_duration
 
+# what undoes a departure, so that neither the log nor the objects' places show both together
+_ALONE: Final = {
+    "latency": ", but for a delay common to all sensors, which moves nothing that stands still",
+    "lever_arm": ", but for an equal error of the other lever arm, which undoes it",
+    "mounting": ", but for a turn of the other sensor that undoes it",
+}
+_GROWING: Final = ("heading_drift",)  # what drifts shows with the log's length to the power 3/2
 MOVED: Final = 0.1  # of a limit: a log that stays below it does not show that the limit is kept
 _MOTION: Final = {"speed": ("speed", 1.0), "rate": ("turn_rate", math.pi / 180.0)}
 _CODES: Final = {"speed": "speed", "rate": "turn_rate"}
 
 
-def by_log(one: Assumed, found: Diagnosis, *, last_stage: str, has_clock: bool) -> Judgement:
-    """What the diagnosis says of one assumption.
+@dataclass(frozen=True, slots=True)
+class LogEvidence:
+    """What a log says: its diagnosis, and what departures do to the spec's verdict.
 
-    has_clock: whether the stage's clock is an assumption of its own; else what drifts breaks the
-    timing of the sensor.
+    last_stage: whose motion it holds.  clocks: of stages whose host clock is an assumption of its
+    own, the stage that it stands at; else what drifts breaks the timing of the sensor.
     """
+
+    found: Diagnosis
+    paper: OnPaper
+    last_stage: str
+    clocks: Mapping[str, str] = field(default_factory=dict)
+
+    def is_of(self, effect: str, sensors: Collection[str], stage: str, one: Assumed) -> bool:
+        """Whether an effect of a stage's sensors would break this assumption."""
+        breaks: str = registry()[effect].breaks
+        if breaks == "clock" and stage in self.clocks:
+            return (one.name, one.stage) == ("clock", self.clocks[stage])
+        broken = "timing" if breaks == "clock" else breaks
+        return (one.name, one.stage) == (broken, stage) and one.role in sensors
+
+
+def by_log(one: Assumed, log: LogEvidence) -> Judgement:
+    """What a measured log says of one assumption."""
     if one.name in _CODES:
-        return _of_platform(one, found, last_stage)
-    own = [f for f in found.findings if _is_of(f.effect, f.sensor, f.stage, one, has_clock)]
+        return _of_platform(one, log.found, log.last_stage)
+    own = [f for f in log.found.findings if log.is_of(f.effect, _sensors(f), f.stage, one)]
     breaking = [f for f in own if f.material and f.kind != "stand_in"]
     if breaking:
         return _broken(one, breaking)
-    doubt = _doubt(one, found, has_clock)
+    doubt = _doubt(one, log)
     if doubt:
         return Judgement("not_shown", doubt)
     if own:
-        return _immaterial(one, own)
-    return _nothing_found(one, found, has_clock)
+        return _immaterial(one, own, log.paper)
+    return _nothing_found(one, log)
 
 
-def _is_of(effect: str, sensor: str, stage: str, one: Assumed, has_clock: bool) -> bool:
-    """Whether an effect of a stage's sensor would break this assumption."""
-    if stage != one.stage:
-        return False
-    breaks = registry()[effect].breaks
-    if breaks == "clock":
-        return one.name == "clock" if has_clock else (one.name, one.role) == ("timing", sensor)
-    return (breaks, sensor) == (one.name, one.role)
+def _sensors(finding: Finding) -> tuple[str, ...]:
+    """Whose it is: of a delay that several sensors share, all of theirs."""
+    return (finding.sensor, *(finding.also or ()))
 
 
 def _broken(one: Assumed, breaking: Sequence[Finding]) -> Judgement:
@@ -61,10 +83,16 @@ def _said(finding: Finding) -> str:
     return finding.sentence + rivals
 
 
-def _immaterial(one: Assumed, own: Sequence[Finding]) -> Judgement:
+def _immaterial(one: Assumed, own: Sequence[Finding], paper: OnPaper) -> Judgement:
+    """Departures that do not matter on this log: they hold unless they turn the verdict."""
     first = max(own, key=lambda f: f.size_m or 0.0)
-    words = "; ".join(f.sentence for f in own)
-    return Judgement("holds", f"immaterial: {words}", _figure(one, first))
+    words, figure = "; ".join(f.sentence for f in own), _figure(one, first)
+    if paper.turned_by(own):
+        return Judgement("broken", f"small, and it turns the verdict: {words}", figure)
+    if paper.sound and not paper.keeps_slight:
+        said = f"immaterial alone, but with all that was found the verdict turns: {words}"
+        return Judgement("broken", said, figure)
+    return Judgement("holds", f"immaterial: {words}", figure)
 
 
 def _figure(one: Assumed, finding: Finding) -> MeasuredFigure | None:
@@ -92,61 +120,123 @@ def _fits(part: Estimate, unit: str) -> bool:
     return not isinstance(part.value, str) and part.unit == ("" if unit == "1" else unit)
 
 
-def _doubt(one: Assumed, found: Diagnosis, has_clock: bool) -> str:
+def _doubt(one: Assumed, log: LogEvidence) -> str:
     """Why the absence of a finding says nothing here; "" where it does."""
+    found = log.found
     if not found.sound:
         first = next(c for c in found.checks if c.severity == "contradiction")
         return f"the log contradicts itself or the spec: {first.message}"
     if found.verdict == "unexplained":
         return "the log disagrees with the spec and the cause has no name: nothing is shown"
     for finding in found.findings:
-        rivals = [a for a in finding.aliases if _is_of(a.effect, a.sensor, a.stage, one, has_clock)]
+        rivals = [a for a in finding.aliases if log.is_of(a.effect, (a.sensor,), a.stage, one)]
         if finding.material and rivals:
             return f"this log cannot tell it from what was found: {finding.sentence}"
     return ""
 
 
-def _nothing_found(one: Assumed, found: Diagnosis, has_clock: bool) -> Judgement:
+def _nothing_found(one: Assumed, log: LogEvidence) -> Judgement:
     """Holds where the log would have shown whatever turns the verdict."""
     if one.name in ("timing", "clock"):
         return Judgement("not_shown", "a log of places alone does not show a bound of stamps")
-    blind = [
-        b for b in found.informative.blind_to if _is_of(b.effect, b.sensor, b.stage, one, has_clock)
-    ]
-    if blind:
-        names = sentence_list(sorted({b.effect for b in blind}))
-        return Judgement("not_shown", f"this log could hide what turns the verdict: {names}")
-    if one.name == "noise":
-        return _noise(one, found)
-    seen = list(_seen(one, found, has_clock))
-    if not seen:
+    figure = _noise_figure(one, log.found) if one.name == "noise" else _seen(one, log)
+    hidden = list(_hidden(one, log))
+    if hidden:
+        words = f"this log could hide what turns the verdict: {'; '.join(hidden)}"
+        return Judgement("not_shown", words, figure if one.name == "noise" else None)
+    if figure is None:
         return Judgement("not_shown", "this log cannot show it")
-    most = max(seen)
-    return Judgement("holds", "not found, and this log would have shown what turns the verdict",
-                     MeasuredFigure(0.0, -most, most))  # fmt: skip
+    if one.name == "noise":
+        return _noise(one, log, figure)
+    words = f"not found, and this log would have shown what turns the verdict{_ALONE[one.name]}"
+    return Judgement("holds", words, figure)
 
 
-def _seen(one: Assumed, found: Diagnosis, has_clock: bool) -> Iterator[float]:
-    """Smallest sizes that the log would have shown, of parameters in the assumption's unit."""
-    for shown in found.smallest_seen:
-        if not _is_of(shown.effect, shown.sensor, shown.stage, one, has_clock):
+def _hidden(one: Assumed, log: LogEvidence) -> Iterator[str]:
+    """Effects that would turn the verdict before nearly all such logs would show them."""
+    told: set[str] = set()
+    for shown in log.found.smallest_seen:
+        if shown.effect in told or not log.is_of(shown.effect, (shown.sensor,), shown.stage, one):
+            continue
+        if log.paper.hides(shown):
+            told.add(shown.effect)
+            yield _hidden_words(shown, log)
+    for spot in log.found.informative.blind_to:
+        own = log.is_of(spot.effect, (spot.sensor,), spot.stage, one)
+        if own and spot.effect not in told:
+            told.add(spot.effect)
+            yield spot.effect
+
+
+def _hidden_words(shown: Smallest, log: LogEvidence) -> str:
+    """From which size on it turns the verdict, from which on it shows, and what would help."""
+    units = {p.name: p.unit for p in registry()[shown.effect].parameters}
+    unit = units[shown.parameter]
+    at = log.paper.turns_at(shown)
+    begins = "" if at is None else f" from {_amount(at, unit)} on"
+    if shown.sure is None:
+        return f"{shown.effect} turns it{begins}, and no size of it shows"
+    words = f"{shown.effect} turns it{begins or ' before it shows'}, "
+    words += f"{'and shows ' if at else ''}from {_amount(shown.sure, unit)} on"
+    if shown.effect in _GROWING and at is not None:
+        longer_s = log.found.log.duration_s * (shown.sure / at) ** (2.0 / 3.0)
+        words += (f" (over the spec's horizon; a log of {format_duration(_rounded_up(longer_s))} "
+                  "would show it)")  # fmt: skip
+    return words
+
+
+def _amount(value: float, unit: str) -> str:
+    """Two digits are enough of what is an estimate."""
+    rounded = float(f"{value:.2g}")
+    if unit == "s":
+        return format_duration(rounded)
+    if unit.startswith("rad"):
+        return f"{math.degrees(rounded):.2g} deg{unit[3:]}"
+    return f"{rounded:g} {unit}".rstrip()
+
+
+def _rounded_up(duration_s: float) -> float:
+    """To whole minutes."""
+    return 60.0 * math.ceil(duration_s / 60.0)
+
+
+def _seen(one: Assumed, log: LogEvidence) -> MeasuredFigure | None:
+    """No departure, and the largest that one log in twenty would have hidden."""
+    sizes = list(_sizes(one, log))
+    if not sizes:
+        return None
+    return MeasuredFigure(0.0, -max(sizes), max(sizes))
+
+
+def _sizes(one: Assumed, log: LogEvidence) -> Iterator[float]:
+    """Of all parameters in the assumption's unit."""
+    for shown in log.found.smallest_seen:
+        if not log.is_of(shown.effect, (shown.sensor,), shown.stage, one):
             continue
         units = {p.name: p.unit for p in registry()[shown.effect].parameters}
-        if shown.value is not None and units[shown.parameter] == one.unit:
-            yield shown.value
+        if units[shown.parameter] == one.unit and shown.value is not None:
+            yield size_of(shown)
 
 
-def _noise(one: Assumed, found: Diagnosis) -> Judgement:
+def _noise_figure(one: Assumed, found: Diagnosis) -> MeasuredFigure | None:
     """The standard deviation that was found, white and slow together, over the spec's."""
     key = f"{one.stage}/{one.role}"
     white = found.noise.white_factor.get(key)
     if white is None:
-        return Judgement("not_shown", "this log does not show this sensor's noise")
+        return None
     slow = found.noise.slow.get(key)
     share = max(slow.variance_over_spec) if slow is not None else 0.0
-    factor = math.sqrt(white**2 + share)
-    return Judgement("holds", f"{factor:.3g} times the spec's figure, nothing material beyond it",
-                     MeasuredFigure(factor))  # fmt: skip
+    return MeasuredFigure(math.sqrt(white**2 + share))
+
+
+def _noise(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
+    factor = figure.value or 0.0
+    if log.paper.noisier(one.role, one.stage, factor):
+        words = f"{factor:.3g} times the spec's figure is nothing unusual, but turns the verdict"
+        return Judgement("not_shown", words, figure)
+    return Judgement(
+        "holds", f"{factor:.3g} times the spec's figure, nothing material beyond it", figure
+    )
 
 
 def _of_platform(one: Assumed, found: Diagnosis, last_stage: str) -> Judgement:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Final
 
-from syncline_design.auditing.result import Audit, StreamAudit
+from syncline_design.auditing.result import Audit, StampFault, StreamAudit
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.model.quantity import format_duration
 
+# faults of the recorder and of the way to it, not of the stamps
+_ON_THE_WAY: Final = ("recorder_clock", "batched_by_recorder", "lost_messages", "gap", "duplicates")
 _LATE: Final = "stamped_on_arrival"  # as a design may mean it
 
 
@@ -22,25 +25,44 @@ def by_stamps(one: Assumed, found: Audit) -> Judgement | None:
     if stream is None or one.value is None:
         return None
     faults = [f for f in stream.faults if f.counts and not (one.on_arrival and f.fault == _LATE)]
+    own = [f for f in faults if f.fault not in _ON_THE_WAY]
+    if faults:
+        words = "; ".join(f"{f.fault}: {f.evidence}" for f in own or faults)
+        if own:
+            return Judgement("broken", f"stream {stream.name}: {words}", _figure(own, stream))
+        return Judgement("not_shown", f"stream {stream.name}: its receipts say nothing: {words}")
     late = any(fault.fault == _LATE for fault in stream.faults)
     size = stream.residual_s.as_recorded if late else stream.residual_s.bound
-    if faults:
-        jumps = [v for f in faults for k, v in f.parameters.items() if k == "seconds"]
-        sizes = [abs(v) for v in jumps if isinstance(v, float)]
-        figure = MeasuredFigure(max(sizes)) if sizes else None
-        words = "; ".join(f"{fault.fault}: {fault.evidence}" for fault in faults)
-        return Judgement("broken", f"stream {stream.name}: {words}", figure)
     if stream.stamps.secondary is None or size is None:
         return Judgement("not_shown", f"stream {stream.name} has one time a message")
     return _sound(one.value, stream, abs(stream.offset_s or 0.0) + size)
 
 
+def _figure(faults: Sequence[StampFault], stream: StreamAudit) -> MeasuredFigure | None:
+    """How far off stamps are by the worst of their faults; None where none has a size in time."""
+    sizes = [size for fault in faults for size in _sizes(fault, stream.duration_s or 0.0)]
+    return MeasuredFigure(max(sizes)) if sizes else None
+
+
+def _sizes(fault: StampFault, duration_s: float) -> Iterator[float]:
+    for key, value in fault.parameters.items():
+        if not isinstance(value, float):
+            continue
+        if key == "ppm":
+            yield abs(value) * 1e-6 * duration_s
+        elif key in ("seconds", "interval_s"):
+            yield abs(value)
+
+
 def _sound(bound_s: float, stream: StreamAudit, size: float) -> Judgement:
-    """size: the longest time between a stamp and its receipt, which bounds the stamp's error."""
+    """size: the longest time between a stamp and its receipt: so much too early stamps can be.
+
+    A delay before a stamp is taken shows in neither time; that is what `latency` asks.
+    """
     seen, asked = format_duration(size), format_duration(bound_s)
     lead = f"stream {stream.name} is sound; receipts come within {seen} of their stamps"
     if size <= bound_s:
-        return Judgement("holds", f"{lead}, and {asked} are assumed",
-                         MeasuredFigure(size))  # fmt: skip
+        return Judgement("holds", f"{lead}, and {asked} are assumed; a delay before the stamp was "
+                         "taken would not show here (`latency`)", MeasuredFigure(size))  # fmt: skip
     return Judgement("not_shown", f"{lead}, transport included: more than the {asked} assumed",
                      MeasuredFigure(size))  # fmt: skip

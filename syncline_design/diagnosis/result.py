@@ -276,7 +276,7 @@ class Remaining(Record):
 class Smallest(Record):
     """The SI value of a parameter at which half of such logs would have shown the effect.
 
-    None: no value that the effect can have.
+    None: no value that the effect can have.  sure: the value at which 19 of 20 would have.
     """
 
     effect: str
@@ -284,6 +284,7 @@ class Smallest(Record):
     stage: str
     parameter: str
     value: float | None
+    sure: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

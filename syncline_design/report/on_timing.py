@@ -129,10 +129,13 @@ def _sentence(text: str) -> str:
 
 def _facts(result: Timing) -> Iterator[tuple[str, str]]:
     claim = result.claim
-    yield "Bound", numbers.time(result.bound_s)
-    yield "Statistical bound", numbers.time(result.statistical_bound_s)
-    yield "Hard bound", numbers.time(result.hard_bound_s)
-    yield "With events", numbers.time(result.event_bound_s)
+    if result.doubts:
+        yield "Bound", "none: the logs are in doubt"
+    else:
+        yield "Bound", numbers.time(result.bound_s)
+        yield "Statistical bound", numbers.time(result.statistical_bound_s)
+        yield "Hard bound", numbers.time(result.hard_bound_s)
+        yield "With events", numbers.time(result.event_bound_s)
     yield "Sessions", f"{claim.sessions}, {numbers.number(claim.hours, 3)} h"
 
 

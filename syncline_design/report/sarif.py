@@ -51,7 +51,7 @@ _LEVELS: Final = {
     "fail": "error",
     "waived": "error",
     "known": "error",
-    "undecided": "warning",
+    "undecided": "error",
     "warning": "note",
 }
 
