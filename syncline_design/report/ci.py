@@ -56,6 +56,9 @@ def _requirements(verdict: Verdict) -> Iterator[Notice]:
     """Every requirement; of several missions each mission's, at the place of its own limit."""
     for row in () if verdict.missions else verdict.requirements:
         yield _requirement(row, verdict)
+    for row in verdict.requirements if verdict.missions else ():
+        if row.kind == "failing_share":  # of all missions together
+            yield _requirement(row, verdict)
     for mission in verdict.missions or ():
         for row in mission.requirements:
             found = _requirement(row, verdict)

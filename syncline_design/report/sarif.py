@@ -42,6 +42,7 @@ _RULES: Final[dict[str, str]] = {
     "speed": "The vehicle keeps the spec's v_max.",
     "rate": "The vehicle keeps the spec's omega_max.",
     "sample_spacing": "Two samples of a ranging sensor are close enough.",
+    "failing_share": "Figures within their intervals seldom break a requirement.",
     "feasible": "Every entry can work where it stands.",
     "infeasible": "Some design meets every requirement.",
     "indeterminate": "A verdict could be reached.",

@@ -43,6 +43,7 @@ KINDS: Final[dict[str, str]] = {
     "rmse": "root mean square error",
     "quantile": "error, quantile",
     "sample_spacing": "ground between two samples",
+    "failing_share": "share of figures that fail",
     "feasible": "entries that cannot work where they stand",
 }
 AXES: Final[dict[str, str]] = {"horizontal": "horizontal", "vertical": "vertical", "3d": "3D"}

@@ -116,8 +116,8 @@ def _read_choose_for(value: Any) -> str | Quantity:
     if isinstance(value, str):
         raise refusal("not one of the choices", wanted, kind_of(value), did_you_mean(value, _HOW))
     share = read_number(value)
-    if not 0.0 < share < 1.0:
-        raise refusal("out of range", wanted, share.text)
+    if not 0.5 < share < 1.0:
+        raise refusal("out of range", "more than 0.5 and less than 1", share.text)
     return share
 
 
@@ -127,7 +127,7 @@ ChooseFor = Annotated[
     Reader(
         _read_choose_for,
         {"anyOf": [{"enum": list(_HOW)},
-                   {"type": "number", "exclusiveMinimum": 0, "exclusiveMaximum": 1}]},
+                   {"type": "number", "exclusiveMinimum": 0.5, "exclusiveMaximum": 1}]},
     ),
 ]  # fmt: skip
 
@@ -258,9 +258,18 @@ def _spacing_errors(spec: Spec) -> list[Located]:
 
 
 def _choose_for_errors(spec: Spec) -> list[Located]:
-    """A share of the figures is counted on sums; what is simulated has no sum."""
+    """A share of the figures is counted on sums, at one distance; what is simulated has no sum."""
     if isinstance(spec.choose_for, str):
         return []
+    if spec.objective == "error":
+        message = "choose_for takes no probability where the error is made smallest"
+        error = refusal(message, "an objective of cost, mass or power")
+        return [(("choose_for",), error)]
+    spans = [i for i, stage in enumerate(spec.stages) if stage.distance is not None]
+    if spans:
+        message = "choose_for takes no probability where a stage has several distances"
+        error = refusal(message, "nominal or always", hint="or give the stage one distance")
+        return [(("choose_for",), error)]
     message = f"choose_for: {spec.choose_for} does not go with a requirement that is no sum"
     hint = "choose for nominal or always, or delete the requirement"
     return [

@@ -21,6 +21,7 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import SheetFigure, quantity, sigma_figures, with_figure
 from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.load import BadInput, Flaw
+from syncline_design.verdict.likely import Likelihood, likelihood_of
 
 Build = Callable[[Case], Problem]
 End = Literal["low", "high"]
@@ -39,12 +40,16 @@ class Scenario:
 
 @dataclass(frozen=True, slots=True)
 class Work:
-    """A spec's missions as scenarios, and the family that they are."""
+    """A spec's missions as scenarios, and the family that they are.
+
+    likelihood: where a design has to hold with a probability.
+    """
 
     case: Case
     missions: tuple[Mission, ...]
     scenarios: tuple[Scenario, ...]
     family: Family
+    likelihood: Likelihood | None = None
 
     def of(self, mission: str) -> list[int]:
         """The places of a mission's scenarios."""
@@ -62,6 +67,7 @@ class Chosen:
     problems: tuple[Problem, ...]
     found: Found | None = None
     undecided: bool = False
+    passed_open: int = 0  # better designs that are left open
 
 
 def is_family(case: Case) -> bool:
@@ -78,37 +84,34 @@ def refuse_missions(case: Case) -> None:
         raise BadInput((Flaw(str(case.path), *place, "missions", message, hint=hint),))
 
 
-def refuse_share(case: Case) -> None:
-    """BadInput where a design is asked for that holds with a probability."""
-    if case.spec.choose_for not in ("nominal", "always"):
-        place = case.position(("choose_for",))
-        message = "a choice for a probability is not worked out"
-        hint = "say nominal, or always for any figures in their intervals"
-        raise BadInput((Flaw(str(case.path), *place, "choose_for", message, hint=hint),))
-
-
 def missions_of(case: Case) -> tuple[Mission, ...]:
     """The missions of a spec; the spec itself where it has none."""
     return case.missions or (Mission(ALL, case),)
 
 
-def work_of(case: Case, build: Callable[[], Build], *, nominal: bool = False) -> Work:
+def work_of(
+    case: Case, build: Callable[[], Build], seed: int = 0, *, nominal: bool = False
+) -> Work:
     """The scenarios of a spec; build: a fresh way to make a problem of each case.
 
     nominal: with figures as given, whatever the spec asks for.
     """
-    refuse_share(case)
-    missions = missions_of(case)
+    likely = None
+    if not nominal and not isinstance(case.spec.choose_for, str):
+        cases = [one.case for one in missions_of(case)]
+        likely = likelihood_of(cases, float(case.spec.choose_for), seed)
+    missions, wanted = missions_of(case), case.spec.choose_for
+    nominal = nominal or wanted != "always"
     scenarios = [
         Scenario(one.name, end, own, build()(own))
         for one in missions
-        for end, own in _ends(one.case, nominal or case.spec.choose_for == "nominal")
+        for end, own in _ends(one.case, nominal)
     ]
     names = [one.mission for one in scenarios]
     order = list(dict.fromkeys(names))
     problems = [one.problem for one in scenarios]
     family = family_of(names, problems, _differing(missions), [order.index(n) for n in names])
-    return Work(case, missions, tuple(scenarios), family)
+    return Work(case, missions, tuple(scenarios), family, likely)
 
 
 def intervals(case: Case) -> tuple[SheetFigure, ...]:
@@ -157,7 +160,8 @@ def choose_family(work: Work) -> Chosen | None:
     problems = work.family.problems
     one = next(accepted(work, left_open), None)
     if one is not None:
-        return Chosen(work.family.designs(one.design), problems, one)
+        designs = work.family.designs(one.design)
+        return Chosen(designs, problems, one, passed_open=len(left_open))
     if left_open:
         return Chosen(work.family.designs(left_open[0]), problems, None, undecided=True)
     return None
@@ -175,7 +179,8 @@ def passing(
     work: Work, left_open: list[FamilyDesign] | None = None
 ) -> Callable[[FamilyDesign], bool] | None:
     """Whether what is no sum accepts a design in every mission; None where nothing asks it."""
-    if all(problem.judge is None for problem in work.family.problems):
+    likely = work.likelihood
+    if likely is None and all(problem.judge is None for problem in work.family.problems):
         return None
 
     def passes(design: FamilyDesign) -> bool:
@@ -183,7 +188,13 @@ def passing(
         found = [judgement(p, d) for p, d in zip(work.family.problems, designs, strict=True)]
         if any(one.failed for one in found):
             return False
-        if any(one.undecided for one in found):
+        undecided = any(one.undecided for one in found)
+        if likely is not None:
+            status = likely.of(work.family.problems, designs).status
+            if status == "fail":
+                return False
+            undecided |= status == "indeterminate"
+        if undecided:
             if left_open is not None:
                 left_open.append(design)
             return False

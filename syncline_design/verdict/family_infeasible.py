@@ -17,7 +17,7 @@ from syncline_design.verdict.verify import CheckSettings, infeasible_verdict, un
 def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], Build]) -> Verdict:
     """Which mission cannot be flown, or which of them not with one payload, and why."""
     for mission in work.missions:
-        own = work_of(replace(mission.case, missions=()), build)
+        own = work_of(replace(mission.case, missions=()), build, settings.seed)
         if choose_family(own) is None and work.case.spec.choose_for == "nominal":
             problem = own.scenarios[0].problem
             found = infeasible_verdict(mission.case, problem, settings, build())
@@ -37,6 +37,8 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
     )
     if work.case.spec.choose_for != "nominal":
         text = ("No payload holds at both ends of every datasheet interval.",)
+    if not isinstance(work.case.spec.choose_for, str):
+        text = (f"No payload holds with probability {work.case.spec.choose_for}.",)
     why = Explanation((), Conflict((), False), (), (), (), False, text, names or None)
     first = work.missions[0].case
     return Verdict(

@@ -34,6 +34,7 @@ from syncline_design.verdict.family_choice import (
     robustness_of,
 )
 from syncline_design.verdict.family_infeasible import infeasible_family
+from syncline_design.verdict.likely import CONFIDENCE
 from syncline_design.verdict.named import (
     BillLine,
     ChoiceResult,
@@ -49,6 +50,7 @@ from syncline_design.verdict.tree import (
     RequirementResult,
     Verdict,
     Word,
+    decided,
     finite,
     word_of,
 )
@@ -62,6 +64,7 @@ from syncline_design.verdict.verify import (
 )
 
 _WORST_FIRST: dict[str, int] = {"fails": 0, "infeasible": 0, "indeterminate": 1, "meets": 2}
+SHARE = "CHOOSE_FOR"  # the implied requirement of a choice for a probability
 _STATUS_ORDER = {"fail": 0, "indeterminate": 1, "pass": 2}
 
 
@@ -89,7 +92,7 @@ def check_family(case: Case, settings: CheckSettings) -> Verdict:
 
     try:
         in_force().doing("choosing")
-        work = work_of(case, build)
+        work = work_of(case, build, settings.seed)
         pinned = pinned_family(work)
         if pinned is not None:
             found = _verdict_on(work, pinned, settings, build, ChoiceResult())
@@ -124,7 +127,35 @@ def _verdict_on(
     if work.case.missions:
         judged = [replace(one, alone=_alone(one, build)) for one in judged]
     shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], _least_margin(one.rows)))
-    return _assembled(work, judged, shown, sums, settings, build, choice)
+    found = _assembled(work, judged, shown, sums, settings, build, choice)
+    return found if work.likelihood is None else _with_probability(work, chosen, found)
+
+
+def _with_probability(work: Work, chosen: Chosen, found: Verdict) -> Verdict:
+    """The verdict with the share of figures for which the design fails, and what is left open."""
+    assert work.likelihood is not None
+    assert found.robustness is not None
+    one = work.likelihood.of(chosen.problems, chosen.designs)
+    row = decided(
+        id=SHARE, kind="failing_share", status=one.status, value=1.0 - one.value,
+        limit=1.0 - work.likelihood.asked, unit="1", implied=True,
+        note=f"{one.samples} samples of the datasheet figures, with {CONFIDENCE:.1%} confidence "
+        f"between {1.0 - one.high:.3g} and {1.0 - one.low:.3g}",
+    )  # fmt: skip
+    word = min((found.verdict, word_of([row])), key=lambda word: _WORST_FIRST[word])
+    warnings = found.warnings
+    if chosen.passed_open and found.verdict == "meets":
+        plural = "" if chosen.passed_open == 1 else "s"
+        message = (
+            f"{chosen.passed_open} design{plural} that come before this one in the order are left "
+            "open: samples do not tell whether they reach the probability"
+        )
+        warnings = (Caution("undecided-before", message), *warnings)
+    robust = replace(found.robustness, probability=one)
+    return replace(
+        found, verdict=word, requirements=(*found.requirements, row), warnings=warnings,
+        robustness=robust,
+    )  # fmt: skip
 
 
 def _demand_agreement(chosen: Chosen, sums: Sums) -> None:

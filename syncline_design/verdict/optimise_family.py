@@ -50,7 +50,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
         settings.seed, settings.method, monte_carlo=simulated or settings.report
     )
     verdict = check_family(case, checking)
-    work = work_of(case, build)
+    work = work_of(case, build, settings.seed)
     more: dict[str, Any] = {"infeasibility": verdict.infeasibility}
     found: list[Found] = []
     cut_short: list[str] = []

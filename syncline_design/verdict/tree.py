@@ -18,6 +18,7 @@ from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
 from syncline_design.verdict.baseline import Baseline
+from syncline_design.verdict.likely import Estimate
 from syncline_design.verdict.named import (
     BillLine,
     ChoiceResult,
@@ -42,6 +43,7 @@ UNITS = {
     **dict.fromkeys(JUDGED_KINDS, "m"),
     "sync": "1",
     "feasible": "1",
+    "failing_share": "1",
     "sample_spacing": "m",
     "mass": "kg",
     "power": "W",
@@ -352,7 +354,7 @@ class Robustness(Record):
 
     choose_for: always, or the probability; figures: how many datasheet figures have an interval.
     price: what the chosen design takes more of the objective than the nominal one (None: there is
-    none, or the objective is the error).
+    none, or the objective is the error); probability: that every requirement holds.
     """
 
     choose_for: str
@@ -360,6 +362,7 @@ class Robustness(Record):
     nominal: RankedDesign | None
     price: float | None
     unit: str
+    probability: Estimate | None = optional()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
