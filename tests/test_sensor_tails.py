@@ -50,3 +50,21 @@ def test_freedom_and_outliers_are_those_of_the_sensor(
     assert found.freedom_uncertainty < 0.12 * freedom
     assert abs(found.degrees_of_freedom - freedom) < 3.0 * found.freedom_uncertainty
     assert found.outlier_rate == pytest.approx(rate, abs=0.006)
+
+
+@pytest.mark.parametrize(("freedom", "core"), [(6.0, 7.0), (4.0, 3.0)])
+def test_a_core_wider_than_the_spec_says_is_no_flood_of_outliers(
+    freedom: float, core: float
+) -> None:
+    """Held to the spec's width, half of the rows would be outliers of a very heavy tail."""
+    rng = np.random.default_rng(11)
+    drawn = core * rng.standard_t(freedom, (1500, 2))
+    own = np.full(drawn.shape, SIGMA_M**2)
+    others = 9.0 * own
+    noise = SIGMA_M * (drawn + 3.0 * rng.standard_normal(drawn.shape))
+    found = tails_beside(noise, own, others, factor=core * math.sqrt(freedom / (freedom - 2.0)))
+    assert found.outlier_rate == 0.0
+    assert found.scale == pytest.approx(core, rel=0.1)
+    assert found.wider > 10.0
+    assert found.freedom_uncertainty < 0.35 * freedom
+    assert abs(found.degrees_of_freedom - freedom) < 3.0 * found.freedom_uncertainty

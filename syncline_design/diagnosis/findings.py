@@ -27,6 +27,7 @@ from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.sensor_tails import sensor_tails
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.spans import span_of
+from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
@@ -119,7 +120,9 @@ def findings(
     refuted: what is left is no noise, so no chance is stated: it would rest on that noise.
     """
     found = [_deterministic(final, k, weights) for k in _single(final.model)]
-    found += [_stochastic(final, o, weights) for o in final.model.opened]
+    for opened in final.model.opened:
+        one = _tails if opened.what == "tails" else _stochastic
+        found += one(final, opened, weights)
     if refuted:
         found = [_without_chance(one) for one in found]
     found.sort(key=lambda f: (not f.material, f.kind == "noise", -f.gain_nat))
@@ -266,7 +269,7 @@ def _of_a_clock(view: Scene, fault: Gross) -> str:
             f"the position's stamps may be wrong but that ({TELL_CLOCK})")  # fmt: skip
 
 
-def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:
+def _stochastic(final: Settled, opened: Opened, weights: Weights) -> list[Finding]:
     """Values of a stochastic effect from the fitted noise; uncertainty from the likelihood."""
     data, model = final.data, final.model
     effect, label = opened.candidate.effect, opened.candidate.label
@@ -280,10 +283,6 @@ def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:
     elif opened.what == "size":
         value = model.level.size[opened.directed]
         figures = [(value, value * _log_spread(data, model, ("size", opened.directed, 0)))]
-    elif opened.what == "tails":
-        found = sensor_tails(data, model, sensor)
-        freedom = (found.degrees_of_freedom, found.freedom_uncertainty)
-        figures = [freedom, (found.outlier_rate, math.inf)]
     elif opened.what == "factor":
         index = [w.sensor for w in data.structure.white].index(sensor)
         value = model.level.factor[index]
@@ -293,7 +292,40 @@ def _stochastic(final: Settled, opened: Opened, weights: Weights) -> Finding:
     shown = {
         p.name: estimate(v, s, p.unit) for p, (v, s) in zip(effect.parameters, figures, strict=True)
     }
-    return _finding(final, effect, label, shown, _noise_size(data, model, opened), weights)
+    return [_finding(final, effect, label, shown, _noise_size(data, model, opened), weights)]
+
+
+def _tails(final: Settled, opened: Opened, weights: Weights) -> list[Finding]:
+    """Heavy tails, and how much wider than the spec's the core of that noise is, if it is."""
+    data, model = final.data, final.model
+    effect, label = opened.candidate.effect, opened.candidate.label
+    stage = data.view.system.stages[label[2]].name
+    tails = sensor_tails(data, model, (stage, label[1]))
+    figures = [
+        (tails.degrees_of_freedom, tails.freedom_uncertainty),
+        (tails.outlier_rate, math.inf),
+    ]
+    shown = {
+        p.name: estimate(v, s, p.unit) for p, (v, s) in zip(effect.parameters, figures, strict=True)
+    }
+    size_m = _noise_size(data, model, opened)
+    if not tails.scale > 1.0:
+        return [_finding(final, effect, label, shown, size_m, weights)]
+    wider = next(one for one in registry().values() if one.opens == "factor")
+    part = next(w for w in data.structure.white if w.sensor == (stage, label[1]))
+    visible = np.isfinite(data.view.log.truth_m)
+    own = float(np.mean(np.sum(np.einsum("nii->ni", part.covariance) * visible, axis=1)))
+    core_m = math.sqrt((tails.scale**2 - 1.0) * own)
+    factor = {wider.parameters[0].name: estimate(tails.scale, None, wider.parameters[0].unit)}
+    values = tuple((name, e.value) for name, e in factor.items())
+    material = weights.material(core_m, EffectEntry(wider.name, label[1], stage, values))
+    words = f"a core as wide as the spec's costs {tails.wider:.1f} nat"
+    size_m = math.sqrt(max(size_m**2 - core_m**2, 0.0))
+    return [
+        _finding(final, effect, label, shown, size_m, weights),
+        finding(wider, label[1], stage, factor, words, tails.wider, None,
+                material=material, size_m=core_m),
+    ]  # fmt: skip
 
 
 def episode_finding(data: Data, one: Episode, weights: Weights) -> Finding:

@@ -23,7 +23,8 @@ from syncline_design.effects.record import OUTLIER_FACTOR, Array
 MOST_ROWS = 3000
 LOG_W = np.arange(-11.0, 3.2, 0.25)  # of the mixed variances: beyond, nothing is left of any t
 FREEDOMS = np.geomspace(1.2, 40.0, 29)
-SCALES = np.geomspace(0.5, 2.0, 7)
+NARROWEST, WIDEST = 0.5, 2.0  # core over the spec's, over all of the sensor's noise
+COARSE, FINER = 0.25, 9  # steps of its logarithm, and how many finer ones about the best
 SCALE_NATS = 10.0  # by which another width of the core has to be better than the spec's
 RATE_STEPS = 15
 LEAST_RATE = 1e-6
@@ -31,11 +32,17 @@ LEAST_RATE = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class SensorTails:
-    """Degrees of freedom with their standard uncertainty, and the share of outliers."""
+    """Degrees of freedom with their standard uncertainty, and the share of outliers.
+
+    scale: width of the core over the spec's; wider: how much better that is than the spec's [nat],
+    0 where the core is the spec's.
+    """
 
     degrees_of_freedom: float
     freedom_uncertainty: float
     outlier_rate: float
+    scale: float = 1.0
+    wider: float = 0.0
 
 
 def sensor_tails(data: Data, model: Model, sensor: Sensor) -> SensorTails:
@@ -48,19 +55,30 @@ def sensor_tails(data: Data, model: Model, sensor: Sensor) -> SensorTails:
     thin = slice(None, None, 1 + len(left) // MOST_ROWS)
     own = np.einsum("nii->ni", structure.white[index].covariance)
     error, own, rest = (v[thin][:, axes] for v in (left, own, np.einsum("nii->ni", others)))
-    return tails_beside(error, own, rest)
+    return tails_beside(error, own, rest, model.level.factor[index])
 
 
-def tails_beside(error: Array, own: Array, others: Array) -> SensorTails:
-    """Fit to errors (n, axes) [m], own and other noise's variances there [m2]."""
-    found = {float(scale): _profile(error, scale**2 * own, others) for scale in SCALES}
-    best = max(found, key=lambda scale: float(np.max(found[scale][0])))
-    if float(np.max(found[best][0])) < float(np.max(found[1.0][0])) + SCALE_NATS:
-        best = 1.0
-    likelihood, rate = found[best]
+def tails_beside(error: Array, own: Array, others: Array, factor: float = 1.0) -> SensorTails:
+    """Fit to errors (n, axes) [m], own and other noise's variances there [m2].
+
+    factor: deviation of all of the sensor's noise over the spec's; its core is no wider.
+    """
+    as_stated = _profile(error, own, others)
+    widest = WIDEST * max(factor, 1.0)
+    scales = np.geomspace(NARROWEST, widest, 1 + math.ceil(math.log(widest / NARROWEST) / COARSE))
+    found = [_profile(error, scale**2 * own, others) for scale in scales]
+    best = scales[int(np.argmax([np.max(likelihood) for likelihood, _ in found]))]
+    scales = best * np.exp(np.linspace(-COARSE, COARSE, FINER))
+    found = [_profile(error, scale**2 * own, others) for scale in scales]
+    wider = max(float(np.max(likelihood)) for likelihood, _ in found) - float(np.max(as_stated[0]))
+    if wider < SCALE_NATS:
+        scales, found, wider = np.ones(1), [as_stated], 0.0
+    likelihood = np.max([one for one, _ in found], axis=0)  # over all widths
     at = int(np.argmax(likelihood))
+    chosen = int(np.argmax([one[at] for one, _ in found]))
     freedom, spread = _peak(likelihood, at)
-    return SensorTails(freedom, spread, float(rate[at]))
+    rate = float(found[chosen][1][at])
+    return SensorTails(freedom, spread, rate, float(scales[chosen]), wider)
 
 
 def _profile(error: Array, own: Array, others: Array) -> tuple[Array, Array]:
