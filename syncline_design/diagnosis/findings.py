@@ -316,8 +316,12 @@ def _tails(final: Settled, opened: Opened, weights: Weights) -> list[Finding]:
     visible = np.isfinite(data.view.log.truth_m)
     own = float(np.mean(np.sum(np.einsum("nii->ni", part.covariance) * visible, axis=1)))
     core_m = math.sqrt((tails.scale**2 - 1.0) * own)
-    factor = {wider.parameters[0].name: estimate(tails.scale, None, wider.parameters[0].unit)}
-    values = tuple((name, e.value) for name, e in factor.items())
+    factor = {
+        wider.parameters[0].name: estimate(
+            tails.scale, tails.scale_uncertainty, wider.parameters[0].unit
+        )
+    }
+    values = ((wider.parameters[0].name, tails.scale),)
     material = weights.material(core_m, EffectEntry(wider.name, label[1], stage, values))
     words = f"a core as wide as the spec's costs {tails.wider:.1f} nat"
     size_m = math.sqrt(max(size_m**2 - core_m**2, 0.0))

@@ -34,14 +34,15 @@ LEAST_RATE = 1e-6
 class SensorTails:
     """Degrees of freedom with their standard uncertainty, and the share of outliers.
 
-    scale: width of the core over the spec's; wider: how much better that is than the spec's [nat],
-    0 where the core is the spec's.
+    scale: width of the core over the spec's, with its standard uncertainty; wider: how much better
+    that is than the spec's [nat], 0 where the core is the spec's.
     """
 
     degrees_of_freedom: float
     freedom_uncertainty: float
     outlier_rate: float
     scale: float = 1.0
+    scale_uncertainty: float = 0.0
     wider: float = 0.0
 
 
@@ -73,12 +74,12 @@ def tails_beside(error: Array, own: Array, others: Array, factor: float = 1.0) -
     wider = max(float(np.max(likelihood)) for likelihood, _ in found) - float(np.max(as_stated[0]))
     if wider < SCALE_NATS:
         scales, found, wider = np.ones(1), [as_stated], 0.0
-    likelihood = np.max([one for one, _ in found], axis=0)  # over all widths
-    at = int(np.argmax(likelihood))
-    chosen = int(np.argmax([one[at] for one, _ in found]))
-    freedom, spread = _peak(likelihood, at)
-    rate = float(found[chosen][1][at])
-    return SensorTails(freedom, spread, rate, float(scales[chosen]), wider)
+    likelihood = np.array([one for one, _ in found])  # by width and freedom
+    at = int(np.argmax(np.max(likelihood, axis=0)))
+    chosen = int(np.argmax(likelihood[:, at]))
+    freedom, spread = _peak(FREEDOMS, np.max(likelihood, axis=0), at)
+    scale, off = _peak(scales, np.max(likelihood, axis=1), chosen) if wider else (1.0, 0.0)
+    return SensorTails(freedom, spread, float(found[chosen][1][at]), scale, off, wider)
 
 
 def _profile(error: Array, own: Array, others: Array) -> tuple[Array, Array]:
@@ -113,14 +114,14 @@ def _log_densities(error: Array, own: Array, others: Array) -> Array:
     return total
 
 
-def _peak(likelihood: Array, at: int) -> tuple[float, float]:
-    """Where a parabola in log nu peaks, and its standard uncertainty."""
-    if at in (0, len(FREEDOMS) - 1):
-        return float(FREEDOMS[at]), math.inf
+def _peak(grid: Array, likelihood: Array, at: int) -> tuple[float, float]:
+    """Where a parabola in the logarithm peaks, and its standard uncertainty."""
+    if at in (0, len(grid) - 1):
+        return float(grid[at]), math.inf
     low, middle, high = (float(v) for v in likelihood[at - 1 : at + 2])
-    step = math.log(FREEDOMS[1] / FREEDOMS[0])
+    step = math.log(grid[1] / grid[0])
     bend = 2.0 * middle - low - high
     if not bend > 0.0:
-        return float(FREEDOMS[at]), math.inf
-    freedom = float(FREEDOMS[at]) * math.exp(0.5 * step * (high - low) / bend)
-    return freedom, freedom * step / math.sqrt(bend)
+        return float(grid[at]), math.inf
+    found = float(grid[at]) * math.exp(0.5 * step * (high - low) / bend)
+    return found, found * step / math.sqrt(bend)
