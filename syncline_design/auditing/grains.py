@@ -22,6 +22,7 @@ _FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _MOST_MOMENTS: Final = 200_000
 _LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
 _COHERENT: Final = 0.75
+_MOST_LOST: Final = 0.15  # of all messages
 _COARSE_STEPS: Final = 3.0
 _EVENLY: Final = 0.25  # scatter of the distance between skips
 _BUNCHED: Final = 0.25  # share of neighbours that come together
@@ -108,7 +109,7 @@ def _lost(series: Series, pace: Cadence, counts: Array, grain: int) -> bool:
     late = (series.receive - series.stamp)[pace.places]
     skips = np.flatnonzero(counts == 2)
     skips = skips[(skips > 1) & (skips < counts.size - 2)]
-    if not skips.size:
+    if not skips.size or skips.size > _MOST_LOST * counts.size:
         return False
     before = np.minimum(late[skips], late[skips - 1])
     after = np.minimum(late[skips + 1], late[skips + 2])
@@ -192,8 +193,12 @@ def _bunches(
     alike = float(np.mean(interval[together] == 0.0)) > 0.9
     if constant and usual == 2 and not alike and timer not in (0.016, 0.008, 0.004):
         return None  # pairs, as designed
-    grid = timer if timer is not None else float(np.median(apart))
-    return _packets(series, interval, grid, timer is not None, float(sizes.mean()), pace)
+    middle = float(np.median(apart))
+    # packets that always come so far apart are no ticks of a part of it: none is ever empty
+    other = timer is not None and spread(apart) < 0.02 * middle and middle > 1.01 * timer
+    grid = middle if timer is None or other else timer
+    sure = timer is not None and not other
+    return _packets(series, interval, grid, sure, float(sizes.mean()), pace)
 
 
 def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain | None:

@@ -307,7 +307,8 @@ def polished(
     if time_s.size < start.size + len(shapes) + 4:
         return _fitted(time_s, low, shapes, blocks)
 
-    limits = math.log(blocks.length_s), math.log(_LONGEST * float(np.ptp(time_s)))
+    span = float(np.ptp(time_s))
+    limits = math.log(blocks.length_s), math.log(_LONGEST * span), float(time_s[0])
 
     def rest(values: Array) -> Array:
         moved = _set(shapes, fixed, start + values * scale, limits)
@@ -348,17 +349,20 @@ def _free(
 
 
 def _set(
-    shapes: tuple[Shape, ...], fixed: Sequence[bool], values: Array, limits: tuple[float, float]
-) -> tuple[Shape, ...]:
-    """The shapes with those values, in the order of `_free`; limits: of log settling times."""
+    shapes: tuple[Shape, ...], fixed: Sequence[bool], values: Array,
+    limits: tuple[float, float, float],
+) -> tuple[Shape, ...]:  # fmt: skip
+    """The shapes with those values, in the order of `_free`; limits: of log settling times, and the
+    log's begin, before which nothing drifts away."""
     left = [float(v) for v in values]
-    shortest, longest = limits
+    shortest, longest, first = limits
     out = []
     for shape, known in zip(shapes, fixed, strict=True):
         if shape.kind in ("relock", "holdover"):
             settle = math.exp(min(max(left.pop(0), shortest), longest))
             end = shape.end_s if known else left.pop(0)
-            begin = min(left.pop(0), end - 1e-6) if shape.kind == "holdover" else end
+            away = max(left.pop(0), first) if shape.kind == "holdover" else end
+            begin = min(away, end - 1e-6) if shape.kind == "holdover" else end
             shape = replace(shape, settle_s=settle, begin_s=begin, end_s=end)
         out.append(shape)
     return tuple(out)

@@ -175,8 +175,8 @@ def _without_disorder(series: Series) -> Series:
     for fall in falls[:MOST_SPIKES]:
         around = np.concatenate([late[max(0, fall - 60) : fall], late[fall + 2 : fall + 61]])
         if around.size >= 8:
-            low, middle = np.percentile(around, [0.0, 50.0])
-            if late[fall + 1] < low - 0.5 * (middle - low):
+            low, middle = np.percentile(around, [5.0, 50.0])
+            if late[fall + 1] < low - (middle - low):
                 good[places[fall + 1]] = False
     whole = series.receive.copy()
     left = np.flatnonzero(good)

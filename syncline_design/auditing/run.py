@@ -194,6 +194,10 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
                     "which is latency or a clock's offset")  # fmt: skip
     else:
         said.append("its constant latency, nor how far its clock is from the recorder's")
+    if one.breathing_s > 0.0:
+        far = in_words(one.breathing_s)
+        said.append(f"why receipts move to and fro by {far} while its stamps keep their rhythm: "
+                    "latency, or the sensor's own oscillator")  # fmt: skip
     if not one.pace.regular and "packetised" not in names:
         said.append("single lost messages, and whether it was stamped on arrival: it has no rhythm")
     if one.smallest.step_s is None:

@@ -51,6 +51,7 @@ class Shifts:
     faults: tuple[StampFault, ...]
     shifts: tuple[Shift, ...]
     blocks: Blocks | None
+    breathing_s: float = 0.0  # how far receipts move to and fro while stamps keep their rhythm
 
 
 def without_slips(series: Series, known_s: float | None) -> Shifts:
@@ -148,7 +149,8 @@ def _side_of(
     a, b = places[k - 1], places[k]
     stamp = (series.stamp[b] - series.stamp[a]) / NS
     receive = (series.receive[b] - series.receive[a]) / NS
-    odd_stamp, odd_receive = abs(stamp - pace.period_s), abs(receive - pace.period_s)
+    expected = float(b - a) * pace.period_s  # messages between may be left out, as duplicates are
+    odd_stamp, odd_receive = abs(stamp - expected), abs(receive - expected)
     if odd_receive > 0.6 and odd_stamp < 0.4:
         return "receipt"
     return "stamp"
@@ -195,7 +197,11 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     found = polished(found, [side == "stamp" for side in sides], blocks)
     count = witness.witness_of(series, pace, blocks)
     sides = witness.sides(count, found, sides)
-    own = _own(found, sides, time_s, late, blocks)
+    sharp = [s.kind in ("step", "episode") and witness.sharp(s, time_s, late) for s in found]
+    own = _own(found, sides, sharp, time_s, blocks)
+    told = witness.mirrored(count, blocks) if not own else None
+    if told is not None:
+        own = tuple(s for s in shapes_of(told, least_s=least_s) if s.kind != "drift")
     if len(own) < len(found):  # without what is transport, sizes are others
         own = polished(own, [True] * len(own), blocks)
     own = witness.simplest(count, own, blocks)
@@ -204,28 +210,30 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     faults = tuple(_all_named(own, time_s))
     shifts = tuple(
         Shift(s.begin_s, None if s.kind == "step" else s.end_s, s.size_s, side, blocks.length_s)
-        for s, side in zip(found, sides, strict=True) if s.kind in ("step", "episode")
+        for s, side, seen in zip(found, sides, sharp, strict=True) if seen or side == "stamp"
     )  # fmt: skip
-    return Shifts(replace(series, stamp=whole), faults, shifts, blocks)
+    left = tuple(s for s in found if s not in own and s.kind not in ("step", "episode"))
+    breathing = float(np.ptp(course(left, blocks.time_s))) if left else 0.0
+    return Shifts(replace(series, stamp=whole), faults, shifts, blocks, breathing)
 
 
 def _own(
-    found: tuple[Shape, ...], sides: Sequence[Side], time_s: Array, late: Array, blocks: Blocks
-) -> tuple[Shape, ...]:
+    found: tuple[Shape, ...], sides: Sequence[Side], sharp: Sequence[bool], time_s: Array,
+    blocks: Blocks,
+) -> tuple[Shape, ...]:  # fmt: skip
     """What is the stamps' own: seen in their rhythm, or such as no transport does."""
     if not found:
         return ()
-    drift, bends = witness.drifts(found, sides, blocks)
+    drift, bends = witness.drifts(found, sides, sharp, blocks)
     wander = float(np.ptp(course(tuple(s for s in found if s.kind in ("drift", "bend")), time_s)))
     kept = []
-    for shape, side in zip(found, sides, strict=True):
+    for shape, side, seen in zip(found, sides, sharp, strict=True):
         if side == "stamp":
             kept.append(shape)
         elif shape.kind == "drift" or shape.kind == "bend":
             kept += [shape] if (drift if shape.kind == "drift" else bends) else []
         elif side == "unknown" and shape.kind in ("step", "episode"):
-            level = witness.sharp(shape, time_s, late)
-            kept += [shape] if level and not _may_be_wander(shape, wander) else []
+            kept += [shape] if seen and not _may_be_wander(shape, wander) else []
     return tuple(kept)
 
 

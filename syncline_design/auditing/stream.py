@@ -52,6 +52,7 @@ class Examined:
     smallest: SmallestSeen
     trace: tuple[EnvelopePoint, ...]
     constant_s: float | None  # latency, or a clock that is wrong: stamps cannot tell
+    breathing_s: float = 0.0  # of receipts, while the stamps keep their rhythm
 
 
 def examined(stream: Stream, start: int | None = None) -> Examined:
@@ -79,7 +80,7 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         slips, base = _as_epochs(slips, series, epoch)
         found = [f for f in found if f is not epoch]
         known = _known(base, slips.series, False)
-    least = max(_coarse(raw), grain.size_s if grain is not None else 0.0)
+    least = max(_coarse(raw), step_ns / NS, grain.size_s if grain is not None else 0.0)
     moved = without_shifts(slips.series, least_s=least)
     found = _with_jumps(found, [*slips.faults, *moved.faults])
     series = moved.series
@@ -282,7 +283,7 @@ def _summed(
     return Examined(
         stream, raw, series, faults, (*moved[0].shifts, *moved[1].shifts), pace, _offset(raw),
         residual_of(raw, series, faults), _smallest(moved[1].blocks), _trace(raw) if told else (),
-        constant,
+        constant, moved[1].breathing_s,
     )  # fmt: skip
 
 

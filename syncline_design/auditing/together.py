@@ -76,7 +76,9 @@ def _groups(pool: list[tuple[int, Shift]]) -> list[list[tuple[int, Shift]]]:
 
 
 def _same(one: Shift, other: Shift) -> bool:
-    close = abs(one.at_s - other.at_s) < 2.0 * (one.window_s + other.window_s) + 0.2
+    # receipts on both sides of a jump are so far apart by the clock that jumped
+    jump = min(abs(one.size_s), abs(other.size_s))
+    close = abs(one.at_s - other.at_s) < 2.0 * (one.window_s + other.window_s) + 0.2 + jump
     alike = abs(one.size_s - other.size_s) < _ALIKE * max(abs(one.size_s), abs(other.size_s))
     return close and alike
 

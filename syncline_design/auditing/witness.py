@@ -149,18 +149,20 @@ def _side_of(
 
 
 def drifts(
-    shapes: Sequence[Shape], sides_of: Sequence[Side], blocks: Blocks
-) -> tuple[bool, bool]:  # fmt: skip
+    shapes: Sequence[Shape], sides_of: Sequence[Side], sharp_ones: Sequence[bool], blocks: Blocks
+) -> tuple[bool, bool]:
     """Whether what runs away is a clock's drift, and whether its bends are that clock's.
 
     Where the count shows the bends they are.  Else they are latency, unless all of it is no more
-    than an oscillator does: nearly a line, of some hundred ppm at most.
+    than an oscillator does: nearly a line, of some hundred ppm at most.  sharp_ones: of steps,
+    those that messages show; what fits as a step and is none belongs to the course.
     """
     slow = [k for k, s in enumerate(shapes) if s.kind in SLOW or s.kind == "drift"]
     bent = [k for k in slow if shapes[k].kind in SLOW]
     if bent and all(sides_of[k] == "stamp" for k in bent):
         return True, True
-    left = [k for k in slow if sides_of[k] != "stamp"]
+    jumps = [k for k, s in enumerate(shapes) if k not in slow and not sharp_ones[k]]
+    left = [k for k in (*slow, *jumps) if sides_of[k] != "stamp"]
     others = tuple(s for k, s in enumerate(shapes) if k not in left)
     time_s, low = blocks.time_s[blocks.usable], blocks.low_s[blocks.usable]
     straight = _straight(time_s, low - course(others, time_s), blocks.noise_s)
@@ -194,6 +196,23 @@ def wander(found: Witness | None, own: tuple[Shape, ...], blocks: Blocks) -> tup
     return tuple(
         replace(b, size_s=float(s), sigma_s=sigma) for b, s in zip(bends, sizes[2:], strict=True)
     )
+
+
+def mirrored(found: Witness | None, blocks: Blocks) -> Blocks | None:
+    """What stamps show against the count, as levels of receipt minus stamp, where these follow it.
+
+    Finer than the levels by as much as the sensor's jitter is below transport's.
+    """
+    if found is None or found.time_s.size < 8:
+        return None
+    told = _bent(found.level_s, found.time_s)
+    late = _bent(blocks.low_s[blocks.usable], found.time_s)
+    floor = max(SURE * blocks.noise_s, _LEAST_SHARE * blocks.spread_s, _LEAST_RUN_S)
+    if float(np.ptp(told)) < floor or not _alike(late, -told):
+        return None
+    use = np.ones(found.time_s.size, bool)
+    noise = max(found.noise_s, 1e-10)
+    return Blocks(found.time_s, -found.level_s, use, noise, blocks.spread_s, blocks.edges)
 
 
 def simplest(found: Witness | None, own: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape, ...]:
