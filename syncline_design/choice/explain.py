@@ -3,6 +3,7 @@ cannot hold together, and the smallest single changes that help."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import replace
@@ -15,6 +16,7 @@ from syncline_design.choice.outcome import (
     Conflict,
     ConflictMember,
     Explanation,
+    Fix,
     Members,
     NoVerdict,
     RoleGap,
@@ -86,6 +88,8 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
     fixes += _proven(lambda: method_fixes(case, build, problem))
     fixes += _proven(lambda: fact_fixes(case, problem, build))
     fixes += _proven(lambda: platform_fixes(case, build))
+    fixes = sorted(map(_measured, fixes), key=_size)
+    joint = tuple(sorted((tuple(map(_measured, some)) for some in joint), key=_largest))
     each_suffices = _each_suffices(case, problem, build, conflict)
     found = Explanation(
         gaps,
@@ -96,6 +100,22 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
         cut_short=in_force().is_over,  # once over, every search after it ended without an answer
     )
     return replace(found, text=tuple(_text(found, each_suffices)))
+
+
+def _measured(fix: Fix) -> Fix:
+    """The fix with the share of its figure that it changes; a change from nothing has none."""
+    if fix.from_ is None or fix.to is None or not fix.from_:
+        return fix
+    return replace(fix, relative=abs(fix.to - fix.from_) / abs(fix.from_))
+
+
+def _size(fix: Fix) -> float:
+    """The least change first; what is no figure comes last, as it was found."""
+    return math.inf if fix.relative is None else fix.relative
+
+
+def _largest(fixes: Sequence[Fix]) -> float:
+    return max(map(_size, fixes))
 
 
 def _proven(source: Callable[[], Iterable[Found]]) -> list[Found]:

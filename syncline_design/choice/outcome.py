@@ -131,7 +131,7 @@ class Fix(Record):
 
     requirement: id of the requirement it changes, None where it changes something else; figure and
     stage: of the platform figure that it changes.  from_, to: the figure in SI or the spec's
-    currency (None: not a figure), unit: theirs.
+    currency (None: not a figure), unit: theirs; relative: its change as a share of itself.
     """
 
     kind: FixKind
@@ -143,6 +143,7 @@ class Fix(Record):
     unit: str | None
     text: str
     proven: bool = True
+    relative: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

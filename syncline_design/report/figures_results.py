@@ -170,13 +170,20 @@ def pareto_front(
     target_m: float | None,
     cost_limit: float | None,
     name: str = "fig-front",
+    beside: tuple[float, float] | None = None,
 ) -> InlineFigure:
-    """The exact front of cost against error as a staircase, the chosen design on it."""
+    """The exact front of cost against error as a staircase, the chosen design on it.
+
+    beside: cost and error of the design that is nearest to what is asked.
+    """
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         _staircase(axes, points, cost_limit)
         errors = [*(p.error_m for p in points), *([target_m] if target_m else [])]
+        if beside is not None:
+            errors.append(beside[1])
+            _named_mark(axes, *beside, "nearest", WARN)
         axes.set_ylim(min(errors) / 1.5, max(errors) * 1.6)
         _limits(axes, target_m, cost_limit, currency)
         low, high = axes.get_ylim()
@@ -187,7 +194,7 @@ def pareto_front(
         scales.grid(axes)
 
     title = "Pareto front of cost against error"
-    return draw(name, title, _front_words(points, currency), (WIDTH, 290.0), build)
+    return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
 
 
 def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None) -> None:
@@ -200,14 +207,20 @@ def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None
     axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)
     for point in points:
         if point.chosen:
-            axes.plot([point.cost], [point.error_m], "D", color=GOOD, markersize=10,
-                      markeredgecolor=SURFACE, markeredgewidth=1.4, zorder=5)  # fmt: skip
-            axes.annotate("chosen", (point.cost, point.error_m), xytext=(9, 7),
-                          textcoords="offset points", color=GOOD, fontweight="bold")  # fmt: skip
+            _named_mark(axes, point.cost, point.error_m, "chosen", GOOD)
     axes.set_xlim(max(0.0, min(costs) - 0.12 * span), right)
 
 
-def _front_words(points: Sequence[FrontMark], currency: str) -> str:
+def _named_mark(axes: Axes, cost: float, error_m: float, words: str, color: str) -> None:
+    axes.plot([cost], [error_m], "D", color=color, markersize=10, markeredgecolor=SURFACE,
+              markeredgewidth=1.4, zorder=5)  # fmt: skip
+    axes.annotate(words, (cost, error_m), xytext=(9, 7), textcoords="offset points", color=color,
+                  fontweight="bold")  # fmt: skip
+
+
+def _front_words(
+    points: Sequence[FrontMark], currency: str, beside: tuple[float, float] | None = None
+) -> str:
     spoken = (
         f"{len(points)} designs from {numbers.money(points[0].cost, currency)} with an error of "
         f"{numbers.length(points[0].error_m)} to {numbers.money(points[-1].cost, currency)} with "
@@ -218,6 +231,8 @@ def _front_words(points: Sequence[FrontMark], currency: str) -> str:
             spoken += (
                 f" Chosen: {numbers.money(point.cost, currency)}, {numbers.length(point.error_m)}."
             )
+    if beside is not None:
+        spoken += f" Nearest: {numbers.money(beside[0], currency)}, {numbers.length(beside[1])}."
     return spoken
 
 

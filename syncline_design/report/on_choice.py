@@ -28,6 +28,7 @@ from syncline_design.report.on_alternatives import (
     bargain_nodes,
     ways_cell,
 )
+from syncline_design.report.on_nearest import nearest_nodes
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import qualification, warning_nodes
@@ -53,7 +54,7 @@ def on_choice(found: Optimised) -> Document:
         sentences=tuple(_sentences(found)),
         facts=(),
         sections=(
-            *_why_not(found.result),
+            *_why_not(result, currency),
             *section("designs", "Best designs", show(designs, silent=True)),
             *why_not_section(result, currency),
             *section("alternatives", "If a sensor cannot be had", show(without, silent=True)),
@@ -128,7 +129,7 @@ def incomplete_lines(result: Optimisation) -> list[str]:
     return lines
 
 
-def _why_not(result: Optimisation) -> list[Section]:
+def _why_not(result: Optimisation, currency: str) -> list[Section]:
     """The explanation's own lines: those with a dash are a list."""
     if result.infeasibility is None:
         return []
@@ -136,6 +137,7 @@ def _why_not(result: Optimisation) -> list[Section]:
     for line in result.infeasibility.text[1:]:
         text = line.strip()
         nodes.append(Items((text[2:],)) if text.startswith("- ") else Text(text))
+    nodes += nearest_nodes(result.nearest, currency)
     return section("infeasibility", "Why no design meets the requirements", nodes)
 
 

@@ -37,6 +37,7 @@ from syncline_design.report.error_figures import error_figures
 from syncline_design.report.explained import explained
 from syncline_design.report.on_alternatives import bargain_nodes
 from syncline_design.report.on_missions import missions, robustness
+from syncline_design.report.on_nearest import nearest_nodes
 from syncline_design.report.simulated import (
     BEYOND,
     certificate,
@@ -184,7 +185,9 @@ def _why_not(verdict: Verdict) -> list[Node]:
         which = "further" if alone or together else "any"
         nodes.append(Text(f"The time limit ended the search for reasons and remedies: whether "
                           f"{which} change would help was not worked out."))  # fmt: skip
-    return nodes
+    limits = (verdict_figures.lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
+    currency = verdict_tables.currency_of(verdict)
+    return [*nodes, *nearest_nodes(verdict.nearest, currency, *limits)]
 
 
 def _conflict(conflict: Conflict) -> list[Node]:

@@ -209,6 +209,42 @@ class Bargain(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class MissedLimit(Record):
+    """A requirement that the nearest design misses: what it reaches of what is asked."""
+
+    requirement: str | None
+    kind: str
+    value: float
+    limit: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class PricedError(Record):
+    """What a design costs and how much it errs."""
+
+    cost: float
+    error_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Nearest(Record):
+    """The best design once the limits are moved that need to move least, as a share of themselves.
+
+    front: of cost against error over the designs that keep every sum but cost and accuracy, where
+    prices are known.
+    """
+
+    cost: float | None
+    mass: float | None
+    power: float | None
+    error_m: float
+    misses: tuple[MissedLimit, ...]
+    design: NamedDesign
+    front: tuple[PricedError, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ChoiceResult(Record):
     """The `choice` of a verdict; without a design, only what is known of one.
 

@@ -49,7 +49,15 @@ from syncline_design.verdict.choice_data import (
     ruled_out,
 )
 from syncline_design.verdict.family import is_family, refuse_missions
-from syncline_design.verdict.named import Alternative, Bargain, Exclusion, FrontDesign, RankedDesign
+from syncline_design.verdict.named import (
+    Alternative,
+    Bargain,
+    Exclusion,
+    FrontDesign,
+    Nearest,
+    RankedDesign,
+)
+from syncline_design.verdict.nearest import nearest
 from syncline_design.verdict.open_choice import Picked, pick
 from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
 from syncline_design.verdict.verified import Verified, error_figures
@@ -128,6 +136,7 @@ class Optimisation(Record):
     tolerances: ToleranceVerdict | None = optional()
     measure_next: tuple[Measurement, ...] | None = optional()
     infeasibility: Explanation | None = optional()
+    nearest: Nearest | None = optional()
     why_not: tuple[Answer, ...] | None = optional()
     alternatives: tuple[Alternative, ...] | None = optional()
     bargains: tuple[Bargain, ...] | None = optional()
@@ -324,7 +333,8 @@ def _reasons(case: Case, problem: Problem, build: Build, pieces: Pieces) -> dict
     found = explain(case, problem, build)
     if found.cut_short:
         pieces.cut_short.append("reasons and remedies")
-    return {"infeasibility": found}
+    near = pieces.made("nearest design", lambda: nearest(case, problem, found, build), None)
+    return {"infeasibility": found, "nearest": near}
 
 
 def _hinges(given: tuple[Case, Problem, Design, Build], pieces: Pieces) -> dict[str, Any]:

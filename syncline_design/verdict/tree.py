@@ -24,6 +24,7 @@ from syncline_design.verdict.named import (
     ChoiceResult,
     ExplainedRequirement,
     NamedDesign,
+    Nearest,
     RankedDesign,
 )
 
@@ -380,6 +381,7 @@ class Verdict(Record):
     warnings: tuple[Caution, ...] = ()
     provenance: Provenance
     infeasibility: Explanation | None = optional()
+    nearest: Nearest | None = optional()
     figures: ErrorFigures | None = optional()
     assumptions: tuple[Assumption, ...] | None = optional()
     sources: tuple[Source, ...] | None = optional()

@@ -243,6 +243,7 @@ def infeasible_verdict(
 ) -> Verdict:
     """Why there is no design, and which single changes would help."""
     from syncline_design.choice.explain import explain
+    from syncline_design.verdict.nearest import nearest
 
     found = explain(case, problem, build)
     conflict = {member.id for members in found.conflicts for member in members}
@@ -257,6 +258,7 @@ def infeasible_verdict(
         ),
         warnings=(*((late,) if found.cut_short else ()), *implausible_cautions(case)),
         infeasibility=found,
+        nearest=nearest(case, problem, found, build),
         choice=without_choice(problem),
     )
 

@@ -1,0 +1,63 @@
+"""The design nearest to a spec that none meets: in a sentence, and on the front of all that are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from syncline_design.report import numbers
+from syncline_design.report.document import Chart, Heading, Node, Text
+from syncline_design.report.words import KINDS
+from syncline_design.verdict.named import MissedLimit, Nearest
+
+if TYPE_CHECKING:
+    from syncline_design.report.svg import InlineFigure
+
+
+def nearest_nodes(
+    found: Nearest | None, currency: str, target_m: float | None = None, price: float | None = None
+) -> list[Node]:
+    """What it is, what it misses and by how much; drawn with the limits of accuracy and cost."""
+    if found is None:
+        return []
+    sensors = ", ".join(
+        f"{stage.name} {role}: {one.name} by {one.primitive}, {one.timestamping_name}"
+        for stage, role, one in found.design.roles
+    )
+    cost = "a price that is not told" if found.cost is None else numbers.money(found.cost, currency)
+    error = numbers.length(found.error_m)
+    missed = " and ".join(_missed(one, currency) for one in found.misses)
+    text = f"{sensors}. It costs {cost} and errs by {error}; it misses {missed}."
+    return [Heading("The nearest design"), Text(text), *_chart(found, currency, target_m, price)]
+
+
+def _missed(one: MissedLimit, currency: str) -> str:
+    name = one.requirement or f"the implied limit of {KINDS.get(one.kind, one.kind)}"
+    value, limit = (_shown(figure, one.unit, currency) for figure in (one.value, one.limit))
+    return f"{name}: {value} where {limit} is asked"
+
+
+def _shown(value: float, unit: str, currency: str) -> str:
+    if unit == currency:
+        return numbers.money(value, currency)
+    return numbers.si_quantity(value, "" if unit == "1" else unit)
+
+
+def _chart(
+    found: Nearest, currency: str, target_m: float | None, price: float | None
+) -> list[Node]:
+    points = [point for point in found.front if point.error_m]
+    if found.cost is None or not points:
+        return []
+    at = (found.cost, found.error_m)
+
+    def draw() -> InlineFigure:
+        from syncline_design.report.figures_results import FrontMark, pareto_front
+
+        drawn = [FrontMark(point.cost, point.error_m, False) for point in points]
+        return pareto_front(drawn, currency, target_m, price, beside=at)
+
+    caption = (
+        "Every design on the line is the cheapest with that error of those that keep every other "
+        "sum."
+    )
+    return [Chart("nearest", draw, caption)]

@@ -1,0 +1,72 @@
+"""The design nearest to a spec that none meets: that of the least change of limits that helps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from fractions import Fraction
+
+from syncline_design.choice.evaluate import Evaluation, evaluate
+from syncline_design.choice.fixes import UNITS_OF, Move, with_moves
+from syncline_design.choice.front import front
+from syncline_design.choice.holding import best_design
+from syncline_design.choice.outcome import Explanation, Fix, NoVerdict
+from syncline_design.choice.parts import lifted, parts_of
+from syncline_design.choice.table import Problem
+from syncline_design.choice.variations import Build
+from syncline_design.model.quantity import Quantity
+from syncline_design.spec.case import Case
+from syncline_design.verdict.choice_data import full_design
+from syncline_design.verdict.named import MissedLimit, Nearest, PricedError
+
+LIMITS = frozenset({*UNITS_OF, "cost"})  # kinds of fix that move a limit and nothing else
+ROOM = Fraction(1, 10**12)  # for a limit that was rounded to a float on its way
+
+
+def nearest(case: Case, problem: Problem, why: Explanation, build: Build) -> Nearest | None:
+    """None where moving limits alone does not help, or where the time is over."""
+    sets = [(fix,) for fix in why.fixes if fix.kind in LIMITS] + list(why.joint_fixes)
+    if not sets:
+        return None
+    least = min(sets, key=lambda fixes: max(fix.relative or 0.0 for fix in fixes))
+    with suppress(NoVerdict):
+        return _of(case, problem, least, build)
+    return None
+
+
+def _of(case: Case, problem: Problem, fixes: Sequence[Fix], build: Build) -> Nearest | None:
+    moved = with_moves(case, [_move(case, fix) for fix in fixes])
+    eased = build(moved)
+    design = best_design(eased)
+    if design is None:
+        return None
+    sums = evaluate(eased, design)
+    cost, mass, power = (
+        None if a is None else float(a) for a in (sums.cost, sums.mass, sums.power)
+    )
+    misses = tuple(_missed(fix, sums) for fix in fixes)
+    shown = full_design(moved, eased, design)
+    return Nearest(cost, mass, power, sums.error_m, misses, shown, _front(problem))
+
+
+def _move(case: Case, fix: Fix) -> Move:
+    """The fix as a limit of the spec; money in its own currency."""
+    to = Fraction(fix.to or 0.0) * (1 + ROOM)
+    currency = case.spec.currency if fix.kind == "cost" else None
+    found = next((one for one in case.spec.requirements if one.id == fix.requirement), None)
+    return found, fix.from_ or 0.0, Quantity(to, "", None, currency)
+
+
+def _missed(fix: Fix, sums: Evaluation) -> MissedLimit:
+    """What the design reaches; of what is no sum, the limit that was shown to do."""
+    reached = {"accuracy": sums.error_m, "cost": sums.cost, "mass": sums.mass, "power": sums.power}
+    value = reached.get(fix.kind)
+    shown = (fix.to or 0.0) if value is None else float(value)
+    return MissedLimit(fix.requirement, fix.kind, shown, fix.from_ or 0.0, fix.unit or "")
+
+
+def _front(problem: Problem) -> tuple[PricedError, ...]:
+    costs = [part for part in parts_of(problem) if part.kind == "cost"]
+    bare = replace(lifted(problem, costs), judge=None)
+    return tuple(PricedError(float(p.amount), p.error_m) for p in front(bare))
