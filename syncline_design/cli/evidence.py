@@ -32,6 +32,7 @@ from syncline_design.machine.streams import say
 if TYPE_CHECKING:
     from syncline_design.campaign.joint import JointRequest
     from syncline_design.comparison.meaning import DesignMeaning
+    from syncline_design.comparison.repairs import Repair
     from syncline_design.diagnosis import Diagnosis
     from syncline_design.machine.deadline import Deadline
     from syncline_design.spec.case import Case
@@ -150,8 +151,9 @@ def diagnose(
 
             found = diagnose_joint(pinned, together, settings, progress)
         means = _meaning(case, found, seed, deadline)
+        put_right = _repairs(pinned, found, seed, deadline)
         found = _with_drive(pinned, found)
-    whole = with_design(found, means)
+    whole = with_design(found, means, put_right)
     if write_spec is not None:
         _write_findings(case, found, means, write_spec)
     text = console(on_diagnosis(whole))
@@ -186,6 +188,21 @@ def _meaning(case: Case, found: Diagnosis, seed: int, deadline: Deadline) -> Des
         means = meaning(case, found.effects_entries(), seed)
         deadline.check()
         return means
+    except OutOfTime:
+        say(f"syncline-design: {deadline.passed()}")
+        return None
+
+
+def _repairs(
+    case: Case, found: Diagnosis, seed: int, deadline: Deadline
+) -> tuple[Repair, ...] | None:
+    """What would put the system right; none where there is nothing to, or no time."""
+    from syncline_design.comparison.repairs import repairs
+    from syncline_design.machine.deadline import OutOfTime
+
+    try:
+        deadline.doing("looking for repairs")
+        return repairs(case, found.findings, seed) or None
     except OutOfTime:
         say(f"syncline-design: {deadline.passed()}")
         return None

@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from syncline_design.choice.effect_tables import NoBudget
 from syncline_design.choice.outcome import Explanation
 from syncline_design.choice.problem import build_problem
+from syncline_design.comparison.repairs import Repair
 from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
@@ -84,15 +85,20 @@ class DesignMeaning(Record):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DiagnosisAndDesign(Diagnosis):
-    """A diagnosis with what it means for the design, where something was found."""
+    """A diagnosis with what it means for the design and what would put it right, where something
+    was found; repairs: the best of each kind, by rising price.
+    """
 
     design: DesignMeaning | None = optional()
+    repairs: tuple[Repair, ...] | None = optional()
 
 
-def with_design(found: Diagnosis, means: DesignMeaning | None) -> DiagnosisAndDesign:
-    """The diagnosis with what it means for the design."""
+def with_design(
+    found: Diagnosis, means: DesignMeaning | None, repairs: tuple[Repair, ...] | None = None
+) -> DiagnosisAndDesign:
+    """The diagnosis with what it means for the design, and what would put that right."""
     parts = {f.name: getattr(found, f.name) for f in fields(Diagnosis)}
-    return DiagnosisAndDesign(**parts, design=means)
+    return DiagnosisAndDesign(**parts, design=means, repairs=repairs)
 
 
 def meaning(case: Case, entries: Sequence[EffectChoice], seed: int = 0) -> DesignMeaning | None:

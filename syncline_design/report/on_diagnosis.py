@@ -46,6 +46,7 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.on_gap import closed_text, gap_nodes, rms_length
 from syncline_design.report.on_joint import joint_nodes, scope_nodes
+from syncline_design.report.on_repairs import repair_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 
@@ -87,6 +88,7 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
             *section("drive", "The drive that would tell", _drive(found.plan), "Drive"),
             *section("unseen", "What this log cannot show", _items(found.unseen), "Not shown"),
             *section("design", "What it means for the design", _design(found.design), "Design"),
+            *section("repairs", "What would put it right", repair_nodes(found), "Repairs"),
             *section("logs", "Log by log", joint_nodes(found.joint), "Logs"),
             *section("log", "The log" if found.joint is None else "The logs", _log(found), "Log"),
             *provenance(_provenance(found)),

@@ -333,8 +333,7 @@ def _reasons(case: Case, problem: Problem, build: Build, pieces: Pieces) -> dict
     found = explain(case, problem, build)
     if found.cut_short:
         pieces.cut_short.append("reasons and remedies")
-    near = pieces.made("nearest design", lambda: nearest(case, problem, found, build), None)
-    return {"infeasibility": found, "nearest": near}
+    return {"infeasibility": found, "nearest": nearest(case, problem, found, build)}
 
 
 def _hinges(given: tuple[Case, Problem, Design, Build], pieces: Pieces) -> dict[str, Any]:

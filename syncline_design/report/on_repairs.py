@@ -1,0 +1,51 @@
+"""What would put a diagnosed system right: a row for the best repair of each kind."""
+
+from __future__ import annotations
+
+from syncline_design.comparison.meaning import DiagnosisAndDesign
+from syncline_design.comparison.repairs import Repair
+from syncline_design.report import numbers
+from syncline_design.report.document import Node, Text, show
+from syncline_design.report.table import Cell, Tone, table
+
+WORDS: dict[str, tuple[str, Tone, str]] = {
+    "meets": ("meets", "good", "\u2713"),
+    "fails": ("does not meet", "bad", "\u2717"),
+    "infeasible": ("does not meet", "bad", "\u2717"),
+    "indeterminate": ("open", "warn", "?"),
+}
+
+
+def repair_nodes(found: DiagnosisAndDesign) -> list[Node]:
+    """The cheapest that meets in a sentence, then the best of each kind."""
+    rows = found.repairs or ()
+    if not rows:
+        return []
+    heads = ("Price #", "Error #", "Verdict", "What to do", "Provided that")
+    shown = table("Repairs", heads, [_row(one) for one in rows])
+    return [Text(_sentence(rows)), *show(shown, silent=True)]
+
+
+def _sentence(rows: tuple[Repair, ...]) -> str:
+    best = next((one for one in rows if one.cheapest), None)
+    if best is None:
+        return "None of these meets every requirement."
+    price = "at no cost for parts" if not best.price else f"for {_money(best)}"
+    steps = " and ".join(step.text for step in best.steps)
+    return f"The cheapest that meets every requirement, {price}: {steps}."
+
+
+def _money(one: Repair) -> str:
+    return numbers.to_the_cent(one.price, one.currency)
+
+
+def _row(one: Repair) -> tuple[Cell | str, ...]:
+    word, tone, mark = WORDS[one.verdict]
+    missed = f": {', '.join(one.misses)}" if one.misses else ""
+    return (
+        Cell(_money(one), one.price),
+        Cell(numbers.length(one.error_m), one.error_m),
+        Cell(word + missed, tone=tone, mark=mark),
+        "; ".join(step.text for step in one.steps),
+        "; ".join(dict.fromkeys(step.assumes for step in one.steps if step.assumes)),
+    )
