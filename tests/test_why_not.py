@@ -17,7 +17,7 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.cli.app import app
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.render_console import console
-from syncline_design.spec.load import Case, load_text
+from syncline_design.spec.load import BadInput, Case, load_text
 from syncline_design.verdict.admitted import kinds_of, with_whole_catalog
 from syncline_design.verdict.optimise import OptimizeSettings, optimize
 from syncline_design.verdict.why_not import Answer, Asked, HeldBack, NotTaken, why_not
@@ -172,3 +172,10 @@ def test_the_command_says_what_the_entry_says_and_what_is_asked(tmp_path: Path) 
     code, text = said("--why-not", "livox_mid36")
     assert code == 2
     assert "--why-not livox_mid36: no such entry in the catalogs; did you mean" in text
+
+
+def test_a_spec_of_several_scenarios_is_not_answered_in_silence() -> None:
+    spec = yaml.safe_load((SPECS / "position_track.yaml").read_text("utf-8"))
+    spec["choose_for"] = "always"
+    with pytest.raises(BadInput, match="answered for one mission at nominal figures"):
+        optimize(case_of(spec), OptimizeSettings(why_not=("trimble_r12_rtk",)))

@@ -36,6 +36,7 @@ from syncline_design.machine.records import Named, Record, optional
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
+from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
@@ -177,6 +178,7 @@ class Optimised:
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best designs of a spec; pinned roles stay as they are."""
     if is_family(case):
+        _refuse_questions(case, settings)
         from syncline_design.verdict.optimise_family import optimize_family
 
         return optimize_family(case, settings)
@@ -227,6 +229,16 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         return found
     of_cost = points if settings.pareto and settings.resource == "cost" else None
     return replace(found, verdict=open_verdict(case, problem, picked, checking, points=of_cost))
+
+
+def _refuse_questions(case: Case, settings: OptimizeSettings) -> None:
+    """BadInput where an entry is asked about and the spec holds in more than one scenario."""
+    if settings.why_not:
+        key = "missions" if case.missions else "choose_for"
+        message = "why an entry is not in the design is answered for one mission at nominal figures"
+        place = (str(case.path), *case.position((key,)), key)
+        hint = "ask a spec of one mission, without choose_for"
+        raise BadInput((Flaw(*place, message, hint=hint),))
 
 
 def _questions(case: Case, settings: OptimizeSettings) -> tuple[Case, Kinds]:
