@@ -15,6 +15,7 @@ import pytest
 # its own (test_diagnose_checks), which starts its processes with a number of threads of its own.
 for _library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{_library}_NUM_THREADS", "1")
+os.environ["COLUMNS"] = "200"  # of the console, unless a test says another width
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 # Every command that a test starts in a process of its own would compile the package anew where

@@ -118,7 +118,10 @@ def test_only_a_page_draws_and_each_output_takes_what_reaches_it() -> None:
         html(document)
 
 
-def test_console_says_the_answer_first_and_lines_columns_up() -> None:
+def test_console_says_the_answer_first_and_lines_columns_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setenv("COLUMNS", str(WIDTH))
     rows = [["a", Cell("1", 1.0), "short"], ["longer", Cell("22\u00a0m", 22.0), "word " * 60]]
     document = d.Document(
         "Family", d.Outcome("good", "\u2713", "Meets"), "My system", ("One sentence.",),

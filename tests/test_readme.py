@@ -21,6 +21,7 @@ def test_the_spec_shown_is_the_shipped_one() -> None:
 
 def test_the_verdict_shown_is_what_check_prints(monkeypatch) -> None:  # type: ignore[no-untyped-def]
     monkeypatch.chdir(ROOT)
+    monkeypatch.setenv("COLUMNS", "100")
     shown = re.search(r"\$ syncline-design (check .*?)\n(.*?)```", README, re.DOTALL)
     assert shown is not None
     done = CliRunner().invoke(app, shown.group(1).split())

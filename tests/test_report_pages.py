@@ -181,7 +181,7 @@ def test_diagnosis_verdicts(verdict: str, words: str) -> None:
         (0.0871, 0.0003, "s", "87.1 \u00b1 0.3 ms"),
         (-0.37, 0.0123, "m", "\u221237.0 \u00b1 1.2 cm"),
         (0.35312, 0.0021, "m", "35.31 \u00b1 0.21 cm"),
-        (math.radians(0.25), math.radians(0.011), "rad", "250 \u00b1 11 mdeg"),
+        (math.radians(0.25), math.radians(0.011), "rad", "0.250 \u00b1 0.011 deg"),
         (1e-5, 2e-4, "s", "10 \u00b1 200 \u00b5s"),
         (3.0, None, "", "3"),
         (18.0, 0.0, "s", "18 s"),

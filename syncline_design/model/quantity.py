@@ -35,7 +35,7 @@ _TO = re.compile(r"\s\.\.\s")
 _ESTIMATE_LADDERS: dict[str, tuple[tuple[str, float], ...]] = {
     "s": (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)),
     "m": (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)),
-    "rad": (("deg", math.pi / 180.0), ("mdeg", math.pi / 180e3)),
+    "rad": (("deg", math.pi / 180.0),),
     "rad/s": (("deg/s", math.pi / 180.0), ("deg/h", math.pi / 648e3)),
     "m/(m/s2)": (("m/(m/s2)", 1.0), ("mm/(m/s2)", 1e-3)),
     "": (("", 1.0), ("ppm", 1e-6)),

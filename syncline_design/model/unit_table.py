@@ -112,9 +112,9 @@ SPELLINGS = {
 LADDERS: dict[Dimension, tuple[str, ...]] = {
     _D.LENGTH: ("nm", "um", "mm", "m", "km"),
     _D.TIME: ("ps", "ns", "us", "ms", "s"),
-    _D.ANGLE: ("mdeg", "deg"),
+    _D.ANGLE: ("deg",),
     _D.SPEED: ("um/s", "mm/s", "m/s"),
-    _D.ANGULAR_RATE: ("mdeg/s", "deg/s"),
+    _D.ANGULAR_RATE: ("deg/s",),
     _D.MASS: ("mg", "g", "kg"),
     _D.POWER: ("uW", "mW", "W", "kW"),
     _D.RATIO: ("ppb", "ppm", "%"),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from textwrap import wrap
+from collections.abc import Iterable, Iterator, Sequence
+from shutil import get_terminal_size
 from typing import Final
 
+from syncline_design.report.console_table import Paint, fitted, folded, one_line
 from syncline_design.report.document import (
     Document,
     Facts,
@@ -21,14 +22,12 @@ from syncline_design.report.document import (
     for_output,
     plain,
 )
-from syncline_design.report.table import Head, Table, Tone, cell_words
-from syncline_design.report.text import visible
+from syncline_design.report.table import Table
 
-WIDTH: Final = 110  # columns of a paragraph, and of a table as far as its last one can be wrapped
-_LEAST: Final = 30  # columns of a wrapped cell
+WIDTH: Final = 110  # columns of a paragraph at most: longer lines are hard to read
+NO_TERMINAL: Final = (80, 24)
+_LEAST: Final = 40  # columns of a terminal that is narrower still
 _CODES: Final = {"good": "32", "bad": "31", "warn": "33"}
-
-Paint = Callable[[str, str], str]
 
 
 def console(document: Document, *, colour: bool | None = None) -> str:
@@ -36,8 +35,15 @@ def console(document: Document, *, colour: bool | None = None) -> str:
     paint = _painter(colour)
     shown = for_output(document, "text")
     blocks = [_answer(shown, paint)]
-    blocks += [[_shown(s.title), *_lines(s.nodes, "  ", paint)] for s in shown.sections]
+    blocks += [
+        [*_wrapped(s.title, "  ", ""), *_lines(s.nodes, "  ", paint)] for s in shown.sections
+    ]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
+
+
+def columns() -> int:
+    """Of the terminal, or of COLUMNS; 80 where there is none."""
+    return max(get_terminal_size(NO_TERMINAL).columns, _LEAST)
 
 
 def supports_colour() -> bool:
@@ -53,46 +59,45 @@ def _painter(colour: bool | None) -> Paint:
 
 
 def _shown(words: Inline) -> str:
-    """One line: harmless, and with the spaces that terminals know."""
-    return visible(plain(words)).replace("\u00a0", " ")
+    return one_line(plain(words))
 
 
 def _answer(document: Document, paint: Paint) -> list[str]:
     outcome = document.outcome
     source = f" ({_shown(document.source)})" if document.source else ""
-    said = paint(f"{outcome.mark} {_shown(outcome.word)}", outcome.tone)
-    lines = [f"{_shown(document.name)}{source}: {said}"]
+    subject = f"{_shown(document.name)}{source}:"
+    first, *more = folded(f"{subject} {outcome.mark} {plain(outcome.word)}", columns(), "", "    ")
+    head = subject if first.startswith(subject) else first
+    lines = [head + paint(first[len(head) :], outcome.tone)]
+    lines += [paint(line, outcome.tone) for line in more]
     for words in document.sentences:
-        lines += _wrapped(_shown(words), "  ")
+        lines += _wrapped(plain(words), "  ")
     return [*lines, *_pairs(document.facts, "  ")]
 
 
 def _wrapped(text: str, indent: str, first: str | None = None) -> list[str]:
-    start = indent if first is None else first
-    return wrap(
-        text, WIDTH, initial_indent=start, subsequent_indent=indent,
-        break_long_words=False, break_on_hyphens=False,
-    )  # fmt: skip
+    return folded(text, min(columns(), WIDTH), indent if first is None else first, indent)
 
 
 def _lines(nodes: Iterable[Node], indent: str, paint: Paint) -> Iterator[str]:
     for node in nodes:
         match node:
             case Heading():
-                aside = f" ({_shown(node.aside)})" if plain(node.aside) else ""
-                yield f"{indent}{_shown(node.words)}{aside}"
+                aside = f" ({plain(node.aside)})" if plain(node.aside) else ""
+                yield from _wrapped(f"{plain(node.words)}{aside}", f"{indent}  ", indent)
             case Text():
                 mark = f"{paint(node.mark, node.tone)} " if node.mark else ""
-                yield from _wrapped(_shown(node.words), indent, indent + mark)
+                yield from _wrapped(plain(node.words), indent, indent + mark)
             case Facts(look="terms"):
                 for label, value in node.pairs:
-                    yield from _wrapped(_shown(label), indent)
-                    yield from _wrapped(_shown(value), f"{indent}  ")
+                    yield from _wrapped(plain(label), indent)
+                    yield from _wrapped(plain(value), f"{indent}  ")
             case Facts():
                 yield from _pairs(node.pairs, indent)
             case Items():
                 mark = paint(node.mark, node.tone) if node.mark else "-"
-                yield from (f"{indent}{mark} {_shown(entry)}" for entry in node.entries)
+                for entry in node.entries:
+                    yield from _wrapped(plain(entry), f"{indent}  ", f"{indent}{mark} ")
             case TableNode():
                 yield from table_lines(node.table, indent, paint, silent=node.silent)
             case Group():
@@ -104,40 +109,26 @@ def _lines(nodes: Iterable[Node], indent: str, paint: Paint) -> Iterator[str]:
 def _pairs(pairs: Sequence[tuple[str, Inline]], indent: str) -> Iterator[str]:
     """Label and value, the values lined up."""
     width = max((len(_shown(label)) for label, _ in pairs), default=0) + 2
+    narrow = width > columns() // 2
     for label, value in pairs:
+        if narrow:
+            yield from _wrapped(f"{label}: {plain(value) or '-'}", f"{indent}  ", indent)
+            continue
         head = f"{indent}{_shown(label).ljust(width)}"
-        yield from _wrapped(_shown(value) or "-", " " * len(head), head)
+        yield from _wrapped(plain(value) or "-", " " * len(head), head)
 
 
 def table_lines(
     shown: Table, indent: str = "", paint: Paint | None = None, *, silent: bool = False
 ) -> Iterator[str]:
-    """A table with its columns lined up; a long last column goes on below itself."""
+    """A table with its columns lined up, no wider than the terminal."""
     if not silent:
-        yield f"{indent}{_shown(shown.caption)}"
+        yield from _wrapped(shown.caption, f"{indent}  ", indent)
         indent += "  "
-    rows: list[tuple[list[str], list[Tone]]] = [
-        ([_shown(head.text) for head in shown.heads], [""] * len(shown.heads)),
-        *(([_shown(cell_words(c)) for c in row], [c.tone for c in row]) for row in shown.rows),
-    ]
-    widths = [max(map(len, column)) for column in zip(*(texts for texts, _ in rows), strict=True)]
-    left = len(indent) + sum(width + 2 for width in widths[:-1])
-    for texts, tones in rows:
-        last = shown.heads[-1].numeric
-        ends = [texts[-1]] if last else wrap(texts[-1], max(WIDTH - left, _LEAST)) or [""]
-        cells = [*texts[:-1], ends[0]]
-        padded = [
-            _padded(*cell, paint) for cell in zip(cells, widths, tones, shown.heads, strict=True)
-        ]
-        yield (indent + "  ".join(padded)).rstrip()
-        yield from (" " * left + more for more in ends[1:])
+    for line in fitted(shown, columns() - len(indent), paint):
+        yield f"{indent}{line}".rstrip()
     if shown.note:
-        yield from _wrapped(_shown(shown.note), indent)
-
-
-def _padded(text: str, width: int, tone: Tone, head: Head, paint: Paint | None) -> str:
-    aligned = text.rjust(width) if head.numeric else text.ljust(width)
-    return paint(aligned, tone) if paint else aligned
+        yield from _wrapped(shown.note, indent)
 
 
 def aligned(rows: Sequence[Sequence[str]], indent: int = 2) -> list[str]:

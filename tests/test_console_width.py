@@ -1,0 +1,91 @@
+"""What a command prints fits the terminal, whatever its width, and says the same."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import pytest
+
+from syncline_design.report import render_console
+from syncline_design.report.console_table import fitted, folded
+from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.table import table
+from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.verify import CheckSettings
+from tests.checked import check_file
+
+ROOT = Path(__file__).resolve().parent.parent
+SPECS = ("usv_wire_missing", "infeasible_example", "rov_relay")
+WIDTHS = (40, 60, 80, 100, 160)
+
+
+@functools.cache
+def verdict_of(name: str) -> Verdict:
+    return check_file(ROOT / "specs" / f"{name}.yaml", CheckSettings(monte_carlo=False))
+
+
+def said(name: str, width: int, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.setenv("COLUMNS", str(width))
+    return render_console.console(on_verdict(verdict_of(name)), colour=False)
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("name", SPECS)
+def test_no_line_is_wider_than_the_terminal(
+    name: str, width: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for line in said(name, width, monkeypatch).splitlines():
+        words = line.split()
+        # only a word that fits in no line, a path for instance, may stand out
+        assert len(line) <= width or max(map(len, words)) + len(line) - len(line.lstrip()) > 28
+
+
+@pytest.mark.parametrize("name", SPECS)
+def test_every_word_is_said_at_every_width(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    wide = set(said(name, 400, monkeypatch).split())
+    first_heads = {"Requirement", "Role", "Stage", "Figure", "Model", "Term", "Sensor", "Option"}
+    for width in WIDTHS:  # rows that became records name themselves without the first head
+        assert wide - set(said(name, width, monkeypatch).split()) <= {"\u2014", *first_heads} | {
+            word for word in wide if word + ":" in said(name, width, monkeypatch)
+        }
+
+
+def test_without_a_terminal_there_are_80_columns(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("COLUMNS")
+    monkeypatch.setattr("sys.__stdout__", None)
+    assert render_console.columns() == 80
+    monkeypatch.setenv("COLUMNS", "7")
+    assert render_console.columns() == 40
+
+
+def test_columns_give_way_at_words_and_figures_stay_with_their_units() -> None:
+    shown = table(
+        "T", ("Name", "Value #", "What it says"),
+        [("one two", "12.5\u00a0mm", "a b c d e f"), ("three", "7\u00a0m", "g")],
+    )  # fmt: skip
+    assert list(fitted(shown, 40)) == [
+        "Name       Value  What it says",
+        "one two  12.5 mm  a b c d e f",
+        "three        7 m  g",
+    ]
+    assert list(fitted(shown, 25)) == [
+        "Name       Value  What it",
+        "                  says",
+        "one two  12.5 mm  a b c d",
+        "                  e f",
+        "three        7 m  g",
+    ]
+    assert list(fitted(shown, 18)) == [
+        "one two",
+        "  Value: 12.5 mm",
+        "  What it says: a",
+        "    b c d e f",
+        "three",
+        "  Value: 7 m",
+        "  What it says: g",
+    ]
+
+
+def test_a_word_longer_than_the_line_is_not_broken() -> None:
+    assert folded("see /a/very/long/path.yaml now", 10) == ["see", "/a/very/long/path.yaml", "now"]
