@@ -305,7 +305,7 @@ def test_the_statistics_are_those_of_dense_least_squares(tmp_path: Path) -> None
         one = examined(inputs, DiagnosisSettings(max_effects=1))
         data, model, states = one.data, one.result.model, one.search.states
         found = sufficient(data, model, states)
-    level, time_s = shown_level(data, model), data.view.log.time_s
+    level, time_s = shown_level(data, model, model.error), data.view.log.time_s
     n = len(time_s)
     dense = np.zeros((n, 3, n, 3))
     dense[np.arange(n), :, np.arange(n), :] = row_covariance(data.structure, level)

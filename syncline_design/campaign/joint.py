@@ -14,9 +14,9 @@ from syncline_design.campaign.store import (
     Entry,
     Stored,
     add_run,
+    demand_known,
     demand_system,
     read_store,
-    refused,
 )
 from syncline_design.campaign.telling import Told, tell
 from syncline_design.diagnosis.consequence import promise_of
@@ -119,15 +119,9 @@ def _demand_different(request: JointRequest, stored: Stored | None) -> None:
         if digest in known:
             raise JointError(f"{path}: the same log as {known[digest]}; expected each run once")
         known[digest] = path
-    for one in stored.entries if stored is not None else ():
-        if one.run.sha256 in known:
-            path = known[one.run.sha256]
-            raise refused(
-                stored.path if stored is not None else path,
-                f"{path}: this run is in the store already, as number {one.number} "
-                f"({', '.join(one.run.files)})",
-                "a log that was not added before",
-            )
+    if stored is not None:
+        for digest, path in known.items():
+            demand_known(stored, digest, [path])
 
 
 def _demand_unlike(run: Run, entries: Sequence[Entry], path: Path) -> None:

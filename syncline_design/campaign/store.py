@@ -13,7 +13,7 @@ from __future__ import annotations
 import hashlib
 import itertools
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -155,17 +155,27 @@ def demand_system(stored: Stored, system: System, spec: str) -> None:
         )
 
 
+def demand_known(stored: Stored, sha256: str, files: Sequence[Path]) -> None:
+    """Refuse files that hold, to the byte, what a run of the store was read from."""
+    for one in stored.entries:
+        if one.run.sha256 == sha256:
+            raise _twice(stored.path, ", ".join(map(str, files)), one)
+
+
+def _twice(path: Path, files: str, one: Entry) -> BadInput:
+    return refused(
+        path,
+        f"{files}: this run is in the store already, as number {one.number} "
+        f"({', '.join(one.run.files)})",
+        "a log that was not added before",
+    )
+
+
 def demand_new(stored: Stored | None, run: Run, path: Path) -> None:
     """Refuse a run that the store holds."""
     for one in stored.entries if stored is not None else ():
         if run.sha256 == one.run.sha256 or run.fingerprint == one.run.fingerprint:
-            files = ", ".join(run.files)
-            raise refused(
-                path,
-                f"{files}: this run is in the store already, as number {one.number} "
-                f"({', '.join(one.run.files)})",
-                "a log that was not added before",
-            )
+            raise _twice(path, ", ".join(run.files), one)
 
 
 def add_run(path: Path, name: str, system: System, run: Run, start: str | None = None) -> None:

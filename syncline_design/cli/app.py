@@ -22,6 +22,7 @@ from syncline_design.cli import (
     library,
     logs,
     stamps,
+    watching,
 )
 from syncline_design.cli.shared import NO_VERDICT
 from syncline_design.machine.processes import forget_working_folder
@@ -58,6 +59,7 @@ app.command("check")(design.check)
 app.command("optimize")(design.optimize)
 app.command("simulate")(evidence.simulate)
 app.command("diagnose")(evidence.diagnose)
+app.command("watch")(watching.watch)
 app.command("plan")(drives.plan)
 app.command("study")(design.study)
 app.command("diff")(design.diff)

@@ -63,6 +63,7 @@ AcceptOutput = Annotated[list[str] | None, output_option(formats.ACCEPT_FORMATS)
 LogOutput = Annotated[list[str] | None, output_option(formats.LOG_FORMATS)]
 AuditOutput = Annotated[list[str] | None, output_option(formats.AUDIT_FORMATS)]
 TimingOutput = Annotated[list[str] | None, output_option(formats.TIMING_FORMATS)]
+WatchOutput = Annotated[list[str] | None, output_option(formats.WATCH_FORMATS)]
 PlanOutput = Annotated[list[str] | None, output_option(formats.PLAN_FORMATS)]
 ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FORMATS)]
 

@@ -23,10 +23,11 @@ from syncline_design.diagnosis.candidates import Candidate, candidates, signatur
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import SLOW_LEAST, NoiseLevel, Structure, precision
 from syncline_design.diagnosis.slow_states import LEAST_BLOCKS, LOST, SHOWN_NATS, States
+from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.record import Array
 
 FAR = 1.6  # root mean square of a row's whitened components, from where on a row counts less
-REWEIGHTED = 2
+REWEIGHTED = 1
 LEAST_WEIGHT = 1e-3
 Seen = NDArray[np.bool_]
 Label = tuple[str, str, int, str]  # effect, sensor, stage, parameter
@@ -67,22 +68,36 @@ def sufficient(data: Data, model: Model, states: States) -> Sufficient:
     ]
     labels = tuple((*c.label, p.name) for c in listed for p in c.effect.slopes())
     columns, point = _columns(data, model, listed)
-    own = [a for a in model.acting if a.label not in {c.label for c in listed}]
-    model = replace(model, level=shown_level(data, model))
+    known = {c.label for c in listed}  # what acts in a part of the log is the log's own
+    own = [a for a in model.acting if a.label not in known or span_of(a.effect) is not None]
     nuisance = np.nan_to_num(slopes(data.view, own)) if own else np.zeros((*columns.shape[:2], 0))
     every = np.concatenate(
         [nuisance, states.courses, columns, model.error[:, :, None]], axis=2
     ) * _compared(data)
+    model = replace(model, level=shown_level(data, model, _left(data, model, nuisance, columns)))
     return _freed(data, model, states, labels, every, nuisance.shape[2], point)
 
 
-def shown_level(data: Data, model: Model) -> NoiseLevel:
+def _left(data: Data, model: Model, nuisance: Array, columns: Array) -> Array:
+    """What no value of any effect explains (n, 3): noise is judged by it.
+
+    An effect too small to be named alone would pass for slow noise and widen its own interval.
+    """
+    every = np.concatenate([nuisance, columns, model.error[:, :, None]], axis=2) * _compared(data)
+    total = _Sums.of(data, model, every, np.ones(len(every))).total
+    values = _solved(total, np.zeros(total.shape[0] - 1))
+    left: Array = every[:, :, -1] - every[:, :, :-1] @ values
+    return left
+
+
+def shown_level(data: Data, model: Model, left: Array) -> NoiseLevel:
     """The fitted noise without the slow parts that do not raise the likelihood by SHOWN_NATS.
 
-    A fit finds some slow noise in every log; what is not shown would only widen every interval.
+    left (n, 3): what is judged by it.  A fit finds some slow noise in every log; what is not shown
+    would only widen every interval.
     """
     level = model.level
-    nll = _nll(data, model, level)
+    nll = _nll(data, left, level)
     for k, part in enumerate(data.structure.slow):
         index = [w.sensor for w in data.structure.white].index(part.sensor)
         share = float(np.mean(level.slow[k])) * max(1.0, level.factor[index]) ** 2
@@ -91,15 +106,15 @@ def shown_level(data: Data, model: Model) -> NoiseLevel:
         slow = list(level.slow)
         slow[k] = tuple(SLOW_LEAST for _ in slow[k])
         trial = replace(level, factor=tuple(factor), slow=tuple(slow))
-        found = _nll(data, model, trial)
+        found = _nll(data, left, trial)
         if found < nll + SHOWN_NATS:
             level, nll = trial, found
     return level
 
 
-def _nll(data: Data, model: Model, level: NoiseLevel) -> float:
+def _nll(data: Data, left: Array, level: NoiseLevel) -> float:
     known = precision(replace(data.structure, survey=None), level)
-    return known.negative_log_likelihood(model.scatter)
+    return known.negative_log_likelihood(left)
 
 
 def _compared(data: Data) -> Array:
@@ -109,7 +124,7 @@ def _compared(data: Data) -> Array:
 
 def _columns(data: Data, model: Model, listed: Sequence[Candidate]) -> tuple[Array, Array]:
     """Slopes (n, 3, p) at the point of the model, and the point (p,)."""
-    acting = {a.label: a for a in model.acting}
+    acting = {a.label: a for a in model.acting if span_of(a.effect) is None}
     parts, point = [np.zeros((len(data.view), 3, 0))], []
     for c in listed:
         one = acting.get(c.label)
@@ -133,11 +148,11 @@ def _freed(
     weight = np.ones(len(data.view))
     for _ in range(REWEIGHTED):
         sums = _Sums.of(data, model, every, weight)
-        prior = states.shown_prior(sums.total, width, model.level)
+        prior = _prior(states, sums.total, width, model.level)
         weight, scale2 = _weights(data, model, every, sums.total, prior)
     sums = _Sums.of(data, model, every, weight)
-    prior = states.shown_prior(sums.total / scale2, width, model.level)
     total = sums.total / scale2
+    prior = _prior(states, total, width, model.level)
     whole = freed(total, prior)
     seen = np.diag(whole)[:-1] > LOST * np.diag(total)[fixed:-1]
     groupings = [states.block] if states.seen is None else [states.block, states.seen]
@@ -150,6 +165,16 @@ def _freed(
     x = every[:, :, fixed:-1].reshape(-1, len(labels))
     gram = x.T @ x / max(len(data.view), 1)
     return Sufficient(labels, normal[0], score[0], float(square[0]), gram, tuple(less))
+
+
+def _prior(states: States, total: Array, width: int, level: NoiseLevel) -> Array:
+    """Prior precision of the nuisance and of the courses, their sizes found beside all effects."""
+    fixed = width + states.courses.shape[2]
+    last = total.shape[0] - 1
+    order = np.r_[0:width, fixed:last, width:fixed, last]
+    free = last - states.courses.shape[2]
+    found = states.shown_prior(total[np.ix_(order, order)], free, level)
+    return np.concatenate([np.zeros(width), found[free:]])
 
 
 def _less(matrices: Array, seen: Seen, point: Array) -> Less:
@@ -228,14 +253,9 @@ def _weighted(structure: Structure, weight: Array) -> Structure:
 def _weights(
     data: Data, model: Model, every: Array, total: Array, prior: Array
 ) -> tuple[Array, float]:
-    """Weights of rows by what the fixed part and the slow noise leave of them, and its variance."""
-    k = prior.shape[0]
-    inner = total[:k, :k] + np.diag(prior)
-    scale = np.sqrt(np.maximum(np.diag(inner), 1e-300))
-    values = np.linalg.pinv(inner / scale[:, None] / scale, rcond=1e-12, hermitian=True) @ (
-        total[:k, -1] / scale
-    )
-    error = every[:, :, -1] - every[:, :, :k] @ (values / scale)
+    """Weights of rows by what effects and slow noise leave of them, and the variance of that."""
+    every_prior = np.concatenate([prior, np.zeros(total.shape[0] - 1 - prior.shape[0])])
+    error = every[:, :, -1] - every[:, :, :-1] @ _solved(total, every_prior)
     known = precision(replace(data.structure, survey=None), model.level)
     left = (error - known.slow_part(error)) * _compared(data)[:, :, 0]
     solved = (known.white_inverse @ left[:, :, None])[:, :, 0]
@@ -245,6 +265,16 @@ def _weights(
     far = size / max(usual, 1e-300)
     weight = np.maximum(np.minimum(1.0, FAR / np.maximum(far, FAR)), LEAST_WEIGHT)
     return weight, max(usual**2, 0.25)
+
+
+def _solved(total: Array, prior: Array) -> Array:
+    """Values of all columns but the last, which is the error."""
+    inner = total[:-1, :-1] + np.diag(prior)
+    scale = np.sqrt(np.maximum(np.diag(inner), 0.0))
+    scale = np.where(scale == 0.0, 1.0, scale)
+    inverse = np.linalg.pinv(inner / scale[:, None] / scale, rcond=1e-10, hermitian=True)
+    values: Array = inverse @ (total[:-1, -1] / scale) / scale
+    return values
 
 
 def _usual_size(count: float) -> float:

@@ -19,6 +19,7 @@ LOG_FORMATS: Final = ("json", "html", "markdown")
 AUDIT_FORMATS: Final = ("json", "html", "markdown")
 PLAN_FORMATS: Final = ("json", "html", "markdown", "csv", "kml", "qgc")
 GEODETIC_FORMATS: Final = ("kml", "qgc")  # of a plan: they need an origin on the globe
+WATCH_FORMATS: Final = ("json", "html", "markdown")
 CATALOG_FORMATS: Final = ("json",)
 
 # Pages and binary tables are for files; a bare format name does not send them to a terminal.
@@ -43,4 +44,5 @@ ResultName = Literal[
     "timing",
     "verdict",
     "verdicts",
+    "watch",
 ]

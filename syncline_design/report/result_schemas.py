@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Final, get_args
 
 from syncline_design.auditing import result as auditing
+from syncline_design.campaign import watch_result
 from syncline_design.clocks import result as clocks
 from syncline_design.comparison import acceptance, clock_meaning, difference, meaning
 from syncline_design.diagnosis import result as diagnosis
@@ -39,6 +40,7 @@ RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "timing": (clock_meaning.TimingAndSpec, clocks.SCHEMA),
     "verdict": (verdict.Checked, verdict.SCHEMA),
     "verdicts": (verdict.Verdicts, verdict.SEVERAL_SCHEMA),
+    "watch": (watch_result.Watch, watch_result.SCHEMA),
 }
 RESULT_NAMES: Final[tuple[ResultName, ...]] = get_args(ResultName)
 

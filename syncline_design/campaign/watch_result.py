@@ -1,0 +1,146 @@
+"""What `watch` says: typed, and written as JSON (schema syncline-design/watch/v1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Final, Literal
+
+from syncline_design.diagnosis.result import LogOutcome, SpecRead
+from syncline_design.machine.records import Named, Record, optional
+
+SCHEMA: Final = "syncline-design/watch/v1"
+WatchOutcome = Literal["unchanged", "alarm"]
+
+
+@dataclass(frozen=True, slots=True)
+class RunValue(Record):
+    """A parameter as one run alone tells it, in SI; null where it says nothing of it."""
+
+    effect: str
+    sensor: str
+    stage: str
+    parameter: str
+    value: float
+    standard_uncertainty: float | None
+    interval95: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedRun(Record):
+    """One run: its number from 1 in the order of adding, and what it tells alone.
+
+    baseline: which baseline it belongs to, from 1.  e_value: the evidence for a change up to this
+    run, since its baseline; null of the first.  new: whether this call added it.
+    """
+
+    run: int
+    files: tuple[str, ...]
+    date: str | None
+    start: str
+    rows: int
+    verdict: LogOutcome
+    named: tuple[str, ...]
+    baseline: int
+    e_value: float | None
+    new: bool
+    values: tuple[RunValue, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Since(Record):
+    """The first run that has a change, and between which runs it lies with 95 %.
+
+    low, high: numbers of runs; low_date, high_date: their dates, where they have some.
+    """
+
+    run: int
+    file: str
+    date: str | None
+    low: int
+    high: int
+    low_date: str | None
+    high_date: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Other(Record):
+    """Another effect whose change explains the runs as well; nats_worse: by how much less."""
+
+    effect: str
+    sensor: str
+    stage: str
+    nats_worse: float
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm(Record):
+    """One parameter that changed: by how much, in SI, and since when.
+
+    words: a convention that is another, which has no figure; then `change` is null.  text: the
+    change as outputs print it.  first_run: at which run the alarm was first due.
+    """
+
+    effect: str
+    sensor: str
+    stage: str
+    parameter: str
+    change: float | None
+    standard_uncertainty: float | None
+    interval95: tuple[float, float] | None
+    unit: str
+    text: str
+    since: Since
+    evidence: str
+    e_value: float | None
+    first_run: int
+    aliases: tuple[Other, ...]
+    words: str | None = optional()
+
+
+@dataclass(frozen=True, slots=True)
+class WatchRule(Record):
+    """How an alarm is raised: at this e-value, with this chance of a false one over all looks."""
+
+    method: str
+    false_alarm_rate: float
+    threshold: float
+    looks: int
+
+
+@dataclass(frozen=True, slots=True)
+class WatchProvenance(Record):
+    """What the answer depends on."""
+
+    version: str
+    spec_sha256: str
+    catalogs_sha256: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Watch(Record):
+    """The runs of one system, and what changed.
+
+    baseline_after: how many runs lie before the baseline that counts.  ordered_by: whether runs
+    are in the order of their dates.  cautions: what is odd in the last run and no change.
+    last: hash of the store's last line.  torn: bytes of a line that a kill had left.
+    """
+
+    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
+    verdict: WatchOutcome
+    spec: SpecRead
+    store: str
+    runs: tuple[WatchedRun, ...]
+    alarms: tuple[Alarm, ...]
+    e_value: float | None
+    rule: WatchRule
+    baseline_after: int
+    ordered_by: Literal["date", "adding"]
+    cautions: tuple[str, ...]
+    last: str
+    torn: int
+    provenance: WatchProvenance
+
+    @property
+    def exit_code(self) -> int:
+        """0 nothing changed, 1 something did."""
+        return 1 if self.alarms else 0

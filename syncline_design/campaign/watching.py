@@ -1,0 +1,363 @@
+"""A store of runs watched over time: `watch STORE SPEC FILE`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from syncline_design import __version__
+from syncline_design.campaign.adding import content_hash, run_of
+from syncline_design.campaign.changes import Change, Changes
+from syncline_design.campaign.joint import JointError
+from syncline_design.campaign.naming import Naming
+from syncline_design.campaign.pool import Pool, Scoped, Term, fitted, inverted, pool_of
+from syncline_design.campaign.store import (
+    Entry,
+    Stored,
+    add_baseline,
+    add_run,
+    by_date,
+    demand_known,
+    demand_new,
+    demand_system,
+    read_store,
+    refused,
+)
+from syncline_design.campaign.watch_result import (
+    Alarm,
+    Other,
+    RunValue,
+    Since,
+    Watch,
+    WatchedRun,
+    WatchProvenance,
+    WatchRule,
+)
+from syncline_design.diagnosis.candidates import commonness
+from syncline_design.diagnosis.consequence import promise_of
+from syncline_design.diagnosis.findings import estimate
+from syncline_design.diagnosis.result import SpecRead
+from syncline_design.diagnosis.search import DiagnosisSettings, Progress, silent
+from syncline_design.diagnosis.slow_states import NORMAL_95
+from syncline_design.diagnosis.system import pinned_system
+from syncline_design.effects.record import Array
+from syncline_design.machine.deadline import in_force
+from syncline_design.machine.linear_algebra import one_thread
+from syncline_design.spec.case import Case
+
+RATE: Final = 0.05
+METHOD: Final = (
+    "e-process: Bayes factors of a change of each effect from each run on, mixed; false alarms "
+    "count over all looks since a baseline (Ville's inequality)"
+)
+AS_GOOD_NATS: Final = 2.0
+RIVAL_NATS: Final = 3.0
+MOST_CHANGES: Final = 4
+CREDIBLE: Final = 0.95
+NOISIER: Final = 1.5  # times the median of the runs before
+SHOWN: Final = 2.0  # standard uncertainties from which a parameter of a changed effect is told
+
+
+@dataclass(frozen=True, slots=True)
+class WatchRequest:
+    """A store and the files of one more run; none: look at the store again."""
+
+    store: Path
+    files: tuple[Path, ...] = ()
+    rate: float = RATE
+
+
+def watch(
+    case: Case,
+    request: WatchRequest,
+    settings: DiagnosisSettings | None = None,
+    progress: Progress = silent,
+) -> Watch:
+    """Add a run to a store, and say what changed since when.
+
+    Raises BadInput for a spec, a log or a store that cannot be used.
+    """
+    with one_thread():
+        system = pinned_system(case)
+        stored = read_store(request.store)
+        if stored is not None:
+            demand_system(stored, system, case.spec.name)
+        torn = 0 if stored is None else stored.torn
+        before = 0 if stored is None else len(stored.entries)
+        if request.files:
+            _add(case, request, stored, settings or DiagnosisSettings(), progress)
+            stored = read_store(request.store)
+        if stored is None or not stored.entries:
+            raise JointError(f"{request.store}: no runs yet; expected a FILE to add, or a store "
+                             "with runs")  # fmt: skip
+        in_force().doing("comparing the runs")
+        progress("comparing the runs", 0.9)
+        return _Watching(case, request, stored, before).told(torn)
+
+
+def accept(store: Path) -> Stored:
+    """Make a new baseline of a store: runs from now on are held against one another."""
+    stored = read_store(store)
+    if stored is None or not stored.entries:
+        raise refused(store, "no runs to accept", "a store that `watch` added runs to")
+    add_baseline(store)
+    found = read_store(store)
+    assert found is not None
+    return found
+
+
+def _add(
+    case: Case,
+    request: WatchRequest,
+    stored: Stored | None,
+    settings: DiagnosisSettings,
+    progress: Progress,
+) -> None:
+    if stored is not None:
+        demand_known(stored, content_hash(request.files), request.files)
+    progress("reading the run", 0.0)
+    run = run_of(case, request.files, settings, promise_of(case), progress)
+    demand_new(stored, run, request.store)
+    add_run(request.store, case.spec.name, pinned_system(case), run)
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A change that was seen: the best, at which look first, how sure, what else it could be."""
+
+    change: Change
+    low: int
+    high: int
+    first_look: int
+    log_evidence: float
+    others: tuple[tuple[Term, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class _Watching:
+    """A store looked at."""
+
+    case: Case
+    request: WatchRequest
+    stored: Stored
+    before: int
+
+    @cached_property
+    def ordered(self) -> tuple[Entry, ...]:
+        """Runs of the last baseline, in their order."""
+        after = self.stored.baselines[-1] if self.stored.baselines else 0
+        return tuple(by_date(tuple(e for e in self.stored.entries if e.number > after)))
+
+    @cached_property
+    def pool(self) -> Pool:
+        entries = self.ordered or self.stored.entries[-1:]
+        return pool_of([e.run.statistics() for e in entries], [e.start for e in entries])
+
+    @cached_property
+    def course(self) -> tuple[float, ...]:
+        """log E_n after each look, from the second run on."""
+        return tuple(self.changes.log_evidence(n)[0] for n in range(2, len(self.ordered) + 1))
+
+    @cached_property
+    def changes(self) -> Changes:
+        return Changes(self.pool)
+
+    @property
+    def threshold(self) -> float:
+        return -math.log(self.request.rate)
+
+    @cached_property
+    def seen(self) -> tuple[Seen, ...]:
+        """Changes that were alarmed at any look so far, the strongest first."""
+        first = next((k + 2 for k, e in enumerate(self.course) if e >= self.threshold), None)
+        if first is None:
+            return ()
+        found: list[Seen] = []
+        changes, look = self.changes, len(self.ordered)
+        while len(found) < MOST_CHANGES:
+            total, table = changes.log_evidence(look)
+            if found and total < self.threshold:
+                break
+            if not found and total < math.log(2.0):  # it went back: as it stood when it rang
+                total, table = changes.log_evidence(first)
+                one = _best(changes, first, table, first, total)
+                return (one,)
+            found.append(_best(changes, look, table, first, total))
+            changes = changes.without(found[-1].change)
+        return tuple(found)
+
+    def told(self, torn: int) -> Watch:
+        """All of it as a result."""
+        stored, case = self.stored, self.case
+        alarms = [a for one in self.seen for a in self._alarms(one)]
+        alarms += self._conventions()
+        dated = all(e.run.date is not None for e in self.ordered)
+        last = self.course[-1] if self.course else None
+        return Watch(
+            verdict="alarm" if alarms else "unchanged",
+            spec=SpecRead(case.spec.name, str(case.path)),
+            store=str(stored.path),
+            runs=tuple(self._runs()),
+            alarms=tuple(alarms),
+            e_value=None if last is None else math.exp(min(last, 690.0)),
+            rule=WatchRule(METHOD, self.request.rate, 1.0 / self.request.rate,
+                           max(len(self.ordered) - 1, 0)),
+            baseline_after=stored.baselines[-1] if stored.baselines else 0,
+            ordered_by="date" if dated else "adding",
+            cautions=tuple(self._cautions()),
+            last=stored.last,
+            torn=torn,
+            provenance=WatchProvenance(__version__, case.spec_sha256, case.catalogs_sha256),
+        )  # fmt: skip
+
+    def _stage(self, index: int) -> str:
+        return self.case.spec.stages[index].name
+
+    def _alarms(self, one: Seen) -> Iterator[Alarm]:
+        """An alarm for each parameter of an effect that clearly changed; at least the clearest."""
+        change, term = one.change, one.change.term
+        slopes = term.effect.slopes()
+        spread = np.sqrt(np.maximum(np.diag(change.covariance), 0.0))
+        size = np.abs(change.values) / np.where(spread > 0.0, spread, np.inf)
+        others = tuple(Other(*t.label[:2], self._stage(t.stage), worse) for t, worse in one.others)
+        for k in np.argsort(-size):
+            if size[k] < SHOWN and k != np.argmax(size):
+                continue
+            value, sigma = float(change.values[k]), float(spread[k])
+            half = NORMAL_95 * sigma
+            e_value = math.exp(min(one.log_evidence, 690.0))
+            shown = f"{e_value:.3g}" if one.log_evidence < 690.0 else "more than 1e299"
+            yield Alarm(
+                effect=term.effect.name,
+                sensor=term.sensor,
+                stage=self._stage(term.stage),
+                parameter=slopes[k].name,
+                change=value,
+                standard_uncertainty=sigma,
+                interval95=(value - half, value + half),
+                unit=slopes[k].unit,
+                text=estimate(value, sigma, slopes[k].unit).text,
+                since=self._since(change.k, one.low, one.high),
+                evidence=f"e-value {shown}, alarm from {1.0 / self.request.rate:.3g} on",
+                e_value=e_value,
+                first_run=self.ordered[one.first_look - 1].number,
+                aliases=others,
+            )
+
+    def _since(self, at: int, low: int, high: int) -> Since:
+        run, first, last = (self.ordered[k] for k in (at, low, high))
+        return Since(run.number, run.run.files[0], run.run.date, first.number, last.number,
+                     first.run.date, last.run.date)  # fmt: skip
+
+    def _conventions(self) -> Iterator[Alarm]:
+        """Conventions and slips that were undone in some runs and not in the first."""
+        first = self.ordered[0].run.named if self.ordered else ()
+        known = {(n.effect, n.sensor, n.stage, n.words) for n in first if n.undone}
+        for at, entry in enumerate(self.ordered):
+            for n in entry.run.named:
+                key = (n.effect, n.sensor, n.stage, n.words)
+                if not n.undone or key in known:
+                    continue
+                known.add(key)
+                yield Alarm(n.effect, n.sensor, n.stage, "convention", None, None, None, "",
+                            n.words, self._since(at, at, at), "undone before anything was fitted",
+                            None, entry.number, (), words=n.words)  # fmt: skip
+
+    def _runs(self) -> Iterator[WatchedRun]:
+        """Every run of every baseline, with what it tells alone beside what is named."""
+        place = {e.number: k for k, e in enumerate(self.ordered)}
+        values = _values(self.pool)
+        for entry in self.stored.entries:
+            k = place.get(entry.number)
+            known = None if k is None or k == 0 else self.course[k - 1]
+            yield WatchedRun(
+                run=entry.number,
+                files=entry.run.files,
+                date=entry.run.date,
+                start=entry.start,
+                rows=entry.run.used,
+                verdict=entry.run.verdict,  # type: ignore[arg-type]  # as it was written
+                named=tuple(n.words for n in entry.run.named),
+                baseline=1 + sum(after < entry.number for after in self.stored.baselines),
+                e_value=None if known is None else math.exp(min(known, 690.0)),
+                new=entry.number > self.before,
+                values=() if k is None else tuple(self._told(*v) for v in values[k]),
+            )
+
+    def _told(self, term: Term, k: int, value: float, spread: float | None) -> RunValue:
+        half = None if spread is None else NORMAL_95 * spread
+        return RunValue(
+            term.effect.name,
+            term.sensor,
+            self._stage(term.stage),
+            term.effect.slopes()[k].name,
+            value,
+            spread,
+            None if half is None else (value - half, value + half),
+        )
+
+    def _cautions(self) -> Iterator[str]:
+        """What is odd in the last run, and no change of an effect."""
+        if not self.ordered:
+            return
+        *earlier, last = self.ordered
+        run = last.run
+        if run.left_material:
+            yield (
+                f"run {last.number} ({run.files[0]}) is unexplained alone: something in it is not "
+                "in the dictionary, or the log contradicts itself; see `diagnose`"
+            )
+        for sensor, factor in run.white_factor.items():
+            own = [e.run.white_factor[sensor] for e in earlier if sensor in e.run.white_factor]
+            if own and factor > NOISIER * float(np.median(own)):
+                yield (
+                    f"noise of {sensor.replace('/', ', ')} in run {last.number} is "
+                    f"{factor / float(np.median(own)):.2g} times that of the runs before"
+                )
+
+
+def _best(changes: Changes, look: int, table: Array, first: int, total: float) -> Seen:
+    """The likeliest change; among effects that are as good, the commonest in practice."""
+    each = np.logaddexp.reduce(table, axis=0)
+    close = np.flatnonzero(each >= each.max() - AS_GOOD_NATS)
+    c = min(close, key=lambda i: (commonness(changes.terms[i].label), -each[i]))
+    share = np.exp(table[:, c] - each[c])
+    k = int(np.argmax(share)) + 1
+    order = np.argsort(-share)
+    needed = int(np.searchsorted(np.cumsum(share[order]), CREDIBLE)) + 1
+    credible = order[:needed] + 1
+    others = sorted(
+        ((changes.terms[i], float(each[c] - each[i])) for i in range(len(each))
+         if i != c and each[i] > each[c] - RIVAL_NATS),
+        key=lambda other: other[1],
+    )  # fmt: skip
+    return Seen(changes.change(look, k, int(c)), int(min(credible)), int(max(credible)), first,
+                total, tuple(others))  # fmt: skip
+
+
+def _values(pool: Pool) -> list[list[tuple[Term, int, float, float | None]]]:
+    """Each effect's parameters by every run alone, beside what all runs name together."""
+    named = Naming(pool, RATE, 4).named().fit
+    within = Changes(pool).within
+    found: list[list[tuple[Term, int, float, float | None]]] = [[] for _ in range(pool.count)]
+    for c, term in enumerate(pool.terms):
+        rest = tuple(s for s in named.scoped if s.term.label != term.label)
+        beside = fitted(pool, tuple(Scoped(s.term, "build") for s in rest))
+        index = term.index[:, None], term.index
+        temper = max(1.0, float(np.mean(within[:, c])))
+        for run in range(pool.count):
+            at, of = beside.columns(run)
+            left = pool.score[run] - pool.normal[run][:, of] @ beside.values[at]
+            inverse = inverted(pool.normal[run][index])
+            values = inverse @ left[term.index]
+            for k in range(term.size):
+                size = float(inverse[k, k])
+                spread = math.sqrt(temper * size) if size > 0.0 else None
+                found[run].append((term, k, float(values[k]), spread))
+    return found

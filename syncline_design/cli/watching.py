@@ -1,0 +1,89 @@
+"""The command that watches a system over time: watch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from syncline_design.cli.shared import (
+    QuietOption,
+    SeedOption,
+    TimeLimitOption,
+    WatchOutput,
+    deadline_of,
+    emit,
+    guarded,
+    output_targets,
+    refuse,
+    watched,
+)
+from syncline_design.machine.arguments import FALSE_ALARM_RATES
+
+
+@guarded
+def watch(
+    store: Annotated[
+        Path, typer.Argument(help="File that keeps what each run says; made by the first.")
+    ],
+    spec: Annotated[
+        Path | None, typer.Argument(help="System spec (YAML).", show_default=False)
+    ] = None,
+    file: Annotated[
+        list[Path] | None,
+        typer.Argument(help="One more run, from one file or several; none: look again."),
+    ] = None,
+    accept: Annotated[
+        bool,
+        typer.Option("--accept", help="After a repair: hold later runs against one another only."),
+    ] = False,
+    output: WatchOutput = None,
+    seed: SeedOption = 0,
+    quiet: QuietOption = False,
+    false_alarm_rate: Annotated[
+        float,
+        typer.Option(
+            min=FALSE_ALARM_RATES[0],
+            max=FALSE_ALARM_RATES[1],
+            help="Chance of a false alarm over all looks since a baseline.",
+        ),
+    ] = 0.05,
+    time_limit: TimeLimitOption = None,
+) -> int:
+    """Add a run to those of a system, and say what changed since when."""
+    deadline = deadline_of(time_limit)
+    if accept:
+        return _accept(store, spec, output, quiet=quiet)
+    if spec is None:
+        refuse("syncline-design: watch: expected STORE SPEC [FILE], found no SPEC; a new baseline "
+               "takes `watch STORE --accept`")  # fmt: skip
+    from syncline_design.campaign.watching import WatchRequest
+    from syncline_design.campaign.watching import watch as watch_runs
+    from syncline_design.diagnosis.search import DiagnosisSettings
+    from syncline_design.report.on_watch import WATCH_FORMATS, on_watch, render_watch
+    from syncline_design.report.render_console import console
+    from syncline_design.spec.load import load
+    from syncline_design.verdict.optimise import as_measured
+
+    files = tuple(file or ())
+    targets = output_targets(output, WATCH_FORMATS, [spec, store, *files])
+    with watched(deadline, targets, quiet=quiet):
+        request = WatchRequest(store, files, false_alarm_rate)
+        case = as_measured(load(spec), seed)
+        found = watch_runs(case, request, DiagnosisSettings(seed=seed))
+    emit(console(on_watch(found)), targets, lambda name: render_watch(name, found), quiet=quiet)
+    return found.exit_code
+
+
+def _accept(store: Path, spec: Path | None, output: list[str] | None, *, quiet: bool) -> int:
+    """A new baseline, said in a line."""
+    if spec is not None or output:
+        refuse("syncline-design: watch STORE --accept takes nothing else")
+    from syncline_design.campaign.watching import accept as accept_runs
+
+    stored = accept_runs(store)
+    count = len(stored.entries)
+    text = f"{store}: runs from {count + 1} on are held against one another; {count} before stay"
+    emit(text, [], lambda name: name, quiet=quiet)
+    return 0

@@ -1,0 +1,228 @@
+"""What `watch` says: what changed since when, and every effect over the runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Final
+
+from syncline_design.campaign.watch_result import Alarm, Watch, WatchedRun
+from syncline_design.effects import registry
+from syncline_design.machine.records import with_texts
+from syncline_design.machine.sentences import sentence_list
+from syncline_design.model.quantity import split_suffix
+from syncline_design.report import figures_watch as drawings
+from syncline_design.report import numbers
+from syncline_design.report.document import (
+    Chart,
+    Document,
+    Facts,
+    Group,
+    Heading,
+    Inline,
+    Items,
+    Node,
+    Outcome,
+    Text,
+    code,
+    given,
+    provenance,
+    section,
+    show,
+)
+from syncline_design.report.formats import WATCH_FORMATS as WATCH_FORMATS
+from syncline_design.report.json_out import json_text
+from syncline_design.report.on_joint import torn_nodes
+from syncline_design.report.render_html import html
+from syncline_design.report.render_markdown import markdown
+from syncline_design.report.table import Cell, table
+from syncline_design.report.text import visible
+
+MOST_RUNS: Final = 10  # told outside the page
+
+
+def render_watch(name: str, found: Watch) -> str:
+    """The text of one format."""
+    if name == "json":
+        return json_text(found.to_json())
+    return markdown(on_watch(found)) if name == "markdown" else html(on_watch(found))
+
+
+def on_watch(found: Watch) -> Document:
+    """A watched system as a document."""
+    found = with_texts(found, visible)
+    return Document(
+        family="Watch",
+        outcome=_outcome(found),
+        name=found.spec.name,
+        sentences=tuple(_sentences(found)),
+        facts=tuple(_facts(found)),
+        sections=(
+            *section("alarms", "What changed", _alarms(found), "Changed"),
+            *section("odd", "What else is odd", _odd(found), "Odd"),
+            *section("evidence", "Evidence for a change", _evidence(found), "Evidence",
+                     reach="page"),
+            *section("effects", "Every effect over the runs", _effects(found), "Effects",
+                     reach="page"),
+            *section("runs", "Runs", _runs(found)),
+            *section("rests", "What it rests on", _rests(found), "Rests on"),
+            *provenance(_provenance(found)),
+        ),
+        source=found.spec.file,
+        title=f"Watch: {found.spec.name}",
+    )  # fmt: skip
+
+
+def _outcome(found: Watch) -> Outcome:
+    looks = len([r for r in found.runs if r.run > found.baseline_after])
+    if not found.alarms:
+        return Outcome("good", "\u2713", f"Nothing changed in {looks} run{'s'[: looks != 1]}")
+    first = found.alarms[0]
+    when = first.since.date or f"run {first.since.run}"
+    return Outcome("bad", "!", f"Changed: {_name(first)}, since {when}")
+
+
+def _name(one: Alarm) -> str:
+    return f"{one.effect.replace('_', ' ')} ({one.sensor})"
+
+
+def _sentences(found: Watch) -> Iterator[Inline]:
+    for one in found.alarms:
+        yield _sentence(one)
+    if found.alarms:
+        yield (
+            "The alarm stays until ",
+            code("watch STORE --accept"),
+            " makes a new baseline: after a repair, or where the change is meant to stay.",
+        )
+
+
+def _sentence(one: Alarm) -> str:
+    """`Latency (position): latency changed by 2.5 ms with run 7 (day7.csv).`"""
+    dated = f", {one.since.date}" if one.since.date else ""
+    place = f"run {one.since.run} ({one.since.file}{dated})"
+    if one.words is not None:
+        return f"Since {place}: {one.words}."
+    near = ""
+    if one.since.low != one.since.high:
+        near = f", with 95 % one of the runs {one.since.low} to {one.since.high}"
+    name = _name(one)
+    return (
+        f"{name[0].upper()}{name[1:]}: {_parameter(one)} changed by {one.text} with {place}{near}."
+    )
+
+
+def _parameter(one: Alarm) -> str:
+    """`latency` of latency_s."""
+    return split_suffix(one.parameter)[0].replace("_", " ")
+
+
+def _facts(found: Watch) -> Iterator[tuple[str, str]]:
+    if found.e_value is not None:
+        yield "Evidence for a change", f"e-value {_e_text(found.e_value)}"
+        yield "Alarm", f"from {found.rule.threshold:.3g} on, at any look"
+    yield "Runs", str(len(found.runs))
+    if found.baseline_after:
+        yield "Baseline", f"after run {found.baseline_after}"
+
+
+def _e_text(value: float) -> str:
+    return f"{value:.2g}" if value < 1e4 else f"{value:.0e}"
+
+
+def _alarms(found: Watch) -> list[Node]:
+    return [_alarm(one) for one in found.alarms]
+
+
+def _alarm(one: Alarm) -> Node:
+    facts: list[tuple[str, str]] = [(f"Change of {_parameter(one)}", one.text)]
+    if one.interval95 is not None:
+        low, high = (numbers.si_quantity(end, one.unit, 3) for end in one.interval95)
+        facts.append(("95 % interval", f"{low} to {high}"))
+    since = f"run {one.since.run}, {one.since.file}"
+    facts.append(("Since", since + (f", {one.since.date}" if one.since.date else "")))
+    nodes: list[Node] = [
+        Heading(given(one.effect.replace("_", " ")), given(f"{one.sensor}, {one.stage}")),
+        Text(_sentence(one), reach="page"),
+        Facts(tuple(facts)),
+        Text(f"Evidence: {one.evidence}; first at run {one.first_run}."),
+    ]
+    if one.aliases:
+        names = sentence_list([f"{o.effect.replace('_', ' ')} ({o.sensor})" for o in one.aliases])
+        apart = registry()[one.effect].separated_by if one.effect in registry() else ""
+        words = f"These runs cannot tell it apart from a change of {names}. To separate: {apart}."
+        nodes.append(Text(words, mark="!", tone="warn"))
+    return Group(tuple(nodes), "article")
+
+
+def _odd(found: Watch) -> list[Node]:
+    nodes: list[Node] = [Items(found.cautions, mark="!", tone="warn")] if found.cautions else []
+    return [*nodes, *torn_nodes(found.torn)]
+
+
+def _evidence(found: Watch) -> list[Node]:
+    runs = [r for r in found.runs if r.e_value is not None]
+    if len(runs) < 2:
+        return []
+    caption = "E-value after each run since the baseline; an alarm from the dashed line on."
+    return [Chart("evidence", partial(drawings.evidence, runs, found.rule.threshold), caption)]
+
+
+def _effects(found: Watch) -> list[Node]:
+    """The changed effects first, then every other; those of one run have no course."""
+    runs = [r for r in found.runs if r.values]
+    if len(runs) < 2:
+        return []
+    since = {(a.effect, a.sensor, a.stage, a.parameter): a.since.run for a in found.alarms}
+    keys = sorted(
+        dict.fromkeys((v.effect, v.sensor, v.stage, v.parameter) for r in runs for v in r.values),
+        key=lambda key: (key not in since, key),
+    )
+    caption = (
+        "Each parameter as every run alone tells it, with its 95 % interval, beside what all runs "
+        "name together; a vertical line where a change began."
+    )
+    return [Chart("effects", partial(drawings.courses, runs, keys, since), caption)]  # fmt: skip
+
+
+def _runs(found: Watch) -> list[Node]:
+    heads = ("Run", "File", "First stamp", "Rows #", "Alone", "Named alone", "E-value #")
+    rows = [_row(one) for one in found.runs]
+    nodes = show(table("Runs", heads, rows), silent=True, reach="page")
+    nodes += show(table("Runs", heads, rows[-MOST_RUNS:]), silent=True, reach="text")
+    if len(rows) > MOST_RUNS:
+        words = f"The last {MOST_RUNS} of {len(rows)}; all in --output json or html."
+        nodes.append(Text(words, quiet=True, reach="text"))
+    return nodes
+
+
+def _row(one: WatchedRun) -> Sequence[Cell | str]:
+    e_value = "" if one.e_value is None else _e_text(one.e_value)
+    mark = "+" if one.new else ""
+    return (Cell(str(one.run), one.run, mark=mark), ", ".join(one.files), one.date or "",
+            Cell(numbers.count(one.rows), one.rows), one.verdict, "; ".join(one.named),
+            Cell(e_value, one.e_value))  # fmt: skip
+
+
+def _rests(found: Watch) -> list[Node]:
+    rate = numbers.percent(found.rule.false_alarm_rate)
+    order = (
+        "in the order of their first stamps"
+        if found.ordered_by == "date"
+        else "in the order of adding, as not every log's timeline is known"
+    )
+    return [
+        Items((
+            f"{found.rule.method}: at most {rate} while nothing changes.",
+            f"Runs are compared {order}.",
+            ("Kept in ", code(found.store), ", whose lines are chained by their hashes; hash of "
+             "the last line ", code(found.last[:16]), ". Whoever writes the whole chain anew is "
+             "believed."),
+        ))
+    ]  # fmt: skip
+
+
+def _provenance(found: Watch) -> list[tuple[str, str]]:
+    own = found.provenance
+    return [("Version", own.version), ("Spec", own.spec_sha256), ("Catalogs", own.catalogs_sha256),
+            ("Store", found.last)]  # fmt: skip
