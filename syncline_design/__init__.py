@@ -33,6 +33,7 @@ if TYPE_CHECKING:
         simulate,
         study,
         timing,
+        watch,
     )
 
 __version__ = "0.1.0"
@@ -55,6 +56,7 @@ __all__ = [
     "simulate",
     "study",
     "timing",
+    "watch",
 ]
 
 

@@ -23,6 +23,8 @@ from syncline_design.spec.load import BadInput, load
 
 if TYPE_CHECKING:
     from syncline_design.auditing.result import Audit
+    from syncline_design.campaign.joint import JointRequest
+    from syncline_design.campaign.watch_result import Watch
     from syncline_design.choice.options import ResourceName
     from syncline_design.choice.outcome import Road
     from syncline_design.clocks.study import TimingSettings
@@ -56,6 +58,7 @@ __all__ = [
     "simulate",
     "study",
     "timing",
+    "watch",
 ]
 
 SpecOrPath = str | Path | Case  # a spec file, or one that was loaded before
@@ -167,13 +170,18 @@ def simulate(
 
 def diagnose(
     spec: SpecOrPath, logs: str | Path | Sequence[str | Path] = (), *, seed: int = 0,
-    false_alarm_rate: float = 0.05, max_effects: int = 8, time_limit_s: float | None = None,
+    false_alarm_rate: float = 0.05, max_effects: int = 8, joint: bool = False,
+    starts: Sequence[str] | None = None, store: str | Path | None = None,
+    time_limit_s: float | None = None,
 ) -> DiagnosisAndDesign:  # fmt: skip
     """Where measured logs disagree with a spec, what is missing in it, what that means for it.
 
-    logs: a file or several; none: those that the spec names.
+    logs: a file or several; none: those that the spec names.  joint: each file is a run of the
+    same system; starts: the start of the system that each is of; store: the file that keeps what
+    each says, with what it holds already.
     """
     from syncline_design import diagnosis
+    from syncline_design.campaign.joint import diagnose_joint
     from syncline_design.comparison.meaning import meaning, with_design
     from syncline_design.planning.next_drive import next_drive
     from syncline_design.verdict.optimise import as_measured
@@ -186,9 +194,23 @@ def diagnose(
     with _limited(time_limit_s):
         case = _case(spec)
         pinned = as_measured(case, seed)
-        found = diagnosis.diagnose(pinned, files, settings)
+        if joint:
+            request = _joint(files, starts, store)
+            found = diagnose_joint(pinned, request, settings)
+        else:
+            found = diagnosis.diagnose(pinned, files, settings)
         means = meaning(case, found.effects_entries(), seed)
         return with_design(replace(found, plan=next_drive(pinned, found)), means)
+
+
+def _joint(
+    files: Sequence[Path], starts: Sequence[str] | None, store: str | Path | None
+) -> JointRequest:
+    from syncline_design.campaign.joint import JointRequest, starts_of
+
+    named = None if starts is None else starts_of(",".join(map(str, starts)), len(files))
+    kept = None if store is None else arguments.path("store", store)
+    return JointRequest(tuple(files), named, kept)
 
 
 def plan(
@@ -296,6 +318,26 @@ def accept(
     files, seed = _files(logs), _seed(seed)
     with _limited(time_limit_s):
         return acceptance.accept(_case(spec), files, settings, seed)
+
+
+def watch(
+    store: str | Path, spec: SpecOrPath, logs: str | Path | Sequence[str | Path] = (), *,
+    false_alarm_rate: float = 0.05, seed: int = 0, time_limit_s: float | None = None,
+) -> Watch:  # fmt: skip
+    """Add a run, of one file or several, to those of a system, and say what changed since when.
+
+    store: the file that keeps what each run says.  false_alarm_rate: over all looks at it.
+    """
+    from syncline_design.campaign import watching
+    from syncline_design.diagnosis import DiagnosisSettings
+    from syncline_design.verdict.optimise import as_measured
+
+    rate = arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
+    seed, kept = _seed(seed), arguments.path("store", store)
+    request = watching.WatchRequest(kept, tuple(_files(logs)), rate)
+    with _limited(time_limit_s):
+        case = as_measured(_case(spec), seed)
+        return watching.watch(case, request, DiagnosisSettings(seed=seed))
 
 
 def reproduce(*, seed: int = 0, time_limit_s: float | None = None) -> Reproduction:

@@ -31,6 +31,7 @@ FUNCTIONS = (
     "simulate",
     "study",
     "timing",
+    "watch",
 )
 
 

@@ -28,6 +28,7 @@ COMMANDS = {
     "reproduce": ([], {"json", "html"}),
     "audit": (["x.csv"], {"json", "html", "markdown"}),
     "timing": (["x.csv"], {"json", "html", "markdown"}),
+    "watch": (["x.jsonl", TRACK, "x.csv"], {"json", "html", "markdown"}),
     "plan": ([USV], {"json", "html", "markdown", "csv", "kml", "qgc"}),
 }  # fmt: skip
 

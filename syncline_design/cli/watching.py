@@ -67,7 +67,7 @@ def watch(
     from syncline_design.verdict.optimise import as_measured
 
     files = tuple(file or ())
-    targets = output_targets(output, WATCH_FORMATS, [spec, store, *files])
+    targets = output_targets(output, WATCH_FORMATS, [store, spec, *files])
     with watched(deadline, targets, quiet=quiet):
         request = WatchRequest(store, files, false_alarm_rate)
         case = as_measured(load(spec), seed)
