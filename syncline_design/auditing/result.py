@@ -34,7 +34,7 @@ FaultName = Literal[
     "batched_by_recorder",
     "recorder_clock",
 ]
-Verdict = Literal["sound", "faults"]
+Soundness = Literal["sound", "faults"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,7 +149,7 @@ class Audit(Record):
     """All streams of all files.  `incomplete`: the first of the damaged files, `damaged` each."""
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
-    verdict: Verdict
+    verdict: Soundness
     streams: tuple[StreamAudit, ...]
     incomplete: IncompleteFile | None = optional()
     damaged: tuple[IncompleteFile, ...] = ()

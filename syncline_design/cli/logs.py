@@ -12,10 +12,11 @@ from syncline_design.cli.shared import (
     QuietOption,
     TimeLimitOption,
     deadline_of,
+    demand_spec,
     emit,
     guarded,
     output_targets,
-    refuse,
+    say_unreadable,
     watched,
 )
 from syncline_design.machine.streams import say
@@ -49,16 +50,14 @@ def inspect(
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
 
-    if write_spec is not None and spec is None:
-        refuse("syncline-design: --write-spec needs --spec SPEC, the spec to write into")
+    demand_spec(write_spec, spec)
     reads = [*(f for f in file if not f.is_dir()), *([spec] if spec is not None else [])]
     targets = output_targets(output, LOG_FORMATS, reads, [write_spec])
     with watched(deadline, targets, quiet=quiet):
         case = None if spec is None else load(spec)
         choice = None if case is None else case.spec.log
         found = inspect_logs(file, choice, _has_attitude(case))
-    for one in found.unreadable:
-        say(one.reason)
+    say_unreadable(found.unreadable)
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
     emit(console(on_log(found)), targets, lambda name: render_log(name, found), quiet=quiet)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec
+from typing import TYPE_CHECKING, Annotated, Any, NoReturn, ParamSpec, Protocol
 
 import typer
 
@@ -26,6 +26,15 @@ PANIC = "PanicException"  # of a library in Rust; it passes by `except Exception
 DEBUG_VARIABLE = "SYNCLINE_DEBUG"  # set it to see the traceback of an internal error
 
 P = ParamSpec("P")
+
+
+class Unreadable(Protocol):
+    """A file that gave nothing."""
+
+    @property
+    def reason(self) -> str: ...
+
+
 _COMMAND: ContextVar[str] = ContextVar("command", default="report")  # that runs
 
 SpecArgument = Annotated[Path, typer.Argument(help="System spec (YAML).", show_default=False)]
@@ -200,6 +209,18 @@ def emit(
     for target in targets:
         if not target.named and not quiet:
             say(f"written to {target.path}")
+
+
+def demand_spec(write_spec: Path | None, spec: Path | None) -> None:
+    """A spec to write into, where one is to be written."""
+    if write_spec is not None and spec is None:
+        refuse("syncline-design: --write-spec needs --spec SPEC, the spec to write into")
+
+
+def say_unreadable(files: Iterable[Unreadable]) -> None:
+    """Which files gave nothing, and why."""
+    for one in files:
+        say(one.reason)
 
 
 def deadline_of(time_limit_s: float | None) -> Deadline:

@@ -13,10 +13,11 @@ from syncline_design.cli.shared import (
     SeedOption,
     TimeLimitOption,
     deadline_of,
+    demand_spec,
     emit,
     guarded,
     output_targets,
-    refuse,
+    say_unreadable,
     watched,
 )
 from syncline_design.machine.streams import say
@@ -53,8 +54,7 @@ def audit(
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
 
-    if write_spec is not None and spec is None:
-        refuse("syncline-design: --write-spec needs --spec SPEC, the spec to write into")
+    demand_spec(write_spec, spec)
     reads = [*file, *([spec] if spec is not None else [])]
     targets = output_targets(output, AUDIT_FORMATS, reads, [write_spec])
     with watched(deadline, targets, quiet=quiet):
@@ -62,8 +62,7 @@ def audit(
         found = audit_files(file)
         if case is not None:
             found = held_against(found, case, seed)
-    for one in found.unreadable:
-        say(one.reason)
+    say_unreadable(found.unreadable)
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
     emit(console(on_audit(found)), targets, lambda name: render_audit(name, found), quiet=quiet)

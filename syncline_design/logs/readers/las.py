@@ -84,13 +84,7 @@ class LasRecording(BatchRecording):
 
     def _clouds(self) -> Iterator[Any]:
         """Points, up to the last that can be read."""
-        claims = self._claims
-        size = self.path.stat().st_size
-        there = claims.points
-        if claims.packed:
-            there = whole_points(self.path, claims, self._record())
-        else:
-            there = min(there, (size - claims.offset) // claims.record)
+        claims, there = self._claims, self._there()
         rows, count, said = min(MOST_ROWS, max(1, PIECE_BYTES // claims.record)), 0, ""
         while rows and count < there:
             try:
@@ -100,18 +94,27 @@ class LasRecording(BatchRecording):
             except BadInput:
                 raise
             except BaseException as error:  # lazrs and laspy raise many kinds, lazrs panics too
-                if not isinstance(error, Exception) and type(error).__name__ != PANIC:
-                    raise
-                said = said or (str(error).splitlines() or [type(error).__name__])[0][:120]
+                said = said or _said(error)
                 if not claims.packed:
                     break
                 rows = rows // NARROWER if rows > NARROWER else rows // 2
             else:
                 break
+        self._demand_points(count, said)
+
+    def _there(self) -> int:
+        """Points that the file is long enough for."""
+        claims = self._claims
+        if claims.packed:
+            return whole_points(self.path, claims, self._record())
+        return min(claims.points, (self.path.stat().st_size - claims.offset) // claims.record)
+
+    def _demand_points(self, count: int, said: str) -> None:
+        """Some, or a refusal; fewer than the header claims are a cut file."""
         if not count and said:
             raise refuse(self.path, "no readable LAS or LAZ cloud", found=said)
-        if count < claims.points:
-            reason = f"{count} of {claims.points} points are there"
+        if count < self._claims.points:
+            reason = f"{count} of {self._claims.points} points are there"
             self._cut(f"{reason}: {said}" if said else reason, count)
 
     def _from(self, first: int, end: int, rows: int) -> Iterator[Any]:
@@ -230,6 +233,13 @@ def no_panic_shown() -> Iterator[None]:
 
 _NAMES = ("point_x_m", "point_y_m", "point_z_m", "intensity", "point_source_id")
 _NONE: NDArray[Any] = np.zeros(0)
+
+
+def _said(error: BaseException) -> str:
+    """What a library says of a damaged cloud; anything else that ends a program goes on."""
+    if not isinstance(error, Exception) and type(error).__name__ != PANIC:
+        raise error
+    return (str(error).splitlines() or [type(error).__name__])[0][:120]
 
 
 def _columns(points: Any) -> dict[str, NDArray[Any]]:

@@ -15,6 +15,7 @@ from syncline_design.logs.readers.ros_recording import (
     RawMessage,
     RosRecording,
     UnpackBudget,
+    from_lz4,
 )
 from syncline_design.logs.readers.ros_types import Channel, Encoding, modern
 
@@ -129,7 +130,7 @@ class McapFile(Container):
         if chunk.compression == "zstd":
             plain = _from_zstd(chunk.data, due, self.path)
         elif chunk.compression == "lz4":
-            plain = _from_lz4(chunk.data, due, self.path)
+            plain = from_lz4(chunk.data, due, self.path, FORMAT)
         elif chunk.compression == "":
             plain = bytes(chunk.data)
         else:
@@ -152,15 +153,6 @@ def _from_zstd(data: bytes, due: int, path: Path) -> bytes:
         with zstandard.ZstdDecompressor().stream_reader(BytesIO(data)) as reader:
             plain: bytes = reader.read(due + 1)
     except zstandard.ZstdError:
-        raise DamagedError("a chunk does not unpack") from None
-    return plain
-
-
-def _from_lz4(data: bytes, due: int, path: Path) -> bytes:
-    lz4 = library("lz4.frame", path, FORMAT)
-    try:
-        plain: bytes = lz4.LZ4FrameDecompressor().decompress(data, due + 1)
-    except (RuntimeError, EOFError, ValueError):
         raise DamagedError("a chunk does not unpack") from None
     return plain
 

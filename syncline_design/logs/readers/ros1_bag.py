@@ -12,13 +12,14 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
 from syncline_design.logs.readers.ros_recording import (
     Container,
     DamagedError,
     RawMessage,
     RosRecording,
     UnpackBudget,
+    from_lz4,
 )
 from syncline_design.logs.readers.ros_types import Channel, modern
 from syncline_design.logs.refusals import refuse
@@ -217,7 +218,7 @@ def _unpacked(data: bytes, fields: Fields, budget: UnpackBudget, path: Path, cut
     elif packing == "bz2":
         plain = _from_bz2(data, due)
     elif packing == "lz4":
-        plain = _from_lz4(data, due, path)
+        plain = from_lz4(data, due, path, FORMAT)
     else:
         raise DamagedError(f"a chunk packed as {packing[:20]!r}")
     if len(plain) != due and not (cut and len(plain) < due):
@@ -230,15 +231,6 @@ def _from_bz2(data: bytes, due: int) -> bytes:
         return bz2.BZ2Decompressor().decompress(data, due + 1)
     except (OSError, EOFError, ValueError):
         raise DamagedError("a chunk does not unpack") from None
-
-
-def _from_lz4(data: bytes, due: int, path: Path) -> bytes:
-    lz4 = library("lz4.frame", path, FORMAT)
-    try:
-        plain: bytes = lz4.LZ4FrameDecompressor().decompress(data, due + 1)
-    except (RuntimeError, EOFError, ValueError):
-        raise DamagedError("a chunk does not unpack") from None
-    return plain
 
 
 def _channel(fields: Fields, data: bytes) -> Channel:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from syncline_design.logs.readers.point_times import CloudTimes, cloud_times
+from syncline_design.logs.readers.reader import library
 from syncline_design.logs.readers.ros_meaning import Meaning, has_meaning, meaning_of
 from syncline_design.logs.readers.ros_types import Channel, StampOf, stamp_of, unpacker
 from syncline_design.logs.readers.stream import (
@@ -36,6 +37,16 @@ RECORDED = "log time"
 
 class DamagedError(Exception):
     """The rest of a file cannot be read; says why."""
+
+
+def from_lz4(data: bytes, due: int, path: Path, format_: str) -> bytes:
+    """A chunk unpacked to no more than is due."""
+    lz4 = library("lz4.frame", path, format_)
+    try:
+        plain: bytes = lz4.LZ4FrameDecompressor().decompress(data, due + 1)
+    except (RuntimeError, EOFError, ValueError):
+        raise DamagedError("a chunk does not unpack") from None
+    return plain
 
 
 class RawMessage(NamedTuple):
