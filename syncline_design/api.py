@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from syncline_design.planning.telling import PlanRun
     from syncline_design.simulation import Simulation
     from syncline_design.studies import Progress, StudyResult
+    from syncline_design.verdict.figure_front import FigureKind
     from syncline_design.verdict.optimise import Optimisation
     from syncline_design.verdict.tree import Verdict
 
@@ -127,11 +128,13 @@ def optimize(
     spec: SpecOrPath, *, best: int = 1, every: bool = False, pareto: bool = False,
     resource: ResourceName = "cost", seed: int = 0, method: Road = "auto",
     time_limit_s: float | None = None, why_not: str | Sequence[str] = (),
+    against: FigureKind | None = None,
 ) -> Optimisation:  # fmt: skip
     """The best designs of a spec, proven, and what they hinge on.
 
     best: how many designs that differ in a sensor; every: in anything.  pareto: the exact front of
-    `resource` against the error too.  why_not: entries to answer for.
+    `resource` against the error too, or `against` another figure of it (worst_case, thu, tvu, rmse,
+    quantile).  why_not: entries to answer for.
     """
     from syncline_design.choice.options import RESOURCES
     from syncline_design.choice.outcome import METHODS
@@ -140,10 +143,13 @@ def optimize(
     best = arguments.whole("best", best, 1)
     arguments.word("resource", resource, RESOURCES)
     arguments.word("method", method, METHODS)
+    if against is not None:
+        arguments.word("against", against, optimise.FIGURES)
     settings = optimise.OptimizeSettings(
         best,
         pareto,
         resource,
+        against,
         method,
         seed=_seed(seed),
         every=every,

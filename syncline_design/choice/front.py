@@ -91,8 +91,8 @@ def staircase(points: Sequence[FrontPoint]) -> tuple[PriceStep, ...]:
         steps.append(
             PriceStep(
                 float(point.amount),
-                point.error_m,
-                before.error_m if before else None,
+                point.drawn_m,
+                before.drawn_m if before else None,
                 float(point.amount - before.amount) if before else None,
             )
         )

@@ -53,12 +53,19 @@ class FrontPoint:
 
     amount: infinite where a catalog entry does not say (only off the fronts that are shown).
     undecided: ids of simulated requirements that its samples leave open.
+    figure_m: what the front is drawn over, where that is another figure of the error.
     """
 
     amount: Fraction | float
     error_m: float
     design: Design
     undecided: tuple[str, ...] = ()
+    figure_m: float | None = None
+
+    @property
+    def drawn_m(self) -> float:
+        """What the front sets against the amount [m]."""
+        return self.error_m if self.figure_m is None else self.figure_m
 
 
 @dataclass(frozen=True, slots=True)

@@ -130,8 +130,16 @@ def optimize(
     pareto: Annotated[bool, typer.Option("--pareto", help="The exact Pareto front too.")] = False,
     resource: Annotated[
         Literal["cost", "mass", "power"],
-        typer.Option("--resource", "--against", help="What the front sets against error."),
+        typer.Option("--resource", help="What the front sets against error."),
     ] = "cost",
+    against: Annotated[
+        Literal["cost", "mass", "power", "worst_case", "thu", "tvu", "rmse", "quantile"] | None,
+        typer.Option(
+            "--against",
+            help="Draw the front over this: an amount against error, or cost (or --resource) "
+            "against this figure of the error.",
+        ),
+    ] = None,
     why_not: Annotated[
         list[str] | None,
         typer.Option(metavar="ENTRY", help="Say why a catalog entry is not in it. Repeatable."),
@@ -150,8 +158,9 @@ def optimize(
     from syncline_design.verdict.optimise import OptimizeSettings, optimize
 
     targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
+    drawn, figure = _axes(resource, against)
     settings = OptimizeSettings(
-        best, pareto, resource, road(method), seed=seed,
+        best, pareto, drawn, figure, road(method), seed=seed,
         every=every, why_not=tuple(dict.fromkeys(why_not or ())),
         report=any(target.format == "html" for target in targets),
     )  # fmt: skip
@@ -167,6 +176,19 @@ def optimize(
         _write_design(found, write_design)
     emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet)
     return found.result.exit_code
+
+
+Amount = Literal["cost", "mass", "power"]
+Figure = Literal["worst_case", "thu", "tvu", "rmse", "quantile"]
+
+
+def _axes(resource: Amount, against: Amount | Figure | None) -> tuple[Amount, Figure | None]:
+    """The resource of a front and the figure of the error that it is drawn over, if any."""
+    if against is None:
+        return resource, None
+    if against == "cost" or against == "mass" or against == "power":
+        return against, None
+    return resource, against
 
 
 def _refuse_elsewhere(path: Path, catalogs: Sequence[str]) -> None:

@@ -44,11 +44,15 @@ def family_csv(found: Optimised) -> str:
 
 def front_csv(problem: Problem, points: Sequence[FrontPoint], resource: ResourceName) -> str:
     """The front as CSV: amount, error in m, then sensor, primitive, method of every role."""
-    headers = [resource, "error_m", *_design_headers(problem)]
-    rows = [
-        [_plain(point.amount), point.error_m, *_design_cells(problem, point.design)]
+    over = [point.figure_m for point in points if point.figure_m is not None]
+    headers = [resource, *(["figure_m"] if over else []), "error_m", *_design_headers(problem)]
+    rows: list[list[Any]] = [
+        [
+            _plain(point.amount), *([point.figure_m] if over else []), point.error_m,
+            *_design_cells(problem, point.design),
+        ]
         for point in points
-    ]
+    ]  # fmt: skip
     return plain_csv(headers, rows)
 
 

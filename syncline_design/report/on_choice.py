@@ -244,32 +244,60 @@ def _front(found: Optimised) -> list[Section]:
         nodes += show(family_front_table(found.result.front, resource, currency), silent=True)
         nodes += show(staircase_table(found.result.staircase or (), currency, resource))
     if found.points:
-        nodes += show(front_table(found.problem, found.points, resource, currency), silent=True)
-        nodes += show(staircase_table(found.result.staircase or (), currency, resource))
+        words = found.result.front_figure
+        drawn = front_table(found.problem, found.points, resource, currency, words)
+        nodes += show(drawn, silent=True)
+        steps = found.result.staircase or ()
+        nodes += show(staircase_table(steps, currency, resource, words))
+        nodes += [Text(OVER_FIGURE)] if words is not None else []
     if found.result.front_left_out:
         nodes.append(Text(left_out_text(found.result.front_left_out, resource)))
-    return section("front", f"Exact front of {resource} against error, all else met", nodes)
+    return section(
+        "front",
+        f"Exact front of {resource} against {found.result.front_figure or 'error'}, all else met",
+        nodes,
+    )
+
+
+OVER_FIGURE = (
+    "Every point keeps all requirements but accuracy and those on this figure; each figure is the "
+    "largest that a search over the situations found, and gains below 0.1 % are no points."
+)
 
 
 def front_table(
-    problem: Problem, points: Sequence[FrontPoint], resource: ResourceName, currency: str
+    problem: Problem,
+    points: Sequence[FrontPoint],
+    resource: ResourceName,
+    currency: str,
+    figure: str | None = None,
 ) -> Table:
-    """The Pareto front, a row per point; one that simulation leaves open says so."""
+    """The Pareto front, a row per point; one that simulation leaves open says so.
+
+    figure: what it is drawn over in place of the Syncline error.
+    """
+    over = (figure,) if figure is not None else ()
     rows = [
         [
             amount_cell(point.amount, resource, currency),
+            *(Cell(numbers.length(point.drawn_m), point.drawn_m) for _ in over),
             Cell(numbers.length(point.error_m), point.error_m),
             *_role_cells(problem, point.design),
             Cell(_open_text(point.undecided)),
         ]
         for point in points
     ]
-    heads = (f"{resource.capitalize()} #", "Error #", *_role_heads(problem), "Simulation")
+    heads = (
+        f"{resource.capitalize()} #", *(f"{one[0].upper()}{one[1:]} #" for one in over),
+        "Error #" if not over else "Syncline error #", *_role_heads(problem), "Simulation",
+    )  # fmt: skip
     return table("Exact front", heads, rows)
 
 
-def staircase_table(steps: Sequence[PriceStep], currency: str, resource: ResourceName) -> Table:
-    """The price of accuracy, loosest target first."""
+def staircase_table(
+    steps: Sequence[PriceStep], currency: str, resource: ResourceName, figure: str | None = None
+) -> Table:
+    """The price of accuracy, or of another figure of the error, loosest target first."""
     rows = []
     for step in steps:
         loose = step.looser_than_m
@@ -279,8 +307,9 @@ def staircase_table(steps: Sequence[PriceStep], currency: str, resource: Resourc
             Cell(f"{numbers.target(step.tightest_m)} {upto}", step.tightest_m),
             amount_cell(step.cost, resource, currency), more,
         ])  # fmt: skip
-    heads = ("Accuracy target #", f"{resource.capitalize()} #", "More than the step before #")
-    return table("What accuracy costs", heads, rows)
+    target = "Accuracy target #" if figure is None else f"Limit of {figure} #"
+    heads = (target, f"{resource.capitalize()} #", "More than the step before #")
+    return table("What accuracy costs" if figure is None else "What it costs", heads, rows)
 
 
 def hinges_nodes(hinges: Optimisation) -> list[Node]:

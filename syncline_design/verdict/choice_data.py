@@ -92,6 +92,7 @@ def front_designs(
             error_m=point.error_m,
             design=full_design(case, problem, point.design),
             undecided=_undecided(problem, point.design),
+            figure_m=point.figure_m,
         )
         for point in points
     )

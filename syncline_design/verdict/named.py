@@ -129,7 +129,8 @@ class Exclusion(Record):
 class FrontDesign(Record):
     """A point of a front; of cost, mass and power it has the one that the front sets against error.
 
-    undecided: simulated requirements that its samples leave open.
+    undecided: simulated requirements that its samples leave open; figure_m: the figure of the
+    error that the front is drawn over, where it is not the Syncline's.
     """
 
     cost: float | None = optional()
@@ -138,6 +139,7 @@ class FrontDesign(Record):
     error_m: float
     design: NamedDesign
     undecided: tuple[str, ...] | None = optional()
+    figure_m: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

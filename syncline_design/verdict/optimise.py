@@ -50,6 +50,15 @@ from syncline_design.verdict.choice_data import (
     ruled_out,
 )
 from syncline_design.verdict.family import is_family, refuse_missions
+from syncline_design.verdict.figure_front import (
+    FIGURES as FIGURES,
+)
+from syncline_design.verdict.figure_front import (
+    FigureKind,
+    drawn_requirement,
+    figure_front,
+    figure_words,
+)
 from syncline_design.verdict.named import (
     Alternative,
     Bargain,
@@ -78,7 +87,7 @@ NO_TABLES = Problem((), (), (), (), 0.0, 0.0, Limits(None, 1.0), "syncline", "co
 
 @dataclass(frozen=True, slots=True)
 class OptimizeSettings:
-    """count: how many designs; pareto: the front too, of `resource` against error.
+    """count: how many designs; pareto: the front too, of `resource` against error, or a figure.
 
     every: rank every design, not only those that differ in a sensor.
     """
@@ -86,6 +95,7 @@ class OptimizeSettings:
     count: int = 1
     pareto: bool = False
     resource: ResourceName = "cost"
+    figure: FigureKind | None = None  # of the error, in place of the Syncline's
     method: Road = "auto"
     seed: int = 0
     every: bool = False
@@ -113,8 +123,9 @@ class Optimisation(Record):
     warnings: of the first design, as `check` gives them; cut_short: what the time limit left out
     or incomplete; gave_up: what lacks designs because too many were simulated; message: what ended
     a search that found no design; front: with `--pareto`, `front_left_out` what has no place on
-    it; slack, tolerances, measure_next: of a design that meets, null where that was not worked out;
-    why_not: of the entries that were asked about; alternatives, bargains: as in a verdict.
+    it, `front_figure` over which figure of the error it is drawn, in words; slack, tolerances,
+    measure_next: of a design that meets, null where that was not worked out; why_not: of the
+    entries that were asked about; alternatives, bargains: as in a verdict.
     """
 
     schema: Annotated[str, Named(SCHEMA)] = SCHEMA
@@ -131,6 +142,7 @@ class Optimisation(Record):
     provenance: MadeFrom
     message: str | None = optional()
     front: tuple[FrontDesign, ...] | None = optional()
+    front_figure: str | None = optional()
     front_left_out: tuple[str, ...] | None = optional()
     staircase: tuple[PriceStep, ...] | None = optional()
     slack: tuple[Slack, ...] | None = optional()
@@ -177,6 +189,8 @@ class Optimised:
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best designs of a spec; pinned roles stay as they are."""
+    if settings.figure is not None:
+        refuse_missions(case)
     if is_family(case):
         _refuse_questions(case, settings)
         from syncline_design.verdict.optimise_family import optimize_family
@@ -200,7 +214,7 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     except OutOfTime as error:
         return _unfinished(case, problem, settings, checking, str(error))
     pieces = Pieces(lambda: refusals(problem))
-    points = _points(problem, settings, pieces)
+    points = _points(case, problem, settings, pieces)
     designs: tuple[Design, ...] = ()
     kind: type[Optimisation] = Optimisation
     more: dict[str, Any] = {}
@@ -227,7 +241,8 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     found = Optimised(case, problem, settings, designs, points, result)
     if not settings.report:
         return found
-    of_cost = points if settings.pareto and settings.resource == "cost" else None
+    of_error = settings.pareto and settings.resource == "cost" and settings.figure is None
+    of_cost = points if of_error else None
     return replace(found, verdict=open_verdict(case, problem, picked, checking, points=of_cost))
 
 
@@ -306,11 +321,24 @@ def _frame(
     }
 
 
-def _points(problem: Problem, settings: OptimizeSettings, pieces: Pieces) -> tuple[FrontPoint, ...]:
+def _points(
+    case: Case, problem: Problem, settings: OptimizeSettings, pieces: Pieces
+) -> tuple[FrontPoint, ...]:
     nothing: tuple[FrontPoint, ...] = ()
     if not settings.pareto:
         return nothing
+    if settings.figure is not None:
+        asked = drawn_requirement(case, settings.figure)
+        made = figure_front(case, asked, settings.resource, settings.seed)
+        return tuple(pieces.listed("front", lambda: made))
     return pieces.made("front", lambda: tuple(front(problem, settings.resource)), nothing)
+
+
+def _drawn(case: Case, settings: OptimizeSettings) -> str | None:
+    """The figure that a front is drawn over, in words."""
+    if settings.figure is None:
+        return None
+    return figure_words(drawn_requirement(case, settings.figure))
 
 
 def _front(
@@ -321,6 +349,7 @@ def _front(
         return {}
     return {
         "front": front_designs(case, problem, points, settings.resource),
+        "front_figure": _drawn(case, settings),
         "front_left_out": left_out(case, problem, settings.resource),
         "staircase": staircase([point for point in points if not point.undecided]),
     }

@@ -107,19 +107,24 @@ def _moved(system: System, distance_m: float) -> System:
     return replace(system, stages=(*system.stages[:-1], replace(last, platform=platform)))
 
 
-def keeps(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> bool:
-    """Whether a system keeps a limit; what fails at once is not searched any further.
+def reached_m(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> float:
+    """A value [m] that a figure reaches: above a limit only if the figure exceeds it.
 
+    What fails at once is not searched any further, nor what keeps the limit by norms alone.
     Designs that differ in timestamps alone share the verdict on their noise: independent errors
     never make a symmetric, unimodal one less dispersed (T. W. Anderson, Proc. AMS 6, 1955).
     """
     if isinstance(wanted, Wanted) and surely_keeps(system, wanted, limit_m):
-        return True
+        return 0.0
     if not system.effects and _noise_fails(_well_timed(system), wanted, limit_m, seed):
-        return False
+        return _above(limit_m)
     if isinstance(wanted, Wanted) and surely_exceeds(system, wanted, limit_m, seed):
-        return False
-    return value_m(system, wanted, limit_m, seed) <= limit_m
+        return _above(limit_m)
+    return value_m(system, wanted, limit_m, seed)
+
+
+def _above(limit_m: float) -> float:
+    return math.nextafter(limit_m, math.inf)
 
 
 @lru_cache(maxsize=1024)
