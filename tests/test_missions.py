@@ -275,3 +275,38 @@ def test_what_works_on_one_system_refuses_missions() -> None:
         done = run(command, str(SHIPPED))
         assert done.returncode == 2
         assert "several missions" in done.stderr
+
+
+def test_what_is_no_sum_is_asked_in_every_mission(tmp_path: Path) -> None:
+    """Against every payload pinned and checked as a spec of each mission alone."""
+    text = BOARDED.replace("kind: accuracy, limit: 2 m", "kind: thu, limit: {a: 0.02 m, b: 0.003}")
+    text = text.replace("ACC-1: 0.25 m", "ACC-1: {a: 0.02 m, b: 0.0035}")
+    text = text.replace("candidates: [livox_mid360, livox_tele15]", "candidates: [livox_tele15]")
+    text = text.replace("[hardware, gpio]", "[gpio]").replace("per_mission: yes, ", "")
+    text = text.replace("[sbg_ellipse_d, vectornav_vn200]", "[sbg_ellipse_d, novatel_cpt7]")
+    path = tmp_path / "two.yaml"
+    path.write_text(text, "utf-8")
+    costs = []
+    for position, attitude in itertools.product(
+        ("ublox_f9p_pvt", "ublox_f9p_rtk"), ("sbg_ellipse_d", "novatel_cpt7")
+    ):
+        words, cost = set(), 0.0
+        for name, own in written_out(yaml.safe_load(text)).items():
+            picked = {"position": position, "attitude": attitude, "ranging": "livox_tele15"}
+            for role, sensor in picked.items():
+                own["stages"][0][role] = {"sensor": sensor, "primitive": "pps"}
+            own["timestamping"] = "gpio"
+            alone = tmp_path / f"{name}.yaml"
+            alone.write_text(yaml.safe_dump(own), "utf-8")
+            found = check_file(alone, QUICK)
+            assert found.design is not None
+            assert found.design.cost is not None
+            words.add(found.verdict)
+            cost = found.design.cost
+        if words == {"meets"}:
+            costs.append(cost)
+    assert 0 < len(costs) < 4
+    family = check_file(path, QUICK)
+    assert family.verdict == "meets"
+    assert family.design is not None
+    assert family.design.cost == min(costs)

@@ -27,7 +27,7 @@ from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 MOST_TRIED = 8  # changes that are also tried one by one
 _ABSENT = object()
-_NAMED = {"stages": "name", "requirements": "id"}
+_NAMED = {"stages": "name", "requirements": "id", "missions": "name"}
 _SILENT_KEYS = {"note", "name", "source"}  # words about things, not things
 
 

@@ -8,17 +8,20 @@ tau_crit), so that what holds at both ends holds everywhere between.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
+import numpy as np
+
 from syncline_design.choice.family import Family, FamilyDesign, family_of
-from syncline_design.choice.family_best import Found, iter_family
+from syncline_design.choice.family_best import FamilyPoint, Found, family_front, iter_family
 from syncline_design.choice.judged import judgement
-from syncline_design.choice.options import Resources
+from syncline_design.choice.options import Indices, ResourceName, Resources
 from syncline_design.choice.prices import resources_of
 from syncline_design.choice.problem import sole_design
 from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import SheetFigure, quantity, sigma_figures, with_figure
+from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.likely import Likelihood, likelihood_of
@@ -172,7 +175,52 @@ def accepted(work: Work, left_open: list[FamilyDesign] | None = None) -> Iterato
 
     left_open: takes in those that simulation leaves open.
     """
-    return iter_family(work.family, passing(work, left_open))
+    passes = passing(work, left_open)
+    first = next(iter_family(work.family), None)
+    if passes is None or first is None or passes(first.design):
+        yield from iter_family(work.family, passes)
+        return
+    if left_open is not None:
+        left_open.clear()  # what the rest leaves open comes in its own order
+    family, places = promising_family(work.family)
+    for one in iter_family(family, lambda design: passes(_whole(design, places))):
+        yield replace(one, design=_whole(one.design, places))
+
+
+def promising_family(family: Family) -> tuple[Family, tuple[Indices, ...]]:
+    """The family without ways that simulation rules out by one sensor alone, in any mission.
+
+    With the places of the ways that are left.
+    """
+    kept = [np.ones(len(role), dtype=bool) for role in family.roles]
+    for m, problem in enumerate(family.problems):
+        if problem.judge is None or not all(len(table.options) for table in problem.roles):
+            continue
+        for r, (table, role) in enumerate(zip(problem.roles, family.roles, strict=True)):
+            in_force().check()
+            sensors = table.options.sensor
+            _, first = np.unique(sensors, return_index=True)
+            gone = [p for p in first.tolist() if problem.judge.hopeless(problem, r, p)]
+            kept[r] &= ~np.isin(sensors[role.places[m]], sensors[gone])
+    places = tuple(np.flatnonzero(one) for one in kept)
+    roles = tuple(role.take(own) for role, own in zip(family.roles, places, strict=True))
+    return replace(family, roles=roles), places
+
+
+def _whole(design: FamilyDesign, places: Sequence[Indices]) -> FamilyDesign:
+    """A design of a part as one of the whole family."""
+    ways = (int(own[way]) for own, way in zip(places, design.ways, strict=True))
+    return replace(design, ways=tuple(ways))
+
+
+def front_of(work: Work, resource: ResourceName = "cost") -> tuple[FamilyPoint, ...]:
+    """The exact front of all that meet every requirement but accuracy, simulation included."""
+    passes = passing(work)
+    if passes is None:
+        return family_front(work.family, resource)
+    family, places = promising_family(work.family)
+    points = family_front(family, resource, lambda design: passes(_whole(design, places)))
+    return tuple(replace(one, design=_whole(one.design, places)) for one in points)
 
 
 def passing(

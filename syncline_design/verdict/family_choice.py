@@ -7,22 +7,22 @@ from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
-from syncline_design.choice.family_best import FamilyPoint, family_front
+from syncline_design.choice.family_best import FamilyPoint
 from syncline_design.choice.front import staircase
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint, Proof
 from syncline_design.machine.deadline import in_force
-from syncline_design.verdict.choice_data import full_design, ruled_out
+from syncline_design.verdict.choice_data import MOST_EXCLUDED, full_design, ruled_out
 from syncline_design.verdict.family import (
     Build,
     Chosen,
     Work,
     choose_family,
+    front_of,
     intervals,
-    passing,
     work_of,
 )
-from syncline_design.verdict.named import ChoiceResult, FrontDesign, RankedDesign
+from syncline_design.verdict.named import ChoiceResult, Exclusion, FrontDesign, RankedDesign
 from syncline_design.verdict.recheck_sums import BUDGETS, Budget
 from syncline_design.verdict.tree import Robustness
 
@@ -35,7 +35,7 @@ def ranked(work: Work, chosen: Chosen) -> RankedDesign:
     sums = chosen.found.sums
     worst = max(range(len(sums.missions)), key=lambda m: sums.missions[m].error_m)
     scenario = work.scenarios[worst]
-    shown = full_design(scenario.case, scenario.problem, chosen.designs[worst])
+    shown = full_design(scenario.case, work.family.problems[worst], chosen.designs[worst])
     amounts = [None if (a := sums.amount(name)) is None else float(a) for name in BUDGETS]
     cost, mass, power = amounts
     return RankedDesign(
@@ -66,8 +66,8 @@ def robustness_of(work: Work, sums: Sums, build: Callable[[], Build]) -> Robustn
 def choice_of_family(work: Work) -> ChoiceResult:
     """The proof, the front of the family, what was ruled out in any mission."""
     in_force().doing("working out the front")
-    points = family_front(work.family, also=passing(work))
-    excluded, count = ruled_out(work.scenarios[0].problem)
+    points = front_of(work)
+    excluded, count = ruled_out_of(work)
     return ChoiceResult(
         proof=Proof("front", optimal=True, rechecked=True),
         front=tuple(front_design(work, point) for point in points),
@@ -75,6 +75,24 @@ def choice_of_family(work: Work) -> ChoiceResult:
         excluded=excluded,
         excluded_count=count,
     )
+
+
+def ruled_out_of(work: Work) -> tuple[tuple[Exclusion, ...], int]:
+    """What was ruled out in any mission, each row once; in some of them alone: in which."""
+    rows: dict[Exclusion, list[str]] = {}
+    several = bool(work.case.missions)
+    for one in work.scenarios:
+        for row in ruled_out(one.problem)[0]:
+            names = rows.setdefault(row, [])
+            if one.mission not in names:
+                names.append(one.mission)
+    told = [
+        replace(row, reason=f"in mission {', '.join(names)}: {row.reason}")
+        if several and len(names) < len(work.missions)
+        else row
+        for row, names in rows.items()
+    ]
+    return tuple(told[:MOST_EXCLUDED]), len(told)
 
 
 def as_point(work: Work, point: FamilyPoint) -> FrontPoint:

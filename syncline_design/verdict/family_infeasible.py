@@ -8,7 +8,8 @@ from dataclasses import replace
 from syncline_design.choice.outcome import Conflict, Explanation
 from syncline_design.spec.case import Mission
 from syncline_design.verdict.family import ALL, Build, Work, choose_family, work_of
-from syncline_design.verdict.family_choice import cannot_share
+from syncline_design.verdict.family_choice import cannot_share, ruled_out_of
+from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Verdict
 from syncline_design.verdict.verified import frame
 from syncline_design.verdict.verify import CheckSettings, infeasible_verdict, unmet
@@ -41,6 +42,7 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
         text = (f"No payload holds with probability {work.case.spec.choose_for}.",)
     why = Explanation((), Conflict((), False), (), (), (), False, text, names or None)
     first = work.missions[0].case
+    excluded, count = ruled_out_of(work)
     return Verdict(
         verdict="infeasible",
         **frame(work.case, work.scenarios[0].problem, settings.seed),
@@ -49,6 +51,7 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
             for one in first.spec.requirements
         ),
         infeasibility=why,
+        choice=ChoiceResult(excluded=excluded, excluded_count=count),
         missions=_without_design(work, None),
     )
 

@@ -11,14 +11,14 @@ from syncline_design.choice.family import FamilyEvaluation
 from syncline_design.choice.outcome import (
     NoVerdict,
     OutOfTime,
+    Proof,
 )
 from syncline_design.choice.problem import selection_of, with_everything
 from syncline_design.choice.table import Design, Problem
-from syncline_design.machine.deadline import in_force
+from syncline_design.machine.deadline import Pieces, in_force
 from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import Selection
-from syncline_design.verdict.bill import total
 from syncline_design.verdict.family import (
     Build,
     Chosen,
@@ -27,6 +27,7 @@ from syncline_design.verdict.family import (
     pinned_family,
     work_of,
 )
+from syncline_design.verdict.family_bill import bill_of, bought
 from syncline_design.verdict.family_choice import (
     Sums,
     choice_of_family,
@@ -36,11 +37,8 @@ from syncline_design.verdict.family_choice import (
 from syncline_design.verdict.family_infeasible import infeasible_family
 from syncline_design.verdict.likely import CONFIDENCE
 from syncline_design.verdict.named import (
-    BillLine,
     ChoiceResult,
-    NamedDesign,
     RankedDesign,
-    SharedHardware,
 )
 from syncline_design.verdict.recheck_family import family_sums
 from syncline_design.verdict.recheck_sums import BUDGETS
@@ -48,6 +46,7 @@ from syncline_design.verdict.tree import (
     Caution,
     MissionVerdict,
     RequirementResult,
+    Robustness,
     Verdict,
     Word,
     decided,
@@ -64,6 +63,7 @@ from syncline_design.verdict.verify import (
 )
 
 _WORST_FIRST: dict[str, int] = {"fails": 0, "infeasible": 0, "indeterminate": 1, "meets": 2}
+PROVEN = ChoiceResult(proof=Proof("front", optimal=True, rechecked=True))
 SHARE = "CHOOSE_FOR"  # the implied requirement of a choice for a probability
 _STATUS_ORDER = {"fail": 0, "indeterminate": 1, "pass": 2}
 
@@ -103,7 +103,7 @@ def check_family(case: Case, settings: CheckSettings) -> Verdict:
         chosen = choose_family(work) if pinned is None else None
         if chosen is None:
             return infeasible_family(work, settings, build)
-        return _verdict_on(work, chosen, settings, build, choice_of_family(work))
+        return _verdict_on(work, chosen, settings, build, PROVEN)
     except OutOfTime as error:
         return unfinished_verdict(case, None, settings, str(error))
 
@@ -124,17 +124,32 @@ def _verdict_on(
     )
     _demand_agreement(chosen, sums)
     judged = [_judged(work, one, chosen, selections, sums, settings) for one in work.missions]
+    pieces = Pieces()
     if work.case.missions:
-        judged = [replace(one, alone=_alone(one, build)) for one in judged]
+        judged = [
+            replace(one, alone=pieces.made(f"{one.mission.name} alone", _alone(one, build), None))
+            for one in judged
+        ]
     shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], _least_margin(one.rows)))
-    found = _assembled(work, judged, shown, sums, settings, build, choice)
+    nothing: Robustness | None = None
+    robust = pieces.made(
+        "the choice at given figures", lambda: robustness_of(work, sums, build), nothing
+    )
+    told = choice
+    if choice.proof is not None:
+        told = pieces.made("front", lambda: choice_of_family(work), choice)
+    found = _assembled(work, judged, shown, sums, settings, told)
+    found = replace(
+        found,
+        robustness=robust,
+        warnings=(*(Caution(*one) for one in pieces.cautions), *found.warnings),
+    )
     return found if work.likelihood is None else _with_probability(work, chosen, found)
 
 
 def _with_probability(work: Work, chosen: Chosen, found: Verdict) -> Verdict:
     """The verdict with the share of figures for which the design fails, and what is left open."""
     assert work.likelihood is not None
-    assert found.robustness is not None
     one = work.likelihood.of(chosen.problems, chosen.designs)
     row = decided(
         id=SHARE, kind="failing_share", status=one.status, value=1.0 - one.value,
@@ -151,7 +166,7 @@ def _with_probability(work: Work, chosen: Chosen, found: Verdict) -> Verdict:
             "open: samples do not tell whether they reach the probability"
         )
         warnings = (Caution("undecided-before", message), *warnings)
-    robust = replace(found.robustness, probability=one)
+    robust = found.robustness and replace(found.robustness, probability=one)
     return replace(
         found, verdict=word, requirements=(*found.requirements, row), warnings=warnings,
         robustness=robust,
@@ -284,12 +299,15 @@ def _least_margin(rows: Sequence[RequirementResult]) -> float:
     return min(shares, default=math.inf)
 
 
-def _alone(one: Judged, build: Callable[[], Build]) -> RankedDesign | None:
+def _alone(one: Judged, build: Callable[[], Build]) -> Callable[[], RankedDesign | None]:
     """The best payload of a mission by itself."""
-    in_force().doing(f"choosing for {one.mission.name} alone")
-    own = work_of(replace(one.mission.case, missions=()), build)
-    chosen = choose_family(own)
-    return None if chosen is None or chosen.undecided else ranked(own, chosen)
+
+    def choose() -> RankedDesign | None:
+        own = work_of(replace(one.mission.case, missions=()), build)
+        chosen = choose_family(own)
+        return None if chosen is None or chosen.undecided else ranked(own, chosen)
+
+    return choose
 
 
 def _assembled(
@@ -298,13 +316,12 @@ def _assembled(
     shown: Judged,
     sums: Sums,
     settings: CheckSettings,
-    build: Callable[[], Build],
     choice: ChoiceResult,
 ) -> Verdict:
     """The family's verdict; what only one mission can show is that of the tightest one."""
     words = {one.word for one in judged}
     word: Word = min(words, key=lambda one: _WORST_FIRST[one])
-    bill = _bill([one.verdict for one in judged])
+    bill = bill_of([one.verdict for one in judged])
     design = shown.verdict.design
     assert design is not None
     several = bool(work.case.missions)
@@ -319,12 +336,11 @@ def _assembled(
         verdict=word,
         **made,
         requirements=_family_rows(judged) if several else shown.rows,
-        design=_bought(design, [one.verdict.design for one in judged], sums, bill),
+        design=bought(design, [one.verdict.design for one in judged], sums, bill),
         warnings=tuple(_warnings(judged, shown, several=several)),
         choice=choice if choice.proof is not None else None,
         bill_of_materials=bill,
         missions=tuple(_mission_verdict(one) for one in judged) if several else None,
-        robustness=robustness_of(work, sums, build),
     )
 
 
@@ -390,32 +406,3 @@ def _warnings(judged: Sequence[Judged], shown: Judged, *, several: bool) -> Iter
             yield caution
         else:
             yield replace(caution, message=f"in mission {', '.join(names)}: {caution.message}")
-
-
-def _bill(verdicts: Sequence[Verdict]) -> tuple[BillLine, ...]:
-    """What is bought for all missions: each piece once, shared hardware as often as one needs."""
-    lines: dict[tuple[str, str, str], BillLine] = {}
-    for verdict in verdicts:
-        for line in verdict.bill_of_materials or ():
-            key = (line.stage, line.use, line.entry)
-            if key not in lines or lines[key].quantity < line.quantity:
-                lines[key] = line
-    return tuple(lines.values())
-
-
-def _bought(
-    design: NamedDesign,
-    designs: Sequence[NamedDesign | None],
-    sums: Sums,
-    bill: tuple[BillLine, ...],
-) -> NamedDesign:
-    """A mission's design with what the whole family buys."""
-    boards: dict[tuple[str, str], SharedHardware] = {}
-    for own in designs:
-        for board in own.infrastructure if own is not None else ():
-            known = boards.get((board.vehicle, board.id))
-            if known is None or known.count < board.count:
-                boards[board.vehicle, board.id] = board
-    cost, mass, power = (None if (a := sums[n]) is None else float(a) for n in BUDGETS)
-    cost = total(bill, "cost") if cost is not None else None
-    return replace(design, cost=cost, mass=mass, power=power, infrastructure=tuple(boards.values()))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from syncline_design import __version__
-from syncline_design.choice.family_best import Found, family_front
+from syncline_design.choice.family_best import Found
 from syncline_design.choice.front import staircase
 from syncline_design.choice.outcome import Proof
 from syncline_design.choice.problem import selection_of
@@ -17,9 +17,8 @@ from syncline_design.spec.edit import pinned_spec_text
 from syncline_design.spec.edit_missions import pinned_missions_text
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.acceptance import Simulations
-from syncline_design.verdict.choice_data import ruled_out
-from syncline_design.verdict.family import Build, Chosen, Work, accepted, passing, work_of
-from syncline_design.verdict.family_choice import as_point, front_design, ranked
+from syncline_design.verdict.family import Build, Chosen, Work, accepted, front_of, work_of
+from syncline_design.verdict.family_choice import as_point, front_design, ranked, ruled_out_of
 from syncline_design.verdict.missions import check_family
 from syncline_design.verdict.optimise import (
     MadeFrom,
@@ -62,7 +61,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
             cut_short.append("next best designs")
         more = _front(work, settings) if settings.pareto else {}
     designs = [Chosen(work.family.designs(o.design), work.family.problems, o) for o in found]
-    excluded, count = ruled_out(work.scenarios[0].problem)
+    excluded, count = ruled_out_of(work)
     result = Optimisation(
         verdict=verdict.verdict,
         spec=SpecName(case.spec.name, str(case.path)),
@@ -115,7 +114,7 @@ def _sensors(work: Work, one: Found) -> tuple[str, ...]:
 
 
 def _front(work: Work, settings: OptimizeSettings) -> dict[str, Any]:
-    points = family_front(work.family, settings.resource, passing(work))
+    points = front_of(work, settings.resource)
     return {
         "front": tuple(front_design(work, point, settings.resource) for point in points),
         "staircase": staircase([as_point(work, point) for point in points]),

@@ -1,0 +1,41 @@
+"""What a family buys: each mission's pieces once, shared hardware as often as one of them needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from syncline_design.verdict.bill import total
+from syncline_design.verdict.family_choice import Sums
+from syncline_design.verdict.named import BillLine, NamedDesign, SharedHardware
+from syncline_design.verdict.recheck_sums import BUDGETS
+from syncline_design.verdict.tree import Verdict
+
+
+def bill_of(verdicts: Sequence[Verdict]) -> tuple[BillLine, ...]:
+    """What is bought for all missions: each piece once, shared hardware as often as one needs."""
+    lines: dict[tuple[str, str, str], BillLine] = {}
+    for verdict in verdicts:
+        for line in verdict.bill_of_materials or ():
+            key = (line.stage, line.use, line.entry)
+            if key not in lines or lines[key].quantity < line.quantity:
+                lines[key] = line
+    return tuple(lines.values())
+
+
+def bought(
+    design: NamedDesign,
+    designs: Sequence[NamedDesign | None],
+    sums: Sums,
+    bill: tuple[BillLine, ...],
+) -> NamedDesign:
+    """A mission's design with what the whole family buys."""
+    boards: dict[tuple[str, str], SharedHardware] = {}
+    for own in designs:
+        for board in own.infrastructure if own is not None else ():
+            known = boards.get((board.vehicle, board.id))
+            if known is None or known.count < board.count:
+                boards[board.vehicle, board.id] = board
+    cost, mass, power = (None if (a := sums[n]) is None else float(a) for n in BUDGETS)
+    cost = total(bill, "cost") if cost is not None else None
+    return replace(design, cost=cost, mass=mass, power=power, infrastructure=tuple(boards.values()))
