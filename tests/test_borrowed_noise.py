@@ -15,8 +15,10 @@ import pytest
 
 from syncline_design.diagnosis.axes import still_axes_apart, varying_axes
 from syncline_design.diagnosis.borrowed import borrowed_nats, doubt_nats, noisier_scenes
+from syncline_design.diagnosis.cancelling import cancelling
 from syncline_design.diagnosis.charges import UNUSUAL_NATS, Charge
 from syncline_design.diagnosis.expected_noise import structure_of
+from syncline_design.diagnosis.fitting import data_of, fit
 from syncline_design.diagnosis.noise import (
     as_specified,
     first_guess,
@@ -102,3 +104,30 @@ def test_an_axis_that_never_varies_says_nothing_of_the_others_noise(tmp_path: Pa
     rows = np.arange(50)
     part = replace(apart, survey=None).rows(rows)
     assert part.fixed.shape[0] == 50
+
+
+@pytest.mark.parametrize(
+    ("height_m", "spread_m", "undone"),
+    [(5.02, 1.0, True), (5.02, 0.1, False), (3.0, 1.0, False), (0.02, 1.0, False)],
+)
+def test_two_heights_that_undo_each_other_are_no_causes(
+    height_m: float, spread_m: float, undone: bool, tmp_path: Path
+) -> None:
+    """On a level vehicle an arm of 5 m down and a reference 5 m down leave nothing.
+
+    Unless each is known for itself, or they leave as much as they are, or both are within noise.
+    """
+    view = moving(tmp_path)
+    data = data_of(view, structure_of(view))
+    arm_m = min(5.0, height_m)
+    causes = (
+        acting("lever_arm", "position", 0, {"x_m": 0.1, "y_m": 0.0, "z_m": arm_m}),
+        acting("datum_offset", "target", 0, {"north_m": 0.0, "east_m": 0.0, "down_m": height_m}),
+    )
+    if not undone and height_m == 3.0:
+        causes = (acting("lever_arm", "position", 0, {"x_m": 0, "y_m": 0, "z_m": 5.0}), causes[1])
+    model = replace(fit(data), acting=causes)
+    spreads = {one.label: np.full(3, spread_m) for one in causes}
+    found = cancelling(data, model, spreads, POSITION_M * np.sqrt(3.0))
+    first, second = (one.label for one in causes)
+    assert found == ({first: second, second: first} if undone else {})

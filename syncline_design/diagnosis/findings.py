@@ -9,6 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from syncline_design.diagnosis.cancelling import cancelling
 from syncline_design.diagnosis.candidates import EDGE
 from syncline_design.diagnosis.consequence import Weights, rms_m
 from syncline_design.diagnosis.episodes import Episode, episode_effect
@@ -119,7 +120,12 @@ def findings(
 
     refuted: what is left is no noise, so no chance is stated: it would rest on that noise.
     """
-    found = [_deterministic(final, k, weights) for k in _single(final.model)]
+    spreads = {label: judged.spread for label, judged in final.judged.items()}
+    undone = cancelling(final.data, final.model, spreads, weights.spec_m)
+    found = [
+        _undone(_deterministic(final, k, weights), undone.get(final.model.acting[k].label))
+        for k in _single(final.model)
+    ]
     for opened in final.model.opened:
         one = _tails if opened.what == "tails" else _stochastic
         found += one(final, opened, weights)
@@ -127,6 +133,15 @@ def findings(
         found = [_without_chance(one) for one in found]
     found.sort(key=lambda f: (not f.material, f.kind == "noise", -f.gain_nat))
     return (*(_gross(final.data.view, g) for g in gross), *found)
+
+
+def _undone(one: Finding, other: Label | None) -> Finding:
+    """The finding, a stand-in where another one undoes it."""
+    if other is None:
+        return one
+    name, sensor, _ = other
+    words = f"{one.sentence}; {name} ({sensor}) undoes nearly all of it, so neither is shown"
+    return replace(one, kind="stand_in", sentence=words)
 
 
 def _without_chance(one: Finding) -> Finding:
