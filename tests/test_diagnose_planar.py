@@ -77,7 +77,9 @@ def write(folder: Path, columns: dict[str, Array], scanner: bool) -> tuple[Path,
     return spec, log
 
 
-def scanned(folder: Path, draw: Draw, seed: int, height_m: float = 0.0) -> tuple[Path, Path]:
+def scanned(
+    folder: Path, draw: Draw, seed: int, height_m: float = 0.0, turned_deg: float = 0.0
+) -> tuple[Path, Path]:
     """A plane scan of walls around: range and azimuth, elevation zero, target down zero."""
     rng = np.random.default_rng(seed)
     moved = drive(rng)
@@ -85,6 +87,7 @@ def scanned(folder: Path, draw: Draw, seed: int, height_m: float = 0.0) -> tuple
     bearing, distance = rng.uniform(-2.0, 2.0, ROWS), rng.uniform(2.0, 11.0, ROWS)
     zero = np.zeros(ROWS)
     noise = draw(rng, ROWS)
+    moved["yaw_deg"] = moved["yaw_deg"] + turned_deg
     azimuth = bearing + np.radians(0.05) * rng.standard_normal(ROWS)
     columns = moved | {
         "position_north_m": north + noise[:, 0], "position_east_m": east + noise[:, 1],
@@ -208,3 +211,18 @@ def test_what_a_plane_log_does_not_show_has_no_figure(tmp_path: Path) -> None:
     assert "0 m down" not in finding.sentence
     assert "(not seen) down" in finding.sentence
     assert "lever_arm (position): z_m" in data["unseen"]
+
+
+def test_a_heading_that_is_off_is_not_a_mounting_with_three_angles(tmp_path: Path) -> None:
+    """All three fit a turn about the vertical; the one that can do nothing else is named.
+
+    The height that is off beside it is an arm's or a datum's, not that of a mount that bends.
+    """
+    spec, log = scanned(tmp_path, normal, 6, height_m=0.4, turned_deg=1.5)
+    found = diagnose(spec, [log])
+    turned, height = sorted(found.findings, key=lambda one: one.sensor)
+    assert turned.effect == "heading_bias"
+    low, high = turned.parameters["bias_rad"].interval95 or (np.nan, np.nan)
+    assert low <= np.radians(1.5) <= high
+    assert height.effect in ("lever_arm", "datum_offset")
+    assert {one.effect for one in turned.aliases} >= {"boresight", "mounting"}

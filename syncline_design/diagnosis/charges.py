@@ -27,11 +27,12 @@ UNUSUAL_NATS = 5.0  # what such an arm is charged: one in a hundred or so
 
 @dataclass(frozen=True, slots=True)
 class Charge:
-    """figures: what its figures cost, borrowed: noise of columns in its favour or not [nat].
+    """count: of its figures; figures: what they cost [nat]; borrowed: noise of columns [nat].
 
     unusual: whether its values are beyond what such an effect usually has on this platform.
     """
 
+    count: int
     figures: float
     borrowed: float
     unusual: bool
@@ -54,7 +55,8 @@ class Charge:
 def charge(data: Data, model: Model, label: Label, named: Model) -> Charge:
     """What one effect of a model is charged, at the covariance of the named one's."""
     borrowed = data.borrowed_nats(model, named.precision)
-    return Charge(_figures(data, model, label), borrowed, _unusual(data, model, label))
+    count = freedom_of(effect_of(model, label))
+    return Charge(count, _figures(data, model, label), borrowed, _unusual(data, model, label))
 
 
 def _figures(data: Data, model: Model, label: Label) -> float:

@@ -96,7 +96,7 @@ def _best(
     fits: Mapping[Label, Model],
     charges: Mapping[Label, Charge],
 ) -> Label:
-    """The likeliest member of a class; among those that are as good, the commonest in practice.
+    """The likeliest member of a class; of those as good, the one of fewest figures, the commonest.
 
     As good is what noise of the columns of motion may have made worse.
     """
@@ -111,7 +111,12 @@ def _best(
         one for one, score in scores.items()
         if score <= scores[least] + AS_GOOD_NATS + charges[one].doubt(charges[least])
     ]  # fmt: skip
-    return min(close, key=lambda one: (charges[one].unusual, commonness(one), scores[one], one))
+
+    def order(one: Label) -> tuple[bool, int, tuple[int, int], float, Label]:
+        mine = charges[one]
+        return mine.unusual, mine.count, commonness(one), scores[one], one
+
+    return min(close, key=order)
 
 
 def _sorted_out(
