@@ -382,6 +382,18 @@ def test_sessions_shorter_than_the_horizon_bear_nothing_out(clocked: Path) -> No
     assert run("accept", clocked, *logs, *asked).exit_code == 0
 
 
+def test_few_sessions_that_keep_a_bound_do_not_break_it(clocked: Path) -> None:
+    """Levels of 50, 100 and 800 us: from three the bound over sessions is far beyond 1 ms."""
+    folder = clocked.parent / "logs"
+    folder.mkdir()
+    logs = sessions_csv(folder, [1e-5, 3e-5, 2e-4], count=800, step_s=10.0)
+    done = run("accept", clocked, *logs, "--only", "clock", "-o", "json:-")
+    (row,) = json.loads(done.stdout)["assumptions"]
+    assert row["measured"]["value"] > row["assumed"] == 1e-3
+    assert (row["status"], done.exit_code) == ("not_shown", 3), row
+    assert "more sessions" in row["evidence"]
+
+
 def test_a_servo_that_nulls_its_own_offsets_bears_nothing_out(clocked: Path) -> None:
     """statistics.log holds no delays: an asymmetric path stays hidden; tracking.log bounds it."""
     folder = clocked.parent / "logs"

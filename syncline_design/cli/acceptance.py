@@ -21,10 +21,10 @@ from syncline_design.cli.shared import (
     watched,
 )
 
-_ASSIGNED = "expected OF=LOG, such as uav=tracking.log"
-
 if TYPE_CHECKING:
     from syncline_design.comparison.acceptance import AssumptionName
+
+_ASSIGNED = "expected OF=LOG, such as uav=tracking.log"
 
 
 @guarded

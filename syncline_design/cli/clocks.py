@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from syncline_design.clocks.entry import EntryFiles
     from syncline_design.clocks.study import TimingSettings, TimingStudy
     from syncline_design.comparison.clock_meaning import TimingAndSpec
+    from syncline_design.report.write import Target
     from syncline_design.spec.case import Case
 
 _SHARE = "a share between 0 and 1, such as 0.95"
@@ -79,12 +81,8 @@ def timing(
 ) -> int:
     """Bound a clock's error from its logs, over sessions, with a stated claim."""
     deadline = deadline_of(time_limit)
-    from syncline_design.clocks.entry import entry_files
-    from syncline_design.clocks.study import TimingSettings, study_logs
+    from syncline_design.clocks.study import TimingSettings
     from syncline_design.report.formats import TIMING_FORMATS
-    from syncline_design.report.on_timing import on_timing, render_timing
-    from syncline_design.report.render_console import console
-    from syncline_design.spec.load import load
 
     if write_catalog is not None and as_id is None:
         refuse("syncline-design: --write-catalog needs --as ID, the entry's id")
@@ -93,16 +91,56 @@ def timing(
         _share(session_share, "--session-share"), _share(confidence, "--confidence"),
         source, independent, use, entry, dict(_declared(one) for one in declare or ()), conditions,
     )  # fmt: skip
-    files = None if as_id is None else entry_files(as_id, write_catalog)
+    wanted = _entry(as_id, write_catalog)
     reads = [*log, *([spec] if spec is not None else [])]
-    targets = output_targets(output, TIMING_FORMATS, reads, files.paths if files else ())
+    targets = output_targets(output, TIMING_FORMATS, reads, wanted.files.paths if wanted else ())
     with watched(deadline, targets, quiet=quiet):
-        case = None if spec is None else load(spec)
-        study = study_logs(log, settings)
-        whole = _with_spec(study, settings, case, as_id or "measured", seed)
-    if as_id is not None and files is not None:
-        currency = "EUR" if case is None else case.spec.currency
-        whole = _written(study, whole, as_id, settings, files, currency)
+        told = _told(log, settings, spec, wanted, seed)
+    whole = told.whole if wanted is None else _written(told, settings, wanted)
+    return _shown(whole, targets, quiet)
+
+
+@dataclass(frozen=True, slots=True)
+class _Entry:
+    """What `--as` writes, and where."""
+
+    identity: str
+    files: EntryFiles
+
+
+@dataclass(frozen=True, slots=True)
+class _Told:
+    """A study, what it means for the spec, and the currency of an entry."""
+
+    study: TimingStudy
+    whole: TimingAndSpec
+    currency: str
+
+
+def _entry(identity: str | None, catalog: Path | None) -> _Entry | None:
+    from syncline_design.clocks.entry import entry_files
+
+    return None if identity is None else _Entry(identity, entry_files(identity, catalog))
+
+
+def _told(
+    logs: list[Path], settings: TimingSettings, spec: Path | None, wanted: _Entry | None, seed: int
+) -> _Told:
+    """The logs read and bounded, and held against the spec."""
+    from syncline_design.clocks.study import study_logs
+    from syncline_design.spec.load import load
+
+    case = None if spec is None else load(spec)
+    study = study_logs(logs, settings)
+    identity = "measured" if wanted is None else wanted.identity
+    whole = _with_spec(study, settings, case, identity, seed)
+    return _Told(study, whole, "EUR" if case is None else case.spec.currency)
+
+
+def _shown(whole: TimingAndSpec, targets: list[Target], quiet: bool) -> int:
+    from syncline_design.report.on_timing import on_timing, render_timing
+    from syncline_design.report.render_console import console
+
     emit(console(on_timing(whole)), targets, lambda name: render_timing(name, whole), quiet=quiet)
     return whole.exit_code
 
@@ -120,21 +158,18 @@ def _with_spec(
     return with_spec(study.timing, means)
 
 
-def _written(
-    study: TimingStudy, whole: TimingAndSpec, identity: str, settings: TimingSettings,
-    files: EntryFiles, currency: str,
-) -> TimingAndSpec:  # fmt: skip
+def _written(told: _Told, settings: TimingSettings, wanted: _Entry) -> TimingAndSpec:
     """The entry on the disk, unless no claim could be made."""
     from syncline_design.clocks.entry import with_entry, write_entry
     from syncline_design.comparison.clock_meaning import with_spec
 
-    if not whole.claim.made:
-        say(f"no claim, so no entry written: {whole.claim.why_not}")
-        return whole
-    timing = with_entry(study, identity, settings.kind, files, currency)
-    write_entry(study, timing, files)
-    say(f"entry {identity} written to {files.catalog}")
-    return with_spec(timing, whole.spec)
+    if not told.whole.claim.made:
+        say(f"no claim, so no entry written: {told.whole.claim.why_not}")
+        return told.whole
+    timing = with_entry(told.study, wanted.identity, settings.kind, wanted.files, told.currency)
+    write_entry(told.study, timing, wanted.files)
+    say(f"entry {wanted.identity} written to {wanted.files.catalog}")
+    return with_spec(timing, told.whole.spec)
 
 
 def _share(value: float, option: str) -> float:

@@ -39,6 +39,10 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
         return Judgement("not_shown", f"the clock logs bound nothing: {found.claim.why_not}")
     figure = MeasuredFigure(found.bound_s)
     asked, measured = format_duration(one.value), format_duration(found.bound_s)
+    if found.bound_s > one.value and _seen_s(found) <= one.value:
+        said = (f"measured bound {measured}, more than the {asked} assumed, but no session was "
+                "beyond that: more sessions would narrow the bound")  # fmt: skip
+        return Judgement("not_shown", said, figure)
     if found.bound_s > one.value:
         times = f"{found.bound_s / one.value:.3g} times" if one.value else "not"
         said = f"measured bound {measured}, {times} the {asked} assumed"
@@ -47,6 +51,12 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
     status: Status = "not_shown" if why else "holds"
     lead = f"measured bound {measured} within the {asked} assumed"
     return Judgement(status, lead + (why or _rests_on(found)), figure)
+
+
+def _seen_s(found: Timing) -> float:
+    """What these logs themselves show: the worst session, and the daemon's own bound."""
+    quantiles = [s.quantile_s or 0.0 for s in found.sessions if s.counted]
+    return max([*quantiles, found.hard_bound_s or 0.0])
 
 
 def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:

@@ -22,6 +22,7 @@ _ALONE: Final = {
     "mounting": ", but for a turn of the other sensor that undoes it",
 }
 _GROWING: Final = ("heading_drift",)  # what drifts shows with the log's length to the power 3/2
+READ: Final = 0.01  # of a limit that readings may lie beyond it
 MOVED: Final = 0.1  # of a limit: a log that stays below it does not show that the limit is kept
 _MOTION: Final = {"speed": ("speed", 1.0), "rate": ("turn_rate", math.pi / 180.0)}
 _CODES: Final = {"speed": "speed", "rate": "turn_rate"}
@@ -252,7 +253,7 @@ def _of_platform(one: Assumed, found: Diagnosis, last_stage: str) -> Judgement:
     most = reached if motion.most is None else motion.most * unit
     if reached < MOVED * one.value:
         return Judgement("not_shown", "the log stays far below the limit", MeasuredFigure(most))
-    if most > one.value:
+    if most > (1.0 + READ) * one.value:
         words = "the log goes beyond the limit for moments, or its readings scatter that far"
         return Judgement("not_shown", words, MeasuredFigure(most))
     return Judgement("holds", "the most that the log reaches", MeasuredFigure(most))
