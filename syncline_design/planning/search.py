@@ -91,26 +91,50 @@ class Placed:
         return self.start_s + self.told.leg.duration_s
 
 
-def arranged(sequence: Sequence[Told]) -> tuple[Placed, ...]:
-    """Every leg at the heading that ends nearest to the start, the way back first."""
-    place, end_s, found = np.zeros(2), 0.0, []
-    before, heading_rad = 0, 0.0
-    for told in sequence:
-        ends = [place + _turned(told.moved_m, h) for h in range(4)]
+@dataclass(frozen=True, slots=True)
+class Way:
+    """Where some legs end: north and east [m], which of the four headings the last one had, the
+    heading now, and when."""
+
+    place_m: tuple[float, float] = (0.0, 0.0)
+    before: int = 0
+    heading_rad: float = 0.0
+    end_s: float = 0.0
+
+    def then(self, told: Told) -> tuple[Placed, Way]:
+        """One more leg, at the heading that ends nearest to the start, the way back first."""
+        moved = [_turned(told.moved_m, h) for h in range(4)]
+        ends = [(self.place_m[0] + north, self.place_m[1] + east) for north, east in moved]
         costs = [
-            float(np.hypot(*end)) + 1e-6 * ((h - before - 2) % 4) for h, end in enumerate(ends)
+            round(math.hypot(*end) + 1e-6 * ((h - self.before - 2) % 4), 5)
+            for h, end in enumerate(ends)
         ]
-        heading = int(np.argmin(np.round(costs, 5)))
+        heading = costs.index(min(costs))
         begins_rad = QUARTER_RAD * heading
-        found.append(Placed(told, heading, end_s + told.turn_s(begins_rad - heading_rad)))
-        place, before, end_s = ends[heading], heading, found[-1].end_s
-        heading_rad = begins_rad + told.turned_rad
+        placed = Placed(told, heading, self.end_s + told.turn_s(begins_rad - self.heading_rad))
+        return placed, Way(ends[heading], heading, begins_rad + told.turned_rad, placed.end_s)
+
+
+def arranged(sequence: Sequence[Told]) -> tuple[Placed, ...]:
+    """Every leg at its heading and time."""
+    way, found = Way(), []
+    for told in sequence:
+        placed, way = way.then(told)
+        found.append(placed)
     return tuple(found)
 
 
-def _turned(moved: tuple[float, float], heading: int) -> Array:
+def way_of(sequence: Sequence[Told]) -> Way:
+    """Where the legs of a sequence end."""
+    way = Way()
+    for told in sequence:
+        way = way.then(told)[1]
+    return way
+
+
+def _turned(moved: tuple[float, float], heading: int) -> tuple[float, float]:
     cos, sin = ((1, 0), (0, 1), (-1, 0), (0, -1))[heading]
-    return np.array([moved[0] * cos - moved[1] * sin, moved[0] * sin + moved[1] * cos])
+    return moved[0] * cos - moved[1] * sin, moved[0] * sin + moved[1] * cos
 
 
 def extent_m(sequence: Sequence[Told]) -> tuple[float, float]:
@@ -119,21 +143,21 @@ def extent_m(sequence: Sequence[Told]) -> tuple[float, float]:
     for one in arranged(sequence):
         south, north, west, east = one.told.box_m
         for corner in ((south, west), (south, east), (north, west), (north, east)):
-            at = place + _turned(corner, one.heading)
+            at = place + np.array(_turned(corner, one.heading))
             low, high = np.minimum(low, at), np.maximum(high, at)
-        place = place + _turned(one.told.moved_m, one.heading)
+        place = place + np.array(_turned(one.told.moved_m, one.heading))
     return float(high[0] - low[0]), float(high[1] - low[1])
 
 
 def lasting_s(sequence: Sequence[Told]) -> float:
     """Of all legs with the turns between them."""
-    return arranged(sequence)[-1].end_s if sequence else 0.0
+    return way_of(sequence).end_s
 
 
 def together(sequence: Sequence[Told]) -> Array:
     """Information of all legs."""
     total: Array = np.sum([p.told.at(p.heading, p.start_s) for p in arranged(sequence)], axis=0)
-    return total
+    return total if sequence else np.zeros(())
 
 
 @dataclass(frozen=True, slots=True)
@@ -308,33 +332,28 @@ class Search:
         self, plan: list[Told], value: float, most_s: float
     ) -> tuple[Told, float, float] | None:
         best: tuple[float, Told, float, float] | None = None
-        begun_s = lasting_s(plan)
+        way, known = way_of(plan), together(plan)
         for told in self.legs:
-            whole_s = lasting_s([*plan, told])
-            if whole_s > most_s or not self.fits([*plan, told]):
+            placed, after = way.then(told)
+            if after.end_s > most_s or not self.fits([*plan, told]):
                 continue
-            loss, after = self.value([*plan, told])
-            worth = (value - after) / (whole_s - begun_s)
+            loss, worse = self.judge.value(known + told.at(placed.heading, placed.start_s))
+            worth = (value - worse) / (after.end_s - way.end_s)
             if best is None or worth > best[0]:
-                best = (worth, told, loss, after)
+                best = (worth, told, loss, worse)
         return None if best is None else best[1:]
 
     def shortened(self, plan: list[Told]) -> list[Told]:
         """Legs left out or exchanged for shorter ones while everything stays reached."""
         for _ in range(SWEEPS):
-            trials = [*self._without(plan), *self._exchanged(plan)]
-            shorter = [t for t in trials if t and self._price(t) < self._price(plan) - 1e-6]
-            shorter = [t for t in shorter if self.fits(t)]
-            shorter.sort(key=self._price)
-            found = next((t for t in shorter if self.reaches(t)), None)
+            trials = [(lasting_s(t), t) for t in (*self._without(plan), *self._exchanged(plan))]
+            shorter = [one for one in trials if one[1] and one[0] < lasting_s(plan) - 1e-6]
+            shorter.sort(key=lambda one: one[0])
+            found = next((t for _, t in shorter if self.fits(t) and self.reaches(t)), None)
             if found is None:
                 break
             plan = found
         return plan
-
-    def _price(self, plan: list[Told]) -> float:
-        """Time [s]."""
-        return lasting_s(plan)
 
     def _without(self, plan: list[Told]) -> list[list[Told]]:
         return [plan[:k] + plan[k + 1 :] for k in range(len(plan))]
@@ -381,6 +400,8 @@ def _begun_anyhow(search: Search, most_s: float) -> list[Told]:
     if not search.reaches(best):
         return best
     best = search.shortened(best)
+    if len(best) > MOST_EXCHANGED:  # what is first hardly matters, and takes long
+        return search.bettered(best, lasting_s(best) + 1e-6)
     for told in search.legs:
         if search.deadline.is_over:
             return best
@@ -389,4 +410,13 @@ def _begun_anyhow(search: Search, most_s: float) -> list[Told]:
         found = search.grown([told], lasting_s(best))
         if search.reaches(found):
             best = min(best, search.shortened(found), key=lasting_s)
+    best = _two_legs(search, best)
     return search.bettered(best, lasting_s(best) + 1e-6)
+
+
+def _two_legs(search: Search, best: list[Told]) -> list[Told]:
+    """The shortest of all drives of two legs where it is shorter still."""
+    pairs = [[one, other] for one in search.legs for other in search.legs]
+    timed = sorted(((lasting_s(pair), pair) for pair in pairs), key=lambda one: one[0])
+    shorter = (pair for lasts_s, pair in timed if lasts_s < lasting_s(best))
+    return next((p for p in shorter if search.fits(p) and search.reaches(p)), best)
