@@ -9,7 +9,7 @@ from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
 from syncline_design.model import timing
 from syncline_design.model.roles import ROLES, RoleName
-from syncline_design.model.system import UTC, Platform, Sensor, Stage, System
+from syncline_design.model.system import UTC, Look, Platform, Sensor, Stage, System
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
     ClockEntry,
@@ -19,6 +19,7 @@ from syncline_design.spec.catalog import (
     TimestampError,
     UniformError,
 )
+from syncline_design.spec.facts import FieldOfView
 
 Vector = tuple[float, float, float]
 
@@ -96,7 +97,13 @@ def _stage(stage: StageCase, chosen: dict[RoleName, Option | None]) -> Stage:
         attitude=sensors["attitude"],
         ranging=sensors["ranging"],
         transponder_lever_arm_m=_vector(transponder),
+        look=None if choice.look is None else _look(choice.look),
     )
+
+
+def _look(view: FieldOfView) -> Look:
+    ends = (None if one is None else (one.low, one.high) for one in (view.azimuth, view.elevation))
+    return Look(*ends)
 
 
 def _vector(arm: Sequence[float] | None) -> Vector | None:

@@ -56,11 +56,20 @@ class Sensor:
 
 
 @dataclass(frozen=True, slots=True)
+class Look:
+    """Directions of azimuth and elevation [rad] between two ends each; None: every one of them."""
+
+    azimuth: tuple[float, float] | None = None
+    elevation: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class Stage:
     """One vehicle that georeferences something; in a chain the object carries the next stage.
 
     position is None from the second stage on: there the chain before yields the position, and
     `transponder_lever_arm_m` is the body vector [m] from the reference point to the transponder.
+    look: where its object is, in the body's axes; None: in any direction.
     """
 
     name: str
@@ -70,6 +79,7 @@ class Stage:
     attitude: Sensor | None
     ranging: Sensor | None
     transponder_lever_arm_m: tuple[float, float, float] | None = None
+    look: Look | None = None
 
     def sensors(self) -> tuple[Sensor, ...]:
         """Sensors the stage has, in the order position, attitude, ranging."""

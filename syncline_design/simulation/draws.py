@@ -11,7 +11,7 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.roles import RoleName
-from syncline_design.model.system import Sensor, Stage, System
+from syncline_design.model.system import Look, Sensor, Stage, System
 from syncline_design.model.timing import (
     Constant,
     Distribution,
@@ -74,6 +74,19 @@ def directions(height: Array, turn: Array) -> Array:
     np.multiply(radius, sine, out=out[:, 1])
     out[:, 2] = z
     return out
+
+
+def sight(look: Look, across: Array, up: Array) -> Array:
+    """Unit vectors (3, n) of a `look` at shares (n,) of its azimuth and of its height.
+
+    The height z = -sin(elevation) is uniform where directions are (Archimedes).
+    """
+    least, most = look.azimuth or (-math.pi, math.pi)
+    low, high = look.elevation or (-0.5 * math.pi, 0.5 * math.pi)
+    azimuth = least + (most - least) * across
+    z = -(math.sin(low) + (math.sin(high) - math.sin(low)) * up)
+    level = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+    return np.stack([level * np.cos(azimuth), level * np.sin(azimuth), z])
 
 
 def timing_draws(system: System, source: RandomSource) -> Shifts:
@@ -151,6 +164,8 @@ def stage_draw(
     free = 4 if position_lever_arm(stage, index == 0) is None else 3
     uniform = source.uniform(2 * free + 1 + 2 * inside)
     found = directions(uniform[:free], uniform[free : 2 * free])
+    if stage.look is not None:
+        found[0] = sight(stage.look, uniform[free], uniform[0])
     cos_yaw, sin_yaw = angle(uniform[2 * free])
     speed: float | Array = float(stage.platform.v_max_mps)
     rate: float | Array = float(stage.platform.omega_max_radps)

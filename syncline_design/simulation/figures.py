@@ -17,7 +17,7 @@ from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.ascent import SYSTEM, chosen
 from syncline_design.simulation.certified import certified_worst_case_m
 from syncline_design.simulation.lattice import POINTS
-from syncline_design.simulation.situations import Situations, ranges_m
+from syncline_design.simulation.situations import Situations, bearings, ranges_m
 from syncline_design.simulation.statistical import (
     AXES,
     Wanted,
@@ -181,7 +181,7 @@ def _stage(situations: Situations, index: int, point: Array) -> StageSituation:
         roll_rad=roll,
         pitch_rad=pitch,
         yaw_rad=math.atan2(picked["yaw"][1, 0], picked["yaw"][0, 0]),
-        look=_vector(picked["bearing"]) if "bearing" in picked else None,
+        look=None if stage.ranging is None else _vector(bearings(stage, picked, 1)),
         position_arm_m=None if arm is None else _vector(stage.platform.baseline_m * arm),
         distance_m=float(ranges_m(stage, picked, 1)[0]) if "distance" in picked else None,
     )

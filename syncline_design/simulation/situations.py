@@ -34,7 +34,7 @@ from syncline_design.simulation.drawn_effects import (
     wanderers,
     wandering,
 )
-from syncline_design.simulation.draws import Shifts, generator, lever_arms, stage_shifts
+from syncline_design.simulation.draws import Shifts, generator, lever_arms, sight, stage_shifts
 from syncline_design.simulation.known_effects import Carried, departed_error
 from syncline_design.simulation.lattice import lattice
 from syncline_design.simulation.surroundings import leaning, moment_at, placed_rows
@@ -210,7 +210,7 @@ def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
         if position_lever_arm(stage, index == 0) is None:
             kinds.append((index, "lever_arm", "sphere", 3))
         if stage.ranging is not None:
-            kinds.append((index, "bearing", "sphere", 3))
+            kinds += _sights(index, stage)
             if stage.platform.nearest_m is not None:
                 kinds.append((index, "distance", "ball", 1))
     return stacked(kinds)
@@ -230,7 +230,7 @@ def _draw(
         velocity_mps=picked["velocity"] * float(stage.platform.v_max_mps),
         rate_radps=picked["rate"] * float(stage.platform.omega_max_radps),
         range_m=ranges_m(stage, picked, count) if aimed else np.zeros(count),
-        bearing=picked.get("bearing", none),
+        bearing=bearings(stage, picked, count) if aimed else none,
         antenna_m=antenna,
         ranging_m=ranging,
         position_noise_m=none,
@@ -238,6 +238,28 @@ def _draw(
         range_noise_m=np.zeros(count),
         **stage_shifts(system, index, shifts, count),
     )
+
+
+def _sights(index: int, stage: Stage) -> list[tuple[int, str, Kind, int]]:
+    """Blocks of a line of sight: any direction, or the height and azimuth of a `look`."""
+    if stage.look is None:
+        return [(index, "bearing", "sphere", 3)]
+    around: tuple[int, str, Kind, int] = (index, "azimuth", "sphere", 2)
+    if stage.look.azimuth is not None:
+        around = (index, "azimuth", "ball", 1)
+    return [around, (index, "elevation", "ball", 1)]
+
+
+def bearings(stage: Stage, picked: dict[str, Array], count: int) -> Array:
+    """Line of sight in the body's axes, (3, count)."""
+    if stage.look is None:
+        return np.broadcast_to(picked["bearing"], (3, count))
+    at = picked["azimuth"]
+    if stage.look.azimuth is None:
+        across = 0.5 + np.arctan2(at[1], at[0]) / (2.0 * np.pi)
+    else:
+        across = 0.5 * (at[0] + 1.0)
+    return sight(stage.look, across, 0.5 * (picked["elevation"][0] + 1.0))
 
 
 def ranges_m(stage: Stage, picked: dict[str, Array], count: int) -> Array:

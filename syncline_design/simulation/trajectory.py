@@ -35,6 +35,7 @@ from syncline_design.simulation.draws import (
     directions,
     lever_arms,
     noise_draw,
+    sight,
     stage_shifts,
     time_margin_s,
     timing_draws,
@@ -110,7 +111,7 @@ def _somewhere(rows: StageRows, mission: Moment) -> StageRows:
 def _rows(
     stage: Stage, first: bool, track: Track, time_s: Array, source: RandomSource
 ) -> StageRows:
-    """True state at the moments; the line of sight from the track, else isotropic at d."""
+    """True state at the moments; the line of sight from the track, else where the stage looks."""
     count = time_s.shape[0]
     uniform = source.uniform(4)
     arm = directions(uniform[:1], uniform[1:2])[0]
@@ -126,6 +127,9 @@ def _rows(
         range_m = np.full(count, d)
         azimuth = 2.0 * math.pi * uniform[2] - math.pi
         elevation = np.arcsin(2.0 * uniform[3] - 1.0)
+        if stage.look is not None:
+            x, y, z = sight(stage.look, uniform[2], uniform[3])
+            azimuth, elevation = np.arctan2(y, x), -np.arcsin(np.clip(z, -1.0, 1.0))
     rotation, position = track.attitude(time_s), track.position(time_s)
     down = np.swapaxes(rotation, 1, 2)
     vector = ranging + range_m[:, None] * bearing(azimuth, elevation)
