@@ -136,7 +136,21 @@ def test_seconds_of_the_day_of_a_time_zone() -> None:
 
 @pytest.mark.parametrize(
     "wrap",
-    [0.065536, 0.65536, 1.0, 1.6777216, 3.2768, 6.5536, 10.0, 17.0, 25.0, 29.3, 32.768, 60.0],
+    [
+        0.065536,
+        0.1234,
+        0.65536,
+        1.0,
+        1.6777216,
+        3.2768,
+        6.5536,
+        10.0,
+        17.0,
+        25.0,
+        29.3,
+        32.768,
+        60.0,
+    ],
 )
 def test_a_counter_of_any_range(wrap: float) -> None:
     rate = 100.0 if wrap > 0.1 else 10.0

@@ -36,6 +36,7 @@ _NEAR: Final = 1e-3  # of a range: how far from its name what was measured may b
 _WITHIN: Final = 0.3  # of a range: falls that are taken for the same
 _EVEN: Final = 0.35
 _AROUND: Final = 20
+_BINS: Final = 10
 _COHERENT: Final = 0.6
 _PIECE: Final = 40
 
@@ -196,8 +197,11 @@ def _fills(stamp: NDArray[np.int64], size: float, sure: float, matching: Mask) -
 def _is_full(stamp: NDArray[np.int64], size: float) -> bool:
     """Whether stamps lie all over an interval of that length, not at its ends alone."""
     low, high = np.percentile(stamp, [0.2, 99.8])
-    everywhere = np.histogram(stamp, bins=10, range=(float(low), float(high) + 1.0))[0].all()
-    return bool(everywhere and 0.9 * size < float(high - low) <= 1.001 * size)
+    ahead = np.diff(stamp)
+    step = float(np.median(ahead[ahead > 0])) if bool(np.any(ahead > 0)) else 0.0
+    bins = min(_BINS, max(3, int(0.5 * size / max(step, 1.0))))  # each wider than an interval
+    everywhere = np.histogram(stamp, bins=bins, range=(float(low), float(high) + 1.0))[0].all()
+    return bool(everywhere and 0.9 * (size - step) < float(high - low) <= 1.001 * size)
 
 
 # ---- ranges of the order of the interval -----------------------------------------------------
