@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from syncline_design.logs.readers import open_recording, registry
-from syncline_design.logs.readers.reader import library
+from syncline_design.logs.readers import open_recording, reader_of, registry
+from syncline_design.logs.readers.reader import Head, library
 from syncline_design.logs.readers.stream import UNSET, StampColumn
 from syncline_design.spec.load import BadInput
 
@@ -73,3 +73,13 @@ def test_nothing_of_others_is_imported_until_a_file_asks_for_it(tmp_path: Path) 
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_packed_bytes_that_look_like_a_receivers_message_leave_a_bag_a_bag(tmp_path: Path) -> None:
+    """Eight bytes of a chunk make an empty UBX message with a right checksum."""
+    chance = b"\n$" + bytes([0xB5, 0x62, 0, 0, 0, 0, 0, 0])
+    for magic, kind in ((b"\x89MCAP0\r\n", "MCAP"), (b"#ROSBAG V2.0\n", "ROS 1 bag")):
+        head = Head(tmp_path / "x", magic + b"\x01\x00" + chance * 3, 1000)
+        reader = reader_of(head)
+        assert reader is not None
+        assert kind in reader.format

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from syncline_design.logs.readers import nmea, ubx
 from syncline_design.logs.readers.batches import Batch, BatchRecording, Facts
 from syncline_design.logs.readers.epochs import DAY_SECONDS, WEEK_SECONDS, gps_minus_utc_s
-from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, library
+from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Reader, library
 from syncline_design.logs.readers.receiver_frames import UBX, FrameCount, frames
 from syncline_design.logs.readers.stream import UNSET, Recording
 from syncline_design.logs.refusals import refuse
@@ -347,12 +347,19 @@ def _place_of_itow(name: str, path: Path) -> int | None:
 
 
 def _recognises(head: Head) -> int:
-    """A sentence or message with a right checksum, and at its very beginning nothing binary."""
-    first = head.start[:1]
-    if head.folder or (first not in (b"$", b"!", b"#", UBX[:1]) and b"\n$" not in head.start):
+    """A sentence or message with a right checksum, and at its very beginning nothing binary.
+
+    What begins otherwise may still be one, from the middle of a frame on; but packed bytes of any
+    format hold eight that look like an empty message, so that the formats with a magic go first.
+    """
+    begins = head.start[:1] in (b"$", b"!", b"#", UBX[:1])
+    if head.folder or not (begins or b"\n$" in head.start):
         return NO
     found = next(frames(io.BytesIO(head.start), FrameCount()), None)
-    return BY_MAGIC if found is not None else NO
+    if found is None:
+        return NO
+    own = begins and head.start[:1] != b"#"  # with which other formats begin as well
+    return BY_MAGIC if own or b"\0" not in head.start else BY_SHAPE
 
 
 def _open(path: Path) -> Recording:
