@@ -196,7 +196,7 @@ def without_duplicates(series: Series) -> Repaired:
     times = series.seconds[places[same]]
     fault = StampFault(
         "duplicates", {"count": float(count)}, float(times[0]), float(times[-1]),
-        f"{count} messages carry the stamp of the message before",
+        f"{count} message{'s carry' if count > 1 else ' carries'} the stamp of the message before",
     )  # fmt: skip
     return Repaired(replace(series, good=good), (fault,))
 

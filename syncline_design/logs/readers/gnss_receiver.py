@@ -346,20 +346,27 @@ def _place_of_itow(name: str, path: Path) -> int | None:
     return None
 
 
+MOST_STRAY = 0.7  # of a head: bytes in no frame
+
+
 def _recognises(head: Head) -> int:
     """A sentence or message with a right checksum, and at its very beginning nothing binary.
 
-    What begins otherwise may still be one, from the middle of a frame on; but packed bytes of any
-    format hold eight that look like an empty message, so that the formats with a magic go first.
+    Packed bytes of any format hold eight that look like an empty message: what begins otherwise,
+    as from the middle of a frame on, has to hold more than such by chance.
     """
     begins = head.start[:1] in (b"$", b"!", b"#", UBX[:1])
     if head.folder or not (begins or b"\n$" in head.start):
         return NO
-    found = next(frames(io.BytesIO(head.start), FrameCount()), None)
-    if found is None:
+    count = FrameCount()
+    found = frames(io.BytesIO(head.start), count)
+    if next(found, None) is None:
         return NO
-    own = begins and head.start[:1] != b"#"  # with which other formats begin as well
-    return BY_MAGIC if own or b"\0" not in head.start else BY_SHAPE
+    if head.start[:1] in (b"$", b"!", UBX[:1]) or b"\0" not in head.start:
+        return BY_MAGIC
+    for _ in found:
+        pass
+    return BY_MAGIC if count.stray < MOST_STRAY * len(head.start) else BY_SHAPE
 
 
 def _open(path: Path) -> Recording:
