@@ -160,7 +160,7 @@ def _position_errors(
 ) -> Array:
     error = s.position * _noise(s, "position", time) * c["position"]
     error[:, 2] += s.of("tide", "position", "rate_mps") * time
-    error[:, 2] -= s.of("squat", "position", "gain") * np.sum(v * v, axis=1)
+    error[:, 2] -= s.of("squat", "position", "sinkage_m") * np.sum(v * v, axis=1)
     wander = math.sqrt(3.0) * s.of("correlated_noise", "position", "std_m")
     error = error + wander * c["scatter"]
     error[:, 2] += s.of("height_drift", "position", "std_m") * c["wander"][:, 2]

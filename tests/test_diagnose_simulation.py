@@ -37,7 +37,7 @@ CASES: tuple[tuple[str, str, dict[str, float]], ...] = (
     ("clock_drift", "ranging", {"rate": 2e-3}),
     ("timestamp_step", "ranging", {"step_s": 0.07, "time_s": 17.0}),
     ("heading_soft_iron", "attitude", {"sin_rad": 0.02, "cos_rad": -0.01}),
-    ("squat", "position", {"gain": 0.01}),
+    ("squat", "position", {"sinkage_m": 0.01}),
     ("tide", "position", {"rate_mps": 1e-3}),
     ("filter_lag", "position", {"time_constant_s": 0.1}),
     ("lever_arm", "position", {"x_m": 0.4, "y_m": -0.3, "z_m": 0.2}),

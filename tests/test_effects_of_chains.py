@@ -46,7 +46,7 @@ VALUES = {
     "lever_arm": "x_m: 1, y_m: -2, z_m: 0.5",
     "noise_understated": "factor: 5000",
     "noise_episode": "factor: 5000, from_s: 10, to_s: 20",
-    "squat": "gain: 0.1",
+    "squat": "sinkage_m: 0.1",
     "tide": "rate_mps: 0.001",
     "correlated_noise": "std_m: 0.5, time_constant_s: 60",
     "height_drift": "std_m: 0.5, time_constant_s: 60",

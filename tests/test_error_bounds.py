@@ -97,7 +97,7 @@ SINGLE: Effects = {
     ("clock_drift", "ranging"): {"rate": 5e-4},
     ("timestamp_jitter", "ranging"): {"std_s": 0.05},
     ("echo_delay", "ranging"): {"share": 90.0},
-    ("squat", "position"): {"gain": 0.1},
+    ("squat", "position"): {"sinkage_m": 0.1},
     ("tide", "position"): {"rate_mps": -2e-3},
     ("noise_episode", "position"): {"factor": 3.0, "from_s": 100.0, "to_s": 500.0},
     ("noise_episode", "attitude"): {"factor": 3.0, "from_s": 100.0, "to_s": 500.0},

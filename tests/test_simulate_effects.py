@@ -143,7 +143,7 @@ CASES: dict[tuple[str, str], Case] = {
     ),
     ("timestamp_jitter", "ranging"): ({"std_s": 0.01}, STRAIGHT, half_normal(0.01 * V)),
     ("echo_delay", "ranging"): ({"share": 1.5}, STRAIGHT, constant(V * 1.5 * D / 1500.0)),
-    ("squat", "position"): ({"gain": 0.01}, STRAIGHT, constant(0.01 * V**2)),
+    ("squat", "position"): ({"sinkage_m": 0.01}, STRAIGHT, constant(0.01 * V**2)),
     ("tide", "position"): ({"rate_mps": 5e-4}, STRAIGHT, uniform(5e-4 * T)),
     ("noise_episode", "position"): ({"factor": 3.0, **A_WHILE}, NOISY, for_a_while(maxwell, 0.02)),
     ("noise_episode", "attitude"): (

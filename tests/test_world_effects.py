@@ -261,7 +261,7 @@ EXAMPLES: dict[str, dict[str, float | str]] = {
     "heading_bias": {"bias_rad": 0.01},
     "heading_hard_iron": {"sin_rad": 0.01, "cos_rad": 0.01},
     "heading_soft_iron": {"sin_rad": 0.01, "cos_rad": 0.01},
-    "squat": {"gain": 0.01},
+    "squat": {"sinkage_m": 0.01},
     "tide": {"rate_mps": 1e-3},
     "heading_drift": {"rate_radps": 1e-4},
     "acceleration_tilt": {"gain": 0.2},

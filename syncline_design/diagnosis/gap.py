@@ -126,7 +126,7 @@ def gap(
     totals = {name: _Sums() for name in ("before", "after", "fitted", "expected")}
     saved = []
     for training, held in folds.pairs:
-        part = _Held(data, held, spec, model.level)
+        part = Held(data, held, spec, model.level)
         left = model.error
         train = precision(data.structure.rows(training), model.level)
         learned = left[held] - columns[held] @ _step(train, columns[training], left[training])
@@ -174,7 +174,7 @@ def _step(known: Precision, columns: Array, error: Array) -> Array:
     return solve_scaled(inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0])
 
 
-class _Held:
+class Held:
     """Held-out rows with their covariance under the spec's noise and under the fitted one."""
 
     def __init__(self, data: Data, held: Index, spec: NoiseLevel, fitted: NoiseLevel) -> None:

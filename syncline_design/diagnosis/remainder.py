@@ -1,23 +1,25 @@
-"""Is anything left that the model does not explain?  A test with no dictionary in it.
+"""Is anything left that the model does not explain?  A test that needs no dictionary.
 
 Families of regressors: quadratic functions of the covariates along NED and level body axes; the
 ways in which any motion-linked error can point (along the antenna's velocity, along the sweep of
 the lever, across the heading, along the beam, along the acceleration) times smooth functions of
-time, heading, bearing, speed and turn rate; and the named effects' own signatures in separate
-regimes, as a right effect has the same parameters in all of them.  Their whitened energy, freed of
-the effects already in the model, is chi-square when only noise is left; circular shifts of the
-whitened error against the regressors show how large it is for this noise anyhow.
+time, heading, bearing, speed and turn rate; the named effects' own signatures in separate regimes,
+as a right effect has the same parameters in all of them; and the span of all signatures of the
+dictionary together, since what no one effect explains well two may explain in part.  Their whitened
+energy, freed of the effects already in the model, is chi-square when only noise is left; circular
+shifts of the whitened error against the regressors show how large it is for this noise anyhow.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from syncline_design.diagnosis.candidates import slopes
+from syncline_design.diagnosis.candidates import Candidate, signatures, slopes
 from syncline_design.diagnosis.consequence import rms_m
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled, thinned
 from syncline_design.diagnosis.regimes import covariates, level_axes
@@ -39,14 +41,15 @@ LOST = 1e-6  # share of a regressor's information below which the model's effect
 # a shift is no fair comparison then, and its say is limited.
 MOST_INFLATION = 1.3
 STRETCHES, FOLDS = 40, 5  # of the log; hands that they are dealt out to
+STEPS = 6  # one place in so many of those where steps are looked for
 CELLS = 4  # regimes per covariate in which a named effect must have the same parameters
 
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
     """p_regimes, p_motion, p_constant: of the energy on the three families (p_constant 1 when
-    nothing is named); p_peak: of the largest single regressor of the first two.  size_m: RMS of the
-    structure, the largest of the families.
+    nothing is named); p_span: in the dictionary's span; p_peak: of the largest single regressor of
+    the first two.  size_m: RMS of the structure, the largest of the families.
     """
 
     p_regimes: float
@@ -54,15 +57,18 @@ class Remainder:
     p_constant: float
     p_peak: float
     size_m: float = 0.0
+    p_span: float = 1.0
 
     @property
     def p(self) -> float:
         """Of all tests together (Bonferroni)."""
-        tests = [self.p_regimes, self.p_motion, self.p_constant, self.p_peak]
+        tests = [self.p_regimes, self.p_motion, self.p_constant, self.p_span, self.p_peak]
         return min(1.0, len(tests) * min(tests))
 
 
-def remainder(data: Data, model: Model, rng: np.random.Generator) -> Remainder:
+def remainder(
+    data: Data, model: Model, rng: np.random.Generator, dictionary: Sequence[Candidate] = ()
+) -> Remainder:
     """Test what a model leaves."""
     data, model = thinned(data, model, MOST_ROWS)
     residual = model.precision.solve(model.error[:, :, None])[:, :, 0]
@@ -77,8 +83,12 @@ def remainder(data: Data, model: Model, rng: np.random.Generator) -> Remainder:
     if model.acting:
         tested.append(_energy(data, model, _constancy_columns(data, model), residual, shifts))
         p_constant = tested[-1].p
+    p_span, free = 1.0, [one for one in dictionary if one.label not in model.labels]
+    if free:
+        tested.append(_energy(data, model, _span_columns(data, free), residual, shifts))
+        p_span = tested[-1].p
     size_m = min(max(t.size_m for t in tested), rms_m(data, model.error))
-    return Remainder(tested[0].p, tested[1].p, p_constant, p_peak, size_m)
+    return Remainder(tested[0].p, tested[1].p, p_constant, p_peak, size_m, p_span)
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,6 +188,13 @@ def _constancy_columns(data: Data, model: Model) -> Array:
             cell = np.searchsorted(edges, covariate.values)
             parts += [shape * (cell == k)[:, None] for k in range(CELLS)]
     return np.stack(parts, axis=-1)
+
+
+def _span_columns(data: Data, free: Sequence[Candidate]) -> Array:
+    """Signatures of all effects that the model does not hold, steps at a few places."""
+    every = signatures(data.view, free)
+    found, steps = [s for s in every if not s.at], [s for s in every if s.at]
+    return np.concatenate([np.nan_to_num(s.columns) for s in (*found, *steps[::STEPS])], axis=2)
 
 
 def _products(vectors: Array, features: Array) -> Array:

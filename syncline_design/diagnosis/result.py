@@ -233,11 +233,33 @@ class Gap(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class UnseenBlock(Record):
+    """A block of the log against what was found without it: effects, values, noise, thresholds.
+
+    found: what was.  closed_fraction: (before - after) / (before - expected), in NLL or in RMS,
+    whichever is less; None where there was no gap to speak of.
+    """
+
+    from_s: float
+    to_s: float
+    rows: int
+    found: tuple[str, ...]
+    before: Fit
+    after: Fit
+    expected_rms_m: float
+    closed_fraction: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class WholeGap(Gap):
-    """The gap on blocks of the log, on its fastest part, and with a placebo added."""
+    """The gap on blocks of the log, on its fastest part, and with a placebo added.
+
+    unseen: on a block that nothing has seen; None where nothing was found or the log is too short.
+    """
 
     regime: Gap = Gap()
     placebo: Gap = Gap()
+    unseen: UnseenBlock | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.diagnosis.axes import still_axes_apart, varying_axes, without_still_axes
+from syncline_design.diagnosis.axes import without_still_axes
 from syncline_design.diagnosis.candidates import (
     candidates,
     directed_parts,
@@ -21,7 +21,7 @@ from syncline_design.diagnosis.consequence import Promise, promise_of, rms_m, we
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.findings import entry_of, episode_finding, findings
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
-from syncline_design.diagnosis.gap import block_folds, gap, regime_fold
+from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
 from syncline_design.diagnosis.noise import SLOW_LEAST, SLOW_LIMIT, as_specified
@@ -32,7 +32,6 @@ from syncline_design.diagnosis.result import (
     Check,
     Diagnosis,
     Finding,
-    Gap,
     Likelihoods,
     LogOutcome,
     LogRead,
@@ -42,7 +41,6 @@ from syncline_design.diagnosis.result import (
     Remaining,
     SlowNoise,
     SpecRead,
-    WholeGap,
 )
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.search import (
@@ -58,6 +56,7 @@ from syncline_design.diagnosis.slow_states import slow_states
 from syncline_design.diagnosis.survey import survey_m, with_shown_survey
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.system_delay import with_system_delay
+from syncline_design.diagnosis.unseen_block import unseen_block
 from syncline_design.diagnosis.untouched import untouched_error
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
@@ -175,8 +174,11 @@ def told(one: Examined, case: Case | None = None, progress: Progress = silent) -
         remaining=remaining,
         where=strongest(cells),
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
-        gap=_whole_gap(data, search, result, untouched),
-        steps=_steps(data, result, faults, untouched),
+        gap=replace(
+            whole_gap(data, search, result, untouched),
+            unseen=unseen_block(data, result, lambda rows: _started(inputs, rows, settings)),
+        ),
+        steps=gap_steps(data, result, faults, untouched),
         unseen=_unseen(data, search, result, settings.exclude_effects),
         log=_log_read(replace(inputs.log, notes=view.log.notes), data),
         noise=_noise(data, result),
@@ -210,7 +212,7 @@ def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
     """Findings and remainder of a settled model, each with whether it matters."""
     data, search, result, faults = one.data, one.search, one.result, one.faults
     untouched = one.untouched
-    rest = remainder(data, result.model, search.rng)
+    rest = remainder(data, result.model, search.rng, search.candidates)
     left = rest.p < REMAINDER_SHARE * search.settings.false_alarm_rate
     weights = weighed(promise, data)
     named = findings(result.final, faults, weights, left)
@@ -275,19 +277,24 @@ def _searched(
 ) -> tuple[Data, Search, SearchResult]:
     """The search over one log; of a long one, over windows of it."""
     log = log.rows(windows(len(log), MOST_ROWS, WINDOW))
+    search = _started(inputs, log, settings, progress)
+    result = search.run()
+    return search.data, search, result
+
+
+def _started(
+    inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress = silent
+) -> Search:
+    """A search over a log, ready to run."""
     plain = structure_of(scene(inputs.system, log, inputs.known))
     log = without_still_axes(inputs.system, log, inputs.known, plain)
     view = scene(inputs.system, log, inputs.known)
     found = candidates(view, settings.exclude_effects)
     parts = directed_parts(view, found)
-    structure = structure_of(view, parts)
-    structure = still_axes_apart(structure, varying_axes(view.error(), structure))
-    data = with_shown_ranging(data_of(view, structure))
+    data = with_shown_ranging(data_of(view, structure_of(view, parts)))
     data = with_shown_survey(data, signatures(view, found))
     progress("searching", 0.15)
-    search = start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
-    result = search.run()
-    return search.data, search, result
+    return start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
 
 
 def with_shown_ranging(data: Data) -> Data:
@@ -325,52 +332,6 @@ def expected_size(inputs: Measured) -> float:
     variance = sum(np.einsum("nii->ni", w.covariance) for w in structure.white)
     visible = np.isfinite(view.log.truth_m)
     return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
-
-
-def _steps(
-    data: Data, result: SearchResult, faults: Sequence[Gross], untouched: Array | None
-) -> tuple[Gap, ...]:
-    """The gap after each addition, gross faults undone first."""
-    folds = block_folds(data)
-    labelled: list[tuple[tuple[tuple[str, str, int], ...], Model]] = [
-        ((label,), model) for label, model in result.final.stairs
-    ]
-    if untouched is not None:
-        labelled.insert(0, (tuple(one.acting.label for one in faults), result.base))
-    found = [(labels, gap(data, model, folds, None, untouched)) for labels, model in labelled]
-    return tuple(
-        replace(one, added=", ".join(f"{name} ({sensor})" for name, sensor, _ in labels))
-        for labels, one in found
-        if one.held_out is not None
-    )
-
-
-def _whole_gap(
-    data: Data, search: Search, result: SearchResult, untouched: Array | None
-) -> WholeGap:
-    """On blocks of the log, on its fastest part, and with a placebo."""
-    blocks = gap(data, result.model, block_folds(data), None, untouched)
-    name, fold = regime_fold(data)
-    return WholeGap(
-        held_out=blocks.held_out,
-        expected_rms_m=blocks.expected_rms_m,
-        closed_fraction=blocks.closed_fraction,
-        nll_saved_per_sample=blocks.nll_saved_per_sample,
-        regime=replace(gap(data, result.model, fold, None, untouched), held_rows=name),
-        placebo=_placebo(data, search, result, untouched),
-    )
-
-
-def _placebo(data: Data, search: Search, result: SearchResult, untouched: Array | None) -> Gap:
-    """The gap with one more effect, drawn from those that were not chosen."""
-    free = [s for s in search.free_signatures(result.model) if s.plain]
-    if not free or not result.model.labels:
-        return Gap(added="")
-    chosen = free[int(search.rng.integers(len(free)))]
-    name, sensor, _ = chosen.candidate.label
-    columns = np.nan_to_num(chosen.columns)
-    found = gap(data, result.model, block_folds(data), columns, untouched)
-    return replace(found, added=f"{name} ({sensor})")
 
 
 def _unseen(

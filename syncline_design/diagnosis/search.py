@@ -122,6 +122,11 @@ class Search:
 
     def run(self) -> SearchResult:
         """Add effects while they beat chance; then take out what is no longer needed."""
+        base, model = self.searched()
+        return SearchResult(base, self.settled(model))
+
+    def searched(self) -> tuple[Model, Model]:
+        """The model without effects, and with all that beat chance, one after the other."""
         base = fit(self.data)
         model = base
         while len(model.labels) < self.settings.max_effects:
@@ -138,7 +143,7 @@ class Search:
             model = cut_down(self.states, self.exchanged(trial.model, model))
             in_force().doing("searching beyond " + ", ".join(name for name, *_ in model.labels))
             self.progress(len(model.labels) / self.settings.max_effects)
-        return SearchResult(base, self.settled(model))
+        return base, model
 
     def settled(self, model: Model) -> Settled:
         """The final model: its classes decided, its evidence counted, needless effects gone."""

@@ -32,31 +32,31 @@ def _applies(stage: Stage, sensor: Target) -> bool:
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
-    """The down reading is too small by gain v^2 [m], gain in s2/m."""
+    """The down reading is too small by sinkage (v / 1 m/s)^2 [m]."""
     added = np.zeros((len(rows), 3))
-    added[:, 2] = -values["gain"] * np.sum(rows.velocity_mps**2, axis=1)
+    added[:, 2] = -values["sinkage_m"] * np.sum(rows.velocity_mps**2, axis=1)
     return Departures(position_m=added)
 
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
-    """d error / d gain = -v^2 down [m2/s2]; (n, 3, 1)."""
+    """d error / d sinkage = -(v / 1 m/s)^2 down [-]; (n, 3, 1)."""
     slope = np.zeros((len(rows), 3, 1))
     slope[:, 2, 0] = -np.sum(rows.velocity_mps**2, axis=1)
     return slope
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
-    """|gain| v_max^2."""
-    return Contribution(systematic_m=abs(values["gain"]) * stage.platform.v_max_mps**2)
+    """|sinkage| (v_max / 1 m/s)^2."""
+    return Contribution(systematic_m=abs(values["sinkage_m"]) * stage.platform.v_max_mps**2)
 
 
 EFFECT = Effect(
     name="squat",
     sensors=("position",),
     kind="deterministic",
-    parameters=(Parameter("gain", 1e-4, 0.2),),
-    sentence="the draught grows with the square of the speed, {gain} m per (m/s)^2, and heights "
-    "miss it",
+    parameters=(Parameter("sinkage_m", 1e-4, 0.2, "m"),),
+    sentence="the draught grows with the square of the speed, by {sinkage_m} at 1 m/s, and heights "
+    "do not follow",
     confused_with="height_drift; latency on slopes",
     separated_by="the same line slow and fast",
     source="ship squat grows with the square of the speed (Barrass, Derrett, Ship Stability)",

@@ -13,8 +13,10 @@ from syncline_design.diagnosis.result import (
     Gap,
     HeldOut,
     Plots,
+    UnseenBlock,
     WholeGap,
 )
+from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import figures_diagnosis as drawings
 from syncline_design.report import numbers
 from syncline_design.report.document import (
@@ -51,14 +53,34 @@ def gap_nodes(found: Diagnosis) -> list[Node]:
     coverage = _coverage(found.plots.coverage)
     fold = show(coverage, silent=True)
     placebo = _placebo_text(found.gap)
+    unseen = _unseen_text(found.gap.unseen)
     return [
         *([Text(lead)] if tables else []),
         *_gap_chart(found),
         *tables,
+        *([Text(unseen)] if unseen else []),
         *([Text(placebo)] if placebo else []),
         *_coverage_chart(found.plots),
         *([Group(tuple(fold), "fold", summary=coverage.caption, reach="page")] if coverage else []),
     ]
+
+
+def _unseen_text(block: UnseenBlock | None) -> str:
+    """What was found without a block, and how the block looks with it."""
+    if block is None:
+        return ""
+    ends = " to ".join(numbers.si_quantity(end, "s", 3) for end in (block.from_s, block.to_s))
+    found = sentence_list(list(block.found)) or "nothing"
+    closed = block.closed_fraction
+    share = (
+        "" if closed is None else f", which closes {numbers.percent(max(closed, 0.0))} of its gap"
+    )
+    return (
+        f"The block from {ends} was kept from the choice of effects, their values and the noise: "
+        f"without it the search names {found}. On it the RMS is {rms_length(block.before.rms_m)} "
+        f"before and {rms_length(block.after.rms_m)} after, where the spec's noise expects "
+        f"{rms_length(block.expected_rms_m)}{share}."
+    )
 
 
 def _placebo_text(gap: WholeGap) -> str:

@@ -158,8 +158,8 @@ def _soft_iron(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> N
 
 def _squat(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:
     """The hull sinks, the height that is used does not: it is too high."""
-    gain = effect.number("gain")
-    faults.height_lost.append(lambda t, speed: -gain * speed**2)
+    sinkage = effect.number("sinkage_m")
+    faults.height_lost.append(lambda t, speed: -sinkage * speed**2)
 
 
 def _tide(faults: Faults, effect: Hidden, stamps_s: Array, draw: Draw) -> None:
