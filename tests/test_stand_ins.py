@@ -29,11 +29,16 @@ def soft_iron(log: Columns) -> None:
     log["yaw_deg"] = log["yaw_deg"] + 0.25 * np.sin(twice + 0.4)
 
 
+def three_a_turn(log: Columns) -> None:
+    thrice = 3.0 * np.radians(log["yaw_deg"])
+    log["yaw_deg"] = log["yaw_deg"] + 0.25 * np.sin(thrice + 0.4)
+
+
 WAVES: dict[str, tuple[Callable[[Columns], None], str, dict[str, float], str]] = {
     "heave": (heave, "position", {"period_s": 7.0, "amplitude_m": 0.06}, "down"),
     "cyclic": (cyclic, "ranging", {"wavelength_m": 0.8, "amplitude_m": 0.03}, "range"),
-    "soft iron": (
-        soft_iron, "attitude", {"harmonic": 2.0, "amplitude_rad": np.radians(0.25)}, "yaw"),
+    "three times a turn": (
+        three_a_turn, "attitude", {"harmonic": 3.0, "amplitude_rad": np.radians(0.25)}, "yaw"),
 }  # fmt: skip
 
 
@@ -59,6 +64,13 @@ def test_a_wave_is_a_stand_in_with_its_pace_and_channel(name: str, tmp_path: Pat
         assert one.parameters[key].value == pytest.approx(value, rel=close)
     assert found.verdict == "unexplained"
     assert found.effects_entries() == ()
+
+
+def test_twice_a_turn_is_soft_iron(tmp_path: Path) -> None:
+    (one,) = asked(soft_iron, tmp_path).findings
+    assert (one.effect, one.sensor, one.kind) == ("heading_soft_iron", "attitude", "cause")
+    sizes = [one.parameters[name].value for name in ("sin_rad", "cos_rad")]
+    assert np.hypot(*sizes) == pytest.approx(np.radians(0.25), rel=0.15)
 
 
 def test_noise_makes_no_wave(tmp_path: Path) -> None:
