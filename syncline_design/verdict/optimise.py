@@ -36,11 +36,9 @@ from syncline_design.machine.records import Named, Record, optional
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
-from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
-from syncline_design.verdict.admitted import Kinds, kinds_of, with_whole_catalog
 from syncline_design.verdict.alternatives import alternatives, bargains
 from syncline_design.verdict.cautions import design_cautions
 from syncline_design.verdict.choice_data import (
@@ -78,7 +76,7 @@ from syncline_design.verdict.verify import (
     unfinished_verdict,
     verify,
 )
-from syncline_design.verdict.why_not import Answer, Asked, why_not
+from syncline_design.verdict.why_not import Answer, Asked, questions_of, refuse_scenarios, why_not
 
 SCHEMA = "syncline-design/optimization/v1"
 # What stands for the tables where time ended before they were made.
@@ -192,11 +190,11 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     if settings.figure is not None:
         refuse_missions(case)
     if is_family(case):
-        _refuse_questions(case, settings)
+        refuse_scenarios(case, settings.why_not)
         from syncline_design.verdict.optimise_family import optimize_family
 
         return optimize_family(case, settings)
-    questions = _questions(case, settings)
+    questions = questions_of(case, settings.why_not)
     build = Simulations(settings.seed).problem_of
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
@@ -244,24 +242,6 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     of_error = settings.pareto and settings.resource == "cost" and settings.figure is None
     of_cost = points if of_error else None
     return replace(found, verdict=open_verdict(case, problem, picked, checking, points=of_cost))
-
-
-def _refuse_questions(case: Case, settings: OptimizeSettings) -> None:
-    """BadInput where an entry is asked about and the spec holds in more than one scenario."""
-    if settings.why_not:
-        key = "missions" if case.missions else "choose_for"
-        message = "why an entry is not in the design is answered for one mission at nominal figures"
-        place = (str(case.path), *case.position((key,)), key)
-        hint = "ask a spec of one mission, without choose_for"
-        raise BadInput((Flaw(*place, message, hint=hint),))
-
-
-def _questions(case: Case, settings: OptimizeSettings) -> tuple[Case, Kinds]:
-    """The case with every entry that is asked about, and what kind of entry each is."""
-    if not settings.why_not:
-        return case, {}
-    whole = with_whole_catalog(case)
-    return whole, kinds_of(whole, settings.why_not)
 
 
 def _cautions(

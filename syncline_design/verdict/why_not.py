@@ -5,7 +5,7 @@ What the spec does not list is answered twice: that it is no candidate, and what
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from syncline_design.choice.evaluate import evaluate
@@ -16,7 +16,8 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import Build
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
-from syncline_design.verdict.admitted import Kinds, admissions, homes
+from syncline_design.spec.load import BadInput, Flaw
+from syncline_design.verdict.admitted import Kinds, admissions, homes, kinds_of, with_whole_catalog
 from syncline_design.verdict.choice_data import full_design, ruled_out_rows
 from syncline_design.verdict.named import Exclusion, Figure, NamedDesign
 
@@ -90,6 +91,24 @@ class Asked:
     chosen: Design | None
     build: Build
     whole: Case
+
+
+def refuse_scenarios(case: Case, entries: Sequence[str]) -> None:
+    """BadInput where an entry is asked about and the spec holds in more than one scenario."""
+    if entries:
+        key = "missions" if case.missions else "choose_for"
+        message = "why an entry is not in the design is answered for one mission at nominal figures"
+        place = (str(case.path), *case.position((key,)), key)
+        hint = "ask a spec of one mission, without choose_for"
+        raise BadInput((Flaw(*place, message, hint=hint),))
+
+
+def questions_of(case: Case, entries: Sequence[str]) -> tuple[Case, Kinds]:
+    """The case with every entry that is asked about, and what kind of entry each is."""
+    if not entries:
+        return case, {}
+    whole = with_whole_catalog(case)
+    return whole, kinds_of(whole, entries)
 
 
 def why_not(asked: Asked, kinds: Kinds) -> Iterator[Answer]:
