@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import copy
 import random
+from collections import Counter
 from decimal import ROUND_HALF_UP, Decimal
 from pathlib import Path
 from typing import Any
@@ -79,46 +80,49 @@ def staircase(spec: dict[str, Any], outcomes: list[Outcome]) -> list[tuple[int, 
 
 
 def test_fronts_designs_and_bills_agree_to_the_cent_with_what_is_owned() -> None:
-    rng, seen, several, boards = random.Random(15), 0, 0, 0
-    while seen < 14:
-        drawn = draw_spec(rng)
-        if not 2 <= Enumeration(drawn).count <= 1500:
-            continue
-        spec, plain = with_money(drawn, rng)
-        outcomes = list(plain)
-        expected = staircase(spec, outcomes)
-        case = case_of(spec)
-        problem = build_problem(case)
-        points = tuple(front(problem))
-        assert [cents(float(p.amount)) for p in points] == [cost for cost, _ in expected]
-        assert [p.error_m for p in points] == pytest.approx([e for _, e in expected], rel=1e-9)
-        seen += 1
-        several += len(points) > 1
-        if not points:
-            continue
-        verdict = check_loaded(case, QUIET)
-        assert verdict.design is not None
-        assert verdict.bill_of_materials is not None
-        paid = [Decimal(repr(line.cost)) for line in verdict.bill_of_materials]
-        assert cents(verdict.design.cost or 0.0) == expected[0][0] == 100 * sum(paid)
-        shown = [one.cost for one in front_designs(case, problem, points)]
-        assert shown[0] == verdict.design.cost
-        for line in verdict.bill_of_materials:
-            mine = line.entry in spec["owned"] and not line.use.endswith("timestamping")
-            assert line.basis.startswith("owned") == mine
-            assert not (mine and line.cost)
-            boards += mine and line.use in ("shared hardware", "host clock")
-        design = choose(problem)
-        assert isinstance(design, Choice)
-        exact = recheck(case, selection_of(problem, design.design))
-        assert exact.cost == evaluate(problem, design.design).cost
-        assert exact.mass == evaluate(problem, design.design).mass
-        if seen == 7:
-            by_program = choose(problem, "milp")
-            assert isinstance(by_program, Choice)
-            assert evaluate(problem, by_program.design).cost == exact.cost
-    assert several >= 4
-    assert boards >= 2
+    rng, seen = random.Random(15), Counter[str]()
+    while seen["specs"] < 14:
+        seen += compare_money(rng, by_program=seen["specs"] == 6)
+    assert seen["several points"] >= 4
+    assert seen["boards and clocks"] >= 2
+
+
+def compare_money(rng: random.Random, *, by_program: bool = False) -> Counter[str]:
+    """The next spec of a size that can be enumerated, with money; counts what was compared."""
+    drawn = draw_spec(rng)
+    if not 2 <= Enumeration(drawn).count <= 1500:
+        return Counter()
+    spec, plain = with_money(drawn, rng)
+    expected = staircase(spec, list(plain))
+    case = case_of(spec)
+    problem = build_problem(case)
+    points = tuple(front(problem))
+    assert [cents(float(p.amount)) for p in points] == [cost for cost, _ in expected]
+    assert [p.error_m for p in points] == pytest.approx([e for _, e in expected], rel=1e-9)
+    seen = Counter({"specs": 1, "several points": len(points) > 1})
+    if not points:
+        return seen
+    verdict = check_loaded(case, QUIET)
+    assert verdict.design is not None
+    assert verdict.bill_of_materials is not None
+    paid = [Decimal(repr(line.cost)) for line in verdict.bill_of_materials]
+    assert cents(verdict.design.cost or 0.0) == expected[0][0] == 100 * sum(paid)
+    assert front_designs(case, problem, points)[0].cost == verdict.design.cost
+    for line in verdict.bill_of_materials:
+        mine = line.entry in spec["owned"] and not line.use.endswith("timestamping")
+        assert line.basis.startswith("owned") == mine
+        assert not (mine and line.cost)
+        seen["boards and clocks"] += mine and line.use in ("shared hardware", "host clock")
+    design = choose(problem)
+    assert isinstance(design, Choice)
+    exact = recheck(case, selection_of(problem, design.design))
+    assert exact.cost == evaluate(problem, design.design).cost
+    assert exact.mass == evaluate(problem, design.design).mass
+    if by_program:
+        found = choose(problem, "milp")
+        assert isinstance(found, Choice)
+        assert evaluate(problem, found.design).cost == exact.cost
+    return seen
 
 
 ONE = """\

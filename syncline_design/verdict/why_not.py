@@ -21,10 +21,11 @@ from syncline_design.verdict.admitted import Kinds, admissions, homes, kinds_of,
 from syncline_design.verdict.choice_data import full_design, ruled_out_rows
 from syncline_design.verdict.named import Exclusion, Figure, NamedDesign
 
-# The strongest reason first, as in `choice.excluded`.
-CODES = (
-    "reach", "medium", "gnss", "field_of_view", "rate", "depth", "temperature", "discontinued",
-    "unknown-fact", "tau", "primitive",
+# Of several ways to use an entry in one place the one that comes nearest speaks for it: what only
+# its timestamps rule out, then what is not told, and so on; last what does not fit its signals.
+NEAREST = (
+    "tau", "unknown-fact", "discontinued", "temperature", "depth", "rate", "field_of_view", "gnss",
+    "medium", "reach", "primitive",
 )  # fmt: skip
 
 
@@ -213,17 +214,17 @@ def _places(asked: Asked, design: Design, kind: EntryKind, entry: str) -> list[s
 
 
 def _excluded(case: Case, problem: Problem, kind: EntryKind, entry: str) -> Iterator[NotTaken]:
-    """Why it was ruled out before the choice: of each place the strongest reason."""
+    """Why it was ruled out before the choice: of each place the way that comes nearest."""
     names = set(_requiring(case, entry)) if kind == "hardware" else {entry}
-    strongest: dict[str, Exclusion] = {}
+    nearest: dict[str, Exclusion] = {}
     for gone in ruled_out_rows(problem):
         if _named(gone, kind) not in names:
             continue
         role = f"{gone.stage}.{gone.role}"
         place = f"the clock of {gone.stage}" if gone.role == "clock" else role
-        if place not in strongest or _strength(gone) < _strength(strongest[place]):
-            strongest[place] = gone
-    for place, gone in strongest.items():
+        if place not in nearest or _distance(gone) < _distance(nearest[place]):
+            nearest[place] = gone
+    for place, gone in nearest.items():
         yield NotTaken(entry, kind, gone.code, gone.figure, gone.limit, gone.reason, place)
     for place, figure in _incomplete(case, kind, entry):
         reason = f"{entry} gives no {figure}, which a requirement or the objective needs"
@@ -247,9 +248,9 @@ def _requiring(case: Case, hardware: str) -> Iterator[str]:
             yield from (one.id for one in role.methods if hardware in one.entry.requires)
 
 
-def _strength(gone: Exclusion) -> tuple[int, float]:
-    """Strongest code first; of timestamp errors the nearest to what is allowed."""
-    place = CODES.index(gone.code) if gone.code in CODES else len(CODES)
+def _distance(gone: Exclusion) -> tuple[int, float]:
+    """By its code; of timestamp errors the nearest to what is allowed."""
+    place = NEAREST.index(gone.code) if gone.code in NEAREST else len(NEAREST)
     ratio = 0.0
     if gone.code == "tau" and isinstance(gone.figure, float) and isinstance(gone.limit, float):
         ratio = gone.figure / gone.limit if gone.limit else float("inf")
