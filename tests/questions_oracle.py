@@ -95,12 +95,18 @@ def compare_why_not(spec: dict[str, Any]) -> Counter[str]:
     assert first is not None
     rows = answers_of(spec, *sorted(entries_of(spec)))
     # what breaks its own tau_crit in one place is a design here, one that misses the sync limit
-    poor = {(r.entry, r.kind) for r in rows if isinstance(r, NotTaken) and r.code == "tau"}
+    # and of what is no candidate a second row says what if it were
+    poor = {
+        (r.entry, r.kind)
+        for r in rows
+        if isinstance(r, NotTaken) and r.code in ("tau", "not-a-candidate")
+    }
     for row in rows:
         mine = [o for o in outcomes if row.entry in held(plain, o, row.kind)]
         expected = best(spec, mine)
         if isinstance(row, NotTaken):
             assert expected is None
+            assert row.code != "not-a-candidate" or not mine
             kept_out = row.code in ("accuracy", "sync", "mass", "power", "requirements")
             assert (row.entry, row.kind) in poor or bool(mine) == kept_out
             seen["kept out" if kept_out else "ruled out"] += 1
