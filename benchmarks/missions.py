@@ -10,19 +10,27 @@ import itertools
 import math
 import random
 import sys
+import tempfile
 import time
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
+
+import yaml
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
+from checked import check_file
+from plain_enumeration import Enumeration, number, read_catalog
 from random_families import plain_front, plain_order, random_family
 from syncline_design.choice.evaluate import error_key
 from syncline_design.choice.family import Family, family_of
 from syncline_design.choice.family_best import best_of_family, family_front, iter_family
 from syncline_design.choice.options import Option, Resources
 from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
+from syncline_design.verdict.verify import CheckSettings
+from test_missions import written_out
 
 
 def agree(first: int, count: int) -> int:
@@ -43,6 +51,76 @@ def agree(first: int, count: int) -> int:
     spent = time.process_time() - started
     print(f"{count} families from {first}: {wrong} disagree, {spent:.0f} s of processor time")
     return wrong
+
+
+def specs(first: int, count: int) -> int:
+    """How many specs `check` and plain enumeration of every mission by itself see differently."""
+    wrong = met = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(first, first + count):
+            spec = _random_spec(random.Random(seed))
+            path = Path(folder) / "spec.yaml"
+            path.write_text(yaml.safe_dump(spec, sort_keys=False), "utf-8")
+            found = check_file(path, CheckSettings(monte_carlo=False))
+            cost = None if found.design is None else found.design.cost
+            cheapest = _cheapest(spec)
+            met += cheapest is not None
+            same = cost is None if cheapest is None else cost == round(cheapest, 2)
+            if not same or (found.verdict == "meets") != (cheapest is not None):
+                wrong += 1
+                print(f"spec {seed} disagrees: {found.verdict} {cost}, enumeration {cheapest}")
+    print(f"{count} specs from {first}, {met} with a payload: {wrong} disagree")
+    return wrong
+
+
+def _random_spec(rng: random.Random) -> dict[str, Any]:
+    """A vehicle with candidates of the catalogs, and missions of other distances and speeds."""
+    sensors = read_catalog(families=True)["sensors"]
+
+    def some(role: str, count: int) -> list[str]:
+        fits = [n for n, one in sensors.items() if one["modality"] == role and "cost" in one]
+        kinds = ("lidar", "radar", "camera") if role == "ranging" else ()
+        fits = [n for n in fits if not kinds or sensors[n]["type"] in kinds]
+        fits = [n for n in fits if str(sensors[n]["cost"]).endswith(" EUR")]
+        return rng.sample(sorted(fits), count)
+
+    stage: dict[str, Any] = {"name": "uav", "platform": "uav_fixed_wing"}
+    for role in ("position", "attitude", "ranging"):
+        stage[role] = {"candidates": some(role, rng.randint(2, 4))}
+    if rng.random() < 0.4:
+        stage["clock"] = {"candidates": rng.sample(["pps_gpio", "ntp_chrony", "ptp_host"], 2)}
+    stage = {key: value for key, value in stage.items() if key != "clock" or _has_clocks(value)}
+    missions = []
+    for m in range(rng.randint(2, 4)):
+        figures = {"distance": f"{rng.randint(10, 150)} m"}
+        if rng.random() < 0.5:
+            figures["v_max"] = f"{rng.randint(3, 25)} m/s"
+        limits = {"ACC": f"{rng.choice([0.15, 0.3, 0.6, 1.5, 3.0])} m"}
+        missions.append({"name": f"m{m}", "stages": {"uav": figures}, "requirements": limits})
+    methods = rng.sample(["hardware", "gpio", "ptp", "ntp", "arrival"], 3)
+    return {
+        "syncline": 1, "name": "random",
+        "requirements": [{"id": "ACC", "kind": "accuracy", "limit": "1 m"}],
+        "stages": [stage], "timestamping": {"candidates": methods}, "missions": missions,
+    }  # fmt: skip
+
+
+def _has_clocks(choice: dict[str, Any]) -> bool:
+    return set(choice["candidates"]) <= set(read_catalog(families=True)["clocks"])
+
+
+def _cheapest(spec: dict[str, Any]) -> float | None:
+    """The cheapest payload that meets every mission, each mission tried out by itself."""
+    kept: list[dict[Any, float]] = []
+    for own in written_out(spec).values():
+        limit = number(own["requirements"][0]["limit"])
+        kept.append({
+            (*((o.sensor, o.primitive, o.method) for o in one.options), one.clocks): one.cost
+            for one in Enumeration(own)
+            if one.total_m <= limit and one.sync < 1.0
+        })  # fmt: skip
+    shared = set.intersection(*map(set, kept))
+    return min((kept[0][key] for key in shared), default=None)
 
 
 def large_family(missions: int, sensors: int, methods: int, roles: int = 5) -> Family:
@@ -118,8 +196,9 @@ def timed(missions: int, sensors: int, methods: int, roles: int) -> None:
 
 def main() -> None:
     numbers = [int(text) for text in sys.argv[2:]]
-    if sys.argv[1] == "agree":
-        sys.exit(1 if agree(*numbers) else 0)
+    if sys.argv[1] in ("agree", "specs"):
+        tried = agree if sys.argv[1] == "agree" else specs
+        sys.exit(1 if tried(*numbers) else 0)
     timed(*(numbers if len(numbers) > 3 else (*numbers, 5)))
 
 
