@@ -53,7 +53,9 @@ def written_out(spec: dict[str, Any]) -> dict[str, dict[str, Any]]:
         own = copy.deepcopy({k: v for k, v in spec.items() if k != "missions"})
         for name, keys in mission.get("stages", {}).items():
             stage = next(one for one in own["stages"] if one["name"] == name)
-            stage["platform"] = {"use": stage["platform"], **keys}
+            figures = {key: value for key, value in keys.items() if key != "ranging"}
+            stage["platform"] = {"use": stage["platform"], **figures}
+            stage["ranging"] = {**stage["ranging"], **keys.get("ranging", {})}
         for identity, limit in mission.get("requirements", {}).items():
             next(one for one in own["requirements"] if one["id"] == identity)["limit"] = limit
         out[mission["name"]] = own
@@ -153,21 +155,29 @@ def test_every_output_says_each_mission(shipped: Verdict) -> None:
         assert "A payload for each mission" in text
 
 
+@pytest.mark.parametrize("far", ["", ", ranging: {candidates: [hesai_xt32m]}"])
 def test_a_role_of_its_own_in_each_mission_is_bought_once_where_it_is_the_same(
-    tmp_path: Path,
+    tmp_path: Path, far: str
 ) -> None:
     path = tmp_path / "two.yaml"
-    path.write_text(BOARDED, "utf-8")
+    text = BOARDED.replace("[hardware, gpio]", "[hardware, gpio, ptp]")
+    text = text.replace("distance: 120 m", f"distance: 60 m{far}")
+    path.write_text(text, "utf-8")
     verdict = check_file(path, QUICK)
-    spec = yaml.safe_load(BOARDED)
+    spec = yaml.safe_load(text)
     found = outcomes(spec)
     catalog = Enumeration(written_out(spec)["near"]).catalog
     cheapest = math.inf
-    for near, far in itertools.product(found["near"], found["far"]):
-        if key_of(near)[:2] == key_of(far)[:2]:
-            cheapest = min(cheapest, bought_once(catalog, [near, far]))
+    for one, other in itertools.product(found["near"], found["far"]):
+        if key_of(one)[:2] == key_of(other)[:2]:
+            cheapest = min(cheapest, bought_once(catalog, [one, other]))
     assert verdict.design is not None
     assert verdict.design.cost == pytest.approx(cheapest, abs=0.005)
+    lines = verdict.bill_of_materials or ()
+    assert sum(line.cost or 0.0 for line in lines) == pytest.approx(cheapest, abs=0.005)
+    used = {line.entry for line in lines if line.use == "ranging sensor"}
+    assert len(used) == (2 if far else 1)
+    assert any(one.code == "differs-by-mission" for one in verdict.warnings) == bool(far)
 
 
 def bought_once(catalog: dict[str, Any], designs: list[Outcome]) -> float:

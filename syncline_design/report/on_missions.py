@@ -91,7 +91,9 @@ def _payload_row(name: str, one: RankedDesign, currency: str) -> tuple[Cell, Cel
 
 
 def _worst(found: tuple[MissionVerdict, ...]) -> float:
-    return max(one.syncline.total_m for one in found if one.syncline is not None)
+    judged = [row.value for one in found for row in one.requirements if row.kind == "accuracy"]
+    totals = [one.syncline.total_m for one in found if one.syncline is not None]
+    return max(*totals, *(value for value in judged if value is not None))
 
 
 def _sensors(design: NamedDesign, found: tuple[MissionVerdict, ...] = ()) -> str:

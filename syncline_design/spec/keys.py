@@ -21,7 +21,7 @@ CATALOG = "catalog"
 PLATFORM_KEYS = ("v_max", "omega_max", "distance", "baseline")
 # What says which files are read, or what a file is: one study has one of each.
 FIXED_KEYS = ("syncline", "catalogs", "log")
-_NAMES_IN = {"stages": "name", "requirements": "id"}
+_NAMES_IN = {"stages": "name", "requirements": "id", "missions": "name"}
 _EXCLUDES = {"sensor": "candidates", "candidates": "sensor"}
 _PART = re.compile(r"(?P<name>[^.\[\]]+)(?P<selectors>(\[[^\[\]]+\])*)(?:\.|$)")
 

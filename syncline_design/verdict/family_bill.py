@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from syncline_design.choice.outcome import NoVerdict
 from syncline_design.verdict.bill import total
 from syncline_design.verdict.family_choice import Sums
 from syncline_design.verdict.named import BillLine, NamedDesign, SharedHardware
@@ -13,11 +14,19 @@ from syncline_design.verdict.tree import Verdict
 
 
 def bill_of(verdicts: Sequence[Verdict]) -> tuple[BillLine, ...]:
-    """What is bought for all missions: each piece once, shared hardware as often as one needs."""
-    lines: dict[tuple[str, str, str], BillLine] = {}
+    """What is bought for all missions: each piece once, shared hardware as often as one needs.
+
+    Timestamping belongs to its sensor: two sensors of one role are stamped by two pieces.
+    """
+    lines: dict[tuple[str, ...], BillLine] = {}
     for verdict in verdicts:
+        sensors: dict[str, str] = {}
         for line in verdict.bill_of_materials or ():
-            key = (line.stage, line.use, line.entry)
+            role, _, part = line.use.partition(" ")
+            if part == "sensor":
+                sensors[f"{line.stage} {role}"] = line.entry
+            stamped = sensors.get(f"{line.stage} {role}", "") if part == "timestamping" else ""
+            key = (line.stage, line.use, line.entry, stamped)
             if key not in lines or lines[key].quantity < line.quantity:
                 lines[key] = line
     return tuple(lines.values())
@@ -37,5 +46,6 @@ def bought(
             if known is None or known.count < board.count:
                 boards[board.vehicle, board.id] = board
     cost, mass, power = (None if (a := sums[n]) is None else float(a) for n in BUDGETS)
-    cost = total(bill, "cost") if cost is not None else None
+    if cost is not None and total(bill, "cost") != cost:
+        raise NoVerdict("the bill of the family does not add up to what its pieces cost")
     return replace(design, cost=cost, mass=mass, power=power, infrastructure=tuple(boards.values()))

@@ -375,6 +375,24 @@ def _order_of(row: RequirementResult) -> tuple[int, float]:
     return _STATUS_ORDER[row.status], share
 
 
+def _differing_roles(judged: Sequence[Judged]) -> Iterator[Caution]:
+    """Roles in which missions have sensors, or ways of stamping them, of their own."""
+    for picked in judged[0].selection.roles:
+        own: dict[tuple[str, str, str], list[str]] = {}
+        for one in judged:
+            other = one.selection.role(picked.stage, picked.role)
+            if other is not None:
+                names = own.setdefault((other.sensor, other.primitive, other.method), [])
+                names.append(one.mission.name)
+        if len(own) > 1:
+            told = "; ".join(
+                f"{', '.join(names)}: {sensor} by {primitive}, {method}"
+                for (sensor, primitive, method), names in own.items()
+            )
+            message = f"{picked.role} of {picked.stage} differs between missions: {told}"
+            yield Caution("differs-by-mission", message)
+
+
 def _mission_verdict(one: Judged) -> MissionVerdict:
     return MissionVerdict(
         name=one.mission.name,
@@ -397,6 +415,7 @@ def _warnings(judged: Sequence[Judged], shown: Judged, *, several: bool) -> Iter
             f"ledger, figures and simulation are those of mission {name}, the one nearest to a "
             "limit; every mission's own are in the table of missions",
         )
+    yield from _differing_roles(judged)
     seen: dict[Caution, list[str]] = {}
     for one in judged:
         for caution in one.verdict.warnings:

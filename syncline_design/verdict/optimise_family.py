@@ -85,11 +85,13 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
 
 def _refuse_unanswered(case: Case, settings: OptimizeSettings) -> None:
     """What `optimize` answers for one mission only."""
-    if settings.why_not:
-        place = case.position(("missions",))
-        message = "--why-not asks about a spec of one mission chosen at given figures"
+    asked = "--why-not" if settings.why_not else "--against a figure" if settings.figure else ""
+    if asked:
+        key = "missions" if case.missions else "choose_for"
+        message = f"{asked} is answered for one mission chosen at given figures"
         hint = "ask it of a spec with one mission's overrides in its stages"
-        raise BadInput((Flaw(str(case.path), *place, "missions", message, hint=hint),))
+        place = case.position((key,))
+        raise BadInput((Flaw(str(case.path), *place, key, message, hint=hint),))
 
 
 def _differing(work: Work, settings: OptimizeSettings) -> Iterator[Found]:
