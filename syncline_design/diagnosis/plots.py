@@ -6,6 +6,13 @@ import numpy as np
 
 from syncline_design.diagnosis.fitting import Data
 from syncline_design.diagnosis.noise import marginal_variance
+from syncline_design.diagnosis.remainder_plots import (
+    listed,
+    motion_of,
+    normal_of,
+    spectrum_of,
+    track_of,
+)
 from syncline_design.diagnosis.result import (
     AxisResiduals,
     CovariateMap,
@@ -21,7 +28,6 @@ from syncline_design.effects.record import Array
 MOST_POINTS = 800
 NOMINAL = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99)
 NED = ("north", "east", "down")
-DIGITS = 6
 
 
 def plots(data: Data, result: SearchResult, cells: tuple[Regime, ...]) -> Plots:
@@ -31,15 +37,23 @@ def plots(data: Data, result: SearchResult, cells: tuple[Regime, ...]) -> Plots:
     sigma = np.sqrt(marginal_variance(data.structure, result.model.level))
     axes = {
         axis: AxisResiduals(
-            before=_listed(before[index, k]),
-            after=_listed(after[index, k]),
-            signature=_listed((before - after)[index, k]),
-            expected_std=_listed(sigma[index, k]),
+            before=listed(before[index, k]),
+            after=listed(after[index, k]),
+            signature=listed((before - after)[index, k]),
+            expected_std=listed(sigma[index, k]),
         )
         for k, axis in enumerate(NED)
     }
-    residuals = Residuals(_listed(data.view.log.time_s[index]), axes)
-    return Plots(residuals, _map(cells), _coverage(data, before / sigma, after / sigma))
+    residuals = Residuals(listed(data.view.log.time_s[index]), axes)
+    return Plots(
+        residuals,
+        _map(cells),
+        _coverage(data, before / sigma, after / sigma),
+        track=track_of(data, before, after, index),
+        motion=motion_of(data, index),
+        spectrum=spectrum_of(data, result),
+        normal=normal_of(data, result),
+    )
 
 
 def _map(cells: tuple[Regime, ...]) -> tuple[CovariateMap, ...]:
@@ -58,10 +72,6 @@ def _map(cells: tuple[Regime, ...]) -> tuple[CovariateMap, ...]:
         )
         for (name, unit), own in found.items()
     )
-
-
-def _listed(values: Array) -> tuple[float, ...]:
-    return tuple(float(f"{v:.{DIGITS}g}") for v in values)
 
 
 def _coverage(data: Data, before: Array, after: Array) -> tuple[Coverage, ...]:

@@ -437,12 +437,54 @@ class Coverage(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class Arrow(Record):
+    """Mean residual of a stretch of the way, at its middle, before and after [m]."""
+
+    north_m: float
+    east_m: float
+    before_north_m: float
+    before_east_m: float
+    after_north_m: float
+    after_east_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Track(Record):
+    """The way of the last stage's reference point, with the residuals along it."""
+
+    north_m: tuple[float, ...]
+    east_m: tuple[float, ...]
+    arrows: tuple[Arrow, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Spectrum(Record):
+    """Power of the whitened remainder over frequency: 1 for white noise, seldom above most."""
+
+    frequency_hz: tuple[float, ...]
+    power: tuple[float, ...]
+    most: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class NormalPlot(Record):
+    """Quantiles of the standard normal and of the whitened remainder."""
+
+    normal: tuple[float, ...]
+    remainder: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Plots(Record):
-    """What figures need, thinned to what a plot can show."""
+    """What figures need, thinned to what a plot can show; motion: covariates at `residuals`."""
 
     residuals: Residuals
     where_map: tuple[CovariateMap, ...]
     coverage: tuple[Coverage, ...]
+    track: Track | None = optional()
+    motion: Mapping[str, tuple[float, ...]] | None = optional()
+    spectrum: Spectrum | None = optional()
+    normal: NormalPlot | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -45,7 +45,7 @@ def residuals(
                 axes.plot(time_s, axis.after_m, ".", markersize=2.2, color=SERIES[0], label="after")
             axes.set_ylabel(axis.name)
             low, high = axes.get_ylim()
-            _length_ticks(axes, low, high)
+            length_ticks(axes, low, high)
             scales.grid(axes)
         rows[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.32), ncols=3, markerscale=4)
         rows[-1].set_xlabel("time [s]")
@@ -66,7 +66,8 @@ def _rms_words(values: Sequence[float]) -> str:
     return f"{numbers.length(rms, 3)} RMS"
 
 
-def _length_ticks(axes: Axes, low: float, high: float) -> None:
+def length_ticks(axes: Axes, low: float, high: float) -> None:
+    """Some four ticks of a length."""
     from matplotlib.ticker import MaxNLocator
 
     places = [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]

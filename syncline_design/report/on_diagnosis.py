@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from functools import partial
 from typing import Final
@@ -16,7 +15,6 @@ from syncline_design.diagnosis.result import (
     Gap,
     LogRead,
     NextDrive,
-    Plots,
     Regime,
     Remaining,
     Rival,
@@ -47,6 +45,7 @@ from syncline_design.report.document import (
 from syncline_design.report.on_gap import closed_text, gap_nodes, rms_length
 from syncline_design.report.on_joint import joint_nodes, scope_nodes
 from syncline_design.report.on_repairs import repair_nodes
+from syncline_design.report.on_residuals import residual_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 
@@ -83,7 +82,7 @@ def on_diagnosis(found: DiagnosisAndDesign) -> Document:
         sections=(
             *section("findings", "What is missing", _findings(found), "Findings"),
             *section("gap", "How much of the gap is closed", gap_nodes(found), "Gap"),
-            *section("residuals", "Residuals", _residuals(found.plots)),
+            *section("residuals", "Residuals", residual_nodes(found.plots)),
             *section("where", "Where they disagree", _where(found), "Where"),
             *section("drive", "The drive that would tell", _drive(found.plan), "Drive"),
             *section("unseen", "What this log cannot show", _items(found.unseen), "Not shown"),
@@ -338,25 +337,6 @@ def _parameter_text(shown: Estimate) -> str:
         return shown.value
     spread = numbers.finite(shown.standard_uncertainty)
     return numbers.with_uncertainty(shown.value, spread, shown.unit)
-
-
-def _residuals(plots: Plots) -> list[Node]:
-    found = plots.residuals
-    if len(found.time_s) < 2:
-        return []
-    axes = [
-        drawings.ResidualAxis(name, _floats(one.before), _floats(one.after), _floats(one.signature))
-        for name, one in found.axes.items()
-    ]
-    caption = (
-        "Measured minus simulated position, before and after the named effects were added, with "
-        "their own signature."
-    )
-    return [Chart("residuals", partial(drawings.residuals, found.time_s, axes), caption)]
-
-
-def _floats(values: Sequence[float | None]) -> tuple[float, ...]:
-    return tuple(math.nan if v is None else v for v in values)
 
 
 def _where(found: Diagnosis) -> list[Node]:

@@ -1,0 +1,181 @@
+"""Figures of the residuals: on the track, against the motion, over frequency, normal or not."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from syncline_design.diagnosis.result import NormalPlot, Spectrum, Track
+from syncline_design.report import axes as scales
+from syncline_design.report import figures_diagnosis as drawings
+from syncline_design.report import numbers
+from syncline_design.report.figures import WIDTH
+from syncline_design.report.palette import INK, MUTED, SERIES
+from syncline_design.report.svg import InlineFigure, add_axes, draw
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+LONGEST = 0.12  # of the map's width: the longest arrow
+LOWEST, HIGHEST, LABELS = 130.0, 340.0, 90.0  # of the map's height [SVG units]
+BINS = 24
+UNITS = {"speed": "m/s", "turn_rate": "deg/s", "range": "m", "heading": "deg"}
+
+
+def longest_m(track: Track) -> tuple[float, float]:
+    """Longest mean residual before and after [m]."""
+    before = [(a.before_north_m**2 + a.before_east_m**2) ** 0.5 for a in track.arrows]
+    after = [(a.after_north_m**2 + a.after_east_m**2) ** 0.5 for a in track.arrows]
+    return max(before, default=0.0), max(after, default=0.0)
+
+
+def drawn_larger(track: Track) -> float:
+    """How many times larger than the map the arrows are drawn."""
+    span = max(_span(track.north_m), _span(track.east_m), 1e-9)
+    return LONGEST * span / max(*longest_m(track), 1e-12)
+
+
+def _span(values: Sequence[float]) -> float:
+    return max(values) - min(values) if values else 0.0
+
+
+def track_map(track: Track, name: str = "fig-track") -> InlineFigure:
+    """The way from above, with the mean residual of each stretch as an arrow."""
+    larger = drawn_larger(track)
+    shape = _span(track.north_m) / max(_span(track.east_m), 1e-9)
+    height = min(max(WIDTH * shape, LOWEST), HIGHEST) + LABELS
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        axes.plot(track.east_m, track.north_m, color=SERIES[1], alpha=0.4, linewidth=1.2, zorder=1,
+                  label="way")  # fmt: skip
+        before = [(a.before_east_m, a.before_north_m) for a in track.arrows]
+        after = [(a.after_east_m, a.after_north_m) for a in track.arrows]
+        for colour, pairs, label in ((MUTED, before, "before"), (SERIES[0], after, "after")):
+            tips = [(e.east_m + larger * x, e.north_m + larger * y)
+                    for e, (x, y) in zip(track.arrows, pairs, strict=True)]  # fmt: skip
+            axes.update_datalim(tips)
+            axes.quiver(
+                [a.east_m for a in track.arrows], [a.north_m for a in track.arrows],
+                [larger * x for x, _ in pairs], [larger * y for _, y in pairs],
+                angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.005,
+                label=label, zorder=3,
+            )  # fmt: skip
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.margins(0.1)
+        axes.set_xlabel("east [m]")
+        axes.set_ylabel("north [m]")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.25), ncols=3)
+        scales.grid(axes)
+
+    first, last = (numbers.length(size, 3) for size in longest_m(track))
+    spoken = f"Mean residual of {len(track.arrows)} stretches: at most {first} before, {last} after"
+    return draw(name, "Residuals along the way", spoken, (WIDTH, height), build)
+
+
+def binned(values: Sequence[float], sizes_m: Sequence[float]) -> list[tuple[float, float]]:
+    """(middle, root mean square [m]) of rows put in order of a covariate, a share a bin."""
+    order = sorted(range(len(values)), key=lambda k: values[k])
+    found = []
+    for k in range(BINS):
+        part = order[k * len(order) // BINS : (k + 1) * len(order) // BINS]
+        if part:
+            middle = sum(values[i] for i in part) / len(part)
+            square = sum(sizes_m[i] ** 2 for i in part) / len(part)
+            found.append((middle, square**0.5))
+    return found
+
+
+def against(
+    rows: Mapping[str, Sequence[float]],
+    before_m: Sequence[float],
+    after_m: Sequence[float],
+    name: str = "fig-against",
+) -> InlineFigure:
+    """RMS of the residuals before and after, over time and every part of the motion."""
+
+    def build(figure: Figure) -> None:
+        every = figure.subplots(len(rows), 1, squeeze=False)[:, 0]
+        for axes, (covariate, values) in zip(every, rows.items(), strict=True):
+            _against(axes, covariate, binned(values, before_m), binned(values, after_m))
+        every[0].legend(loc="upper center", bbox_to_anchor=(0.5, 1.4), ncols=2)
+
+    spoken = "; ".join(
+        f"{covariate.replace('_', ' ')}: {_range_of(binned(values, before_m))} before, "
+        f"{_range_of(binned(values, after_m))} after"
+        for covariate, values in rows.items()
+    )
+    size = (WIDTH, 40.0 + 105.0 * len(rows))
+    return draw(name, "Residuals against the motion", spoken, size, build)
+
+
+def _against(
+    axes: Axes,
+    covariate: str,
+    before: Sequence[tuple[float, float]],
+    after: Sequence[tuple[float, float]],
+) -> None:
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.plot(*zip(*before, strict=True), color=MUTED, marker="s", markersize=3, label="before")
+    axes.plot(*zip(*after, strict=True), color=SERIES[0], marker="o", markersize=3, label="after")
+    unit = "s" if covariate == "time" else UNITS[covariate]
+    axes.set_xlabel(f"{covariate.replace('_', ' ')} [{unit}]")
+    axes.set_ylabel("RMS")
+    top = 1.08 * max(size for _, size in (*before, *after)) or 1.0
+    axes.set_ylim(0.0, top)
+    drawings.length_ticks(axes, 0.0, top)
+    scales.grid(axes, "y")
+
+
+def _range_of(found: Sequence[tuple[float, float]]) -> str:
+    sizes = [size for _, size in found]
+    return f"{numbers.length(min(sizes), 2)} to {numbers.length(max(sizes), 2)}"
+
+
+def spectrum(found: Spectrum, name: str = "fig-spectrum") -> InlineFigure:
+    """Power of the whitened remainder over frequency, with what white noise seldom exceeds."""
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        axes.plot(found.frequency_hz, found.most, color=MUTED, linewidth=1, linestyle=(0, (3, 2)),
+                  label="white noise seldom exceeds")  # fmt: skip
+        axes.plot(found.frequency_hz, found.power, color=SERIES[0], marker="o", markersize=3,
+                  linewidth=1.4, label="what is left")  # fmt: skip
+        axes.axhline(1.0, color=INK, linewidth=0.8)
+        axes.set_xscale("log")
+        low, high = found.frequency_hz[0], found.frequency_hz[-1]
+        scales.set_ticks(axes, "x", scales.one_two_five(low, high)[::2], lambda v: f"{v:g}")
+        axes.set_ylim(0.0, 1.1 * max(*found.power, *found.most))
+        axes.set_xlabel("frequency [Hz]")
+        axes.set_ylabel("power over white noise's")
+        axes.legend(loc="upper right")
+        scales.grid(axes)
+
+    top = max(range(len(found.power)), key=lambda k: found.power[k] / found.most[k])
+    spoken = (
+        f"Highest against what white noise seldom exceeds at {found.frequency_hz[top]:.3g} Hz: "
+        f"{found.power[top]:.3g} of {found.most[top]:.3g}"
+    )
+    return draw(name, "Spectrum of what is left", spoken, (WIDTH, 260.0), build)
+
+
+def normal(found: NormalPlot, name: str = "fig-normal") -> InlineFigure:
+    """Quantiles of the whitened remainder against those of the standard normal."""
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        ends = (found.normal[0], found.normal[-1])
+        axes.plot(ends, ends, color=MUTED, linewidth=1, linestyle=(0, (3, 2)), label="normal")
+        axes.plot(found.normal, found.remainder, color=SERIES[0], marker="o", markersize=3.5,
+                  linewidth=1.2, label="what is left")  # fmt: skip
+        axes.set_xlabel("quantile of the standard normal")
+        axes.set_ylabel("quantile, in its own sigma")
+        axes.legend(loc="upper left")
+        scales.grid(axes)
+
+    spoken = (
+        f"At {found.normal[0]:.2f} and {found.normal[-1]:+.2f} the remainder is at "
+        f"{found.remainder[0]:.2f} and {found.remainder[-1]:+.2f}"
+    )
+    return draw(name, "Normal plot of what is left", spoken, (WIDTH, 300.0), build)
