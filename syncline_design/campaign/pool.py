@@ -18,12 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis.result import Scope
-from syncline_design.diagnosis.slow_states import LOST, STEADY, Judged
+from syncline_design.diagnosis.slow_states import LOST, Judged
 from syncline_design.diagnosis.sufficient import Less, Sufficient
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
 
 Index = NDArray[np.int64]
+KNOWN: Final = 30  # freedom for which the noise fitted counts against the scatter of parts
 EXACT: Final = 60  # parameters up to which every part left out is solved for itself
 
 
@@ -212,15 +213,18 @@ class Fitted:
         return found
 
     def judged(self, index: Index) -> Judged:
-        """Some of the values, with their covariance by the noise fitted and by every jackknife."""
+        """Some of the values, with their covariance by the noise fitted and by every jackknife.
+
+        Few parts tell a variance badly, so that theirs is moderated by the one fitted, each by its
+        freedom (Smyth, Stat. Appl. Genet. Mol. Biol. 3 (2004)); of many logs the parts decide.
+        """
         model = self.inverse[np.ix_(index, index)]
         jackknives = []
         for departures, free in self.parts:
             if free >= index.size + 4:
                 own = departures[:, index]
-                spread = own.T @ own
-                least = np.maximum(STEADY * np.diag(model) - np.diag(spread), 0.0)
-                jackknives.append((spread + np.diag(least), free + 1))
+                spread = (free * own.T @ own + KNOWN * model) / (free + KNOWN)
+                jackknives.append((spread, free + KNOWN + 1))
         return Judged(self.values[index], model, tuple(jackknives))
 
 

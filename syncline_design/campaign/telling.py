@@ -129,7 +129,11 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
     scope = one.scoped.scope
     per_log = None if scope == "build" else tuple(_per_log(told, k))
     tested = one.tested.logs if one.tested.starts is None else one.tested.starts
-    return replace(found, scope=scope, per_log=per_log, one_value=tested)
+    found = replace(found, scope=scope, per_log=per_log, one_value=tested)
+    if scope == "build":
+        return found
+    every = "at every start" if scope == "start" else "in every log"
+    return replace(found, sentence=f"{found.sentence} on average, another value {every}")
 
 
 def _odds(worse: float) -> float:

@@ -286,15 +286,20 @@ def _started(
     inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress = silent
 ) -> Search:
     """A search over a log, ready to run."""
+    data = prepared(inputs, log, settings.exclude_effects)
+    progress("searching", 0.15)
+    return start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
+
+
+def prepared(inputs: Measured, log: Log, exclude: Sequence[str] = ()) -> Data:
+    """A log beside its system, ready for fitting: what its own courses show of slow noise too."""
     plain = structure_of(scene(inputs.system, log, inputs.known))
     log = without_still_axes(inputs.system, log, inputs.known, plain)
     view = scene(inputs.system, log, inputs.known)
-    found = candidates(view, settings.exclude_effects)
+    found = candidates(view, exclude)
     parts = directed_parts(view, found)
     data = with_shown_ranging(data_of(view, structure_of(view, parts)))
-    data = with_shown_survey(data, signatures(view, found))
-    progress("searching", 0.15)
-    return start_search(data, settings, lambda done: progress("searching", 0.15 + 0.5 * done))
+    return with_shown_survey(data, signatures(view, found))
 
 
 def with_shown_ranging(data: Data) -> Data:

@@ -210,6 +210,8 @@ def _facts(found: Diagnosis) -> list[tuple[str, str]]:
     if gap.expected_rms_m is not None:
         facts.append(("The spec's noise expects", rms_length(gap.expected_rms_m)))
     rows = f"{numbers.count(log.used)} of {numbers.count(log.rows)}"
+    if found.joint is not None:
+        facts.append(("Logs together", str(len(found.joint.logs))))
     return [*facts, ("Rows used", rows)]
 
 
@@ -274,7 +276,8 @@ def finding_node(found: Finding) -> Node:
     if open_:
         names = sentence_list([_alias_text(one) for one in open_])
         apart = f"To separate them: {found.separated_by}."
-        words = f"This log cannot tell it apart from {names}. {apart}"
+        who = "This log" if found.scope is None else "These logs"
+        words = f"{who} cannot tell it apart from {names}. {apart}"
         nodes.append(Text(words, mark="!", tone="warn"))
     if unlikely:
         names = sentence_list([_alias_text(one) for one in unlikely])
