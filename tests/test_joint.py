@@ -6,6 +6,8 @@ Oracles: stacked least squares by numpy, dense covariances written out here, the
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +26,7 @@ from syncline_design.diagnosis.noise import row_covariance
 from syncline_design.diagnosis.run import examined
 from syncline_design.diagnosis.sufficient import Less, Sufficient, shown_level, sufficient
 from syncline_design.diagnosis.system import measured
+from syncline_design.machine.appended_files import append_line
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import load
@@ -360,3 +363,29 @@ def test_from_python(weak: Path) -> None:
     found = diagnose_joint(load(weak / "spec.yaml"), JointRequest((Path(logs(weak)[0]),)))
     assert found.joint is not None
     assert found.joint.starts == 1
+
+
+def test_appending_survives_kills(tmp_path: Path) -> None:
+    """A writer that is killed while it writes leaves whole lines, and at most one torn end."""
+    path, code = (
+        tmp_path / "lines",
+        "import sys; from pathlib import Path\n"
+        "from syncline_design.machine.appended_files import append_line\n"
+        "for k in range(10**6):\n"
+        "    append_line(Path(sys.argv[1]), lambda kept: b'%06d' % kept.count(b'\\n')"
+        " + b'x' * 5000 + b'\\n')\n"
+        "    print(k, flush=True)\n",
+    )
+    for _ in range(2):
+        writer = subprocess.Popen([sys.executable, "-c", code, str(path)], stdout=subprocess.PIPE)
+        assert writer.stdout is not None
+        told = [writer.stdout.readline() for _ in range(5)]
+        writer.kill()
+        writer.wait()
+        assert all(told)
+    append_line(path, lambda kept: b"%06d" % kept.count(b"\n") + b"x" * 5000 + b"\n")
+    lines = path.read_bytes().split(b"\n")
+    assert lines.pop() == b""
+    assert len(lines) >= 11
+    assert [int(line[:6]) for line in lines] == list(range(len(lines)))
+    assert {len(line) for line in lines} == {5006}
