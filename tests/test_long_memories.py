@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis import Diagnosis, diagnose
+from syncline_design.diagnosis.scene import acting, scene
+from syncline_design.diagnosis.system import measured
+from syncline_design.spec.load import load
 
 Array = NDArray[np.float64]
 AXES = ("north", "east", "down")
@@ -39,6 +42,7 @@ SCANNER = f"""    attitude:
       primitive: pps
       timestamping: {{error: {{distribution: uniform, low: -10 ns, high: 10 ns}}}}
 """
+CIRCLING = SPEC.replace("ARM", f"{ARM_M}") + SCANNER
 
 
 def written(folder: Path, spec: str, columns: dict[str, Array]) -> Diagnosis:
@@ -52,11 +56,14 @@ def vectors(name: str, values: Array, unit: str) -> dict[str, Array]:
     return {f"{name}_{axis}_{unit}": values[:, k] for k, axis in enumerate(AXES)}
 
 
-def circling(folder: Path, seed: int, lag_s: float, turn: float) -> Diagnosis:
+def circling(seed: int, lag_s: float, turn: float, noise: float = 1.0) -> dict[str, Array]:
     """A level vehicle on a steady circle at 5 m/s sees targets below; its position is smoothed."""
     rng = np.random.default_rng(seed)
     t = 0.1 * np.arange(800)
-    drawn = rng.standard_normal
+
+    def drawn(size: int | tuple[int, int]) -> Array:
+        return noise * rng.standard_normal(size)
+
     yaw, level = turn * t, 0.0 * t
     place = 5.0 / turn * np.exp(1j * (yaw - np.pi / 2))  # north + i east
     antenna = (place + ARM_M * np.exp(1j * yaw)) / (1.0 + 1j * turn * lag_s)
@@ -66,7 +73,7 @@ def circling(folder: Path, seed: int, lag_s: float, turn: float) -> Diagnosis:
     target = place + across * np.exp(1j * (yaw + bearing))
     distance = np.hypot(across, 10.0)
     noise_deg = ANGLE_DEG * drawn((t.size, 5))
-    columns = {
+    return {
         "time_s": t,
         **vectors("position", position + POSITION_M * drawn((t.size, 3)), "m"),
         **vectors("velocity", velocity + SPEED_MPS * drawn((t.size, 3)), "mps"),
@@ -78,7 +85,6 @@ def circling(folder: Path, seed: int, lag_s: float, turn: float) -> Diagnosis:
         "elevation_deg": -np.degrees(np.arctan2(10.0, across)) + noise_deg[:, 4],
         **vectors("target", np.stack([target.real, target.imag, level], axis=1), "m"),
     }  # fmt: skip
-    return written(folder, SPEC.replace("ARM", f"{ARM_M}") + SCANNER, columns)
 
 
 def lag_of(found: Diagnosis) -> tuple[float, float]:
@@ -92,7 +98,7 @@ def test_a_smoothed_circle_is_no_pair_of_arms(tmp_path: Path) -> None:
     """A constant in the body: arms of many baselines fit it too, and a little better, as the noise
     of the velocities is no part of them."""
     lag_s = 1.5
-    found = circling(tmp_path, seed=1, lag_s=lag_s, turn=0.6)
+    found = written(tmp_path, CIRCLING, circling(seed=1, lag_s=lag_s, turn=0.6))
     low, high = lag_of(found)
     assert low - 0.001 < lag_s < high + 0.001
     assert high - low < 0.01 * lag_s
@@ -120,3 +126,22 @@ def test_a_filter_of_seconds_is_no_slip_of_seconds(tmp_path: Path) -> None:
     assert low <= lag_s <= high
     assert high - low < 0.01 * lag_s
     assert found.verdict == "explained"
+
+
+def test_the_slope_of_smoothed_places_tells_the_lag_with_the_arm(tmp_path: Path) -> None:
+    """Without velocity columns y - x = -T dy/dt, of the antenna: its arm must not count again."""
+    lag_s = 2.0
+    columns = circling(seed=1, lag_s=lag_s, turn=0.5, noise=0.0)
+    moved = {name: values for name, values in columns.items() if not name.startswith("velocity")}
+    (tmp_path / "spec.yaml").write_text(CIRCLING)
+    table = np.stack(list(moved.values()), axis=1)
+    np.savetxt(tmp_path / "log.csv", table, "%.7f", ",", header=",".join(moved), comments="")
+    inputs = measured(load(tmp_path / "spec.yaml"), [tmp_path / "log.csv"])
+    view = scene(inputs.system, inputs.log)
+    assert view.log.stages[0].follows_position
+    smoothed = (acting("filter_lag", "position", 0, {"time_constant_s": lag_s}),)
+    left = np.linalg.norm(view.error(smoothed), axis=1)[10:-10]
+    was = np.linalg.norm(view.error(), axis=1)
+    assert np.min(was) > 6.0
+    # less than the parabola over a second that the rest of the motion is derived by would leave
+    assert np.max(left) < 0.2 * (0.5 * 0.5) ** 2 / 10.0 * np.max(was)

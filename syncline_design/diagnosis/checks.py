@@ -105,7 +105,7 @@ def _columns(
 ) -> Iterator[Check]:
     """Velocity columns against the positions' motion, rates against the attitudes' turns."""
     rows = view.rows[index]
-    place = rows.position_m - displaced_m
+    place = rows.position_m if logged.follows_position else rows.position_m - displaced_m
     if view.log.kind == "position" and bool(np.all(np.isfinite(view.log.truth_m))):
         place = view.log.truth_m  # the velocity is that of the better system
     sigma_m = _place_sigma_m(view, index)

@@ -30,7 +30,7 @@ class LoggedPast:
     """The motion of one stage up to some stamps at_s (n,) of its log.
 
     velocity: NED [m/s]; rotation, rate_radps: R_nb and body rates at stamps_s.  from_positions:
-    the velocity is the slope of the smoothed places themselves, of which y - x = -T dy/dt.
+    the velocity is the slope of the antenna's smoothed places, of which y - x = -T dy/dt.
     """
 
     at_s: Array
@@ -72,6 +72,10 @@ class LoggedPast:
         return self.found[time_constant_s]
 
     def _lag(self, time_constant_s: float) -> tuple[Array, Array]:
+        if self.from_positions:  # the slope of the smoothed places themselves, their arm included
+            velocity = pieces(self.velocity.time_s, self.velocity.value)
+            lag = -time_constant_s * velocity.value(self.at_s, self.at_s)
+            return lag, np.zeros((self.at_s.shape[0], 3, 3))
         near = _needed(self.velocity.time_s, self.at_s)
         velocity = pieces(self.velocity.time_s[near], self.velocity.value[near])
         near = _needed(self.stamps_s, self.at_s)
@@ -86,8 +90,6 @@ class LoggedPast:
 
     def _passed(self, series: SplinePieces, turns: Array, time_constant_s: float) -> Array:
         """Low pass (n, k) of a series; turns: how each stretch has been turning before it."""
-        if self.from_positions:
-            return series.value(self.at_s, self.at_s)
         found = np.empty((self.at_s.shape[0], series.splines[0].c.shape[2]))
         first = np.searchsorted(self.at_s, series.starts[1:])
         bounds = [0, *first.tolist(), self.at_s.shape[0]]

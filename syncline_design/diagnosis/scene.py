@@ -186,8 +186,12 @@ def _path_velocity(log: Log, logged: StageLog) -> LogTrack:
     """The velocity [m/s], NED, that a memory of the path sums up.
 
     Of a path that is known itself it is the slope of the spline through it: the sum undoes the
-    slope's noise, and smoothing would take away of the motion.
+    slope's noise, and smoothing would take away of the motion.  Of the antenna's own places it is
+    the slope as it is, smoothed by what the places ask for and not over a fixed time.
     """
+    if logged.follows_position and logged.velocity_track is None and logged.antenna_m is not None:
+        times, places = per_stamp(log.time_s, logged.antenna_m)
+        return LogTrack(times, smooth_slope(times, places, times))
     if log.kind == "position" and logged.follows_reference and np.all(np.isfinite(log.truth_m)):
         times, places = per_stamp(log.time_s, log.truth_m)
         return LogTrack(times, pieces(times, places).slope(times, times))
