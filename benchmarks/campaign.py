@@ -208,7 +208,7 @@ def cover(sets: int, *, is_foreign: bool) -> None:
     """How often intervals hold in clean logs: of every effect alone, in sets of 1 and 4 logs."""
     logs = logs_of("georeference", is_foreign=is_foreign)
     rng = np.random.default_rng(9)
-    for size in (1, 4):
+    for size in (1, min(4, *map(len, logs.values()))):
         held = []
         for k in range(sets):
             own = logs[PLATFORMS[k % len(PLATFORMS)]]
