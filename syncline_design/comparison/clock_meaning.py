@@ -11,6 +11,7 @@ from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry
 from syncline_design.spec.choices import ClockChoice
+from syncline_design.verdict.measured import COMMONLY, coverage_of
 from syncline_design.verdict.named import NamedRole
 from syncline_design.verdict.optimise import as_measured
 from syncline_design.verdict.tree import Verdict, Word
@@ -40,6 +41,8 @@ class TimingMeaning(Record):
     """The verdict as the spec has it and with the measured clock; after None: not put in place.
 
     tau_s, total_m: of the whole system, the largest timestamp difference and the error.
+    asked_coverage: the share of the time for which the spec takes its bounds to hold, where the
+    claim is for less.
     """
 
     name: str
@@ -52,6 +55,7 @@ class TimingMeaning(Record):
     measured_total_m: float | None
     requirement_changes: tuple[str, ...]
     sensors: tuple[SensorUnderTiming, ...]
+    asked_coverage: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -83,8 +87,15 @@ def timing_meaning(
     return TimingMeaning(
         before.name, before.file, before.verdict, None if after is None else after.verdict,
         _tau(before), _tau(after), _total(before), _total(after),
-        _changes(before, after), _sensors(before, after, bound),
+        _changes(before, after), _sensors(before, after, bound), _asked(case, study.timing),
     )  # fmt: skip
+
+
+def _asked(case: Case, timing: Timing) -> float | None:
+    """What the spec's coverage_factor asks for, where the claim is for less of the time."""
+    asked = coverage_of(case)
+    weaker = 1.0 - timing.claim.coverage > COMMONLY * (1.0 - asked)
+    return asked if weaker else None
 
 
 def on_clock(case: Case, study: TimingStudy, identity: str) -> Case:

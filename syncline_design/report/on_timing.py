@@ -179,6 +179,13 @@ def _spec(result: TimingAndSpec) -> list[Node]:
     nodes += changes if means.requirement_changes else []
     if not result.claim.made:
         nodes.append(Text("This holds only if the bound does: no claim is made.", quiet=True))
+    if means.asked_coverage is not None:
+        asked, share = means.asked_coverage, result.claim.coverage
+        nodes.append(Text(
+            f"The bound is claimed for {100.0 * share:.4g} % of the time, the spec's "
+            f"coverage_factor asks for {100.0 * asked:.4g} %: measure with --coverage {asked:.4g}.",
+            mark="!", tone="warn",
+        ))  # fmt: skip
     if means.after is not None and means.tau_s is not None and means.measured_tau_s is not None:
         nodes.append(Facts((
             ("\u03c4 of the system", f"{numbers.time(means.tau_s)}, with this clock "
