@@ -304,7 +304,10 @@ def test_what_it_means_for_a_spec_is_what_check_then_says(tmp_path: Path) -> Non
     assert (means["before"], means["after"]) == ("meets", "fails")
     assert means["requirement_changes"] == ["SYNC-1: pass to fail"]
     assert means["measured_tau_s"] > 10.0 * means["tau_s"]
-    assert means["asked_coverage"] == pytest.approx(0.9973002, abs=1e-7)  # k = 3, the claim 95 %
+    assert "asked_coverage" not in means  # k = 2, said to be 95 %
+    spec.write_text(base.replace("coverage_factor: 2", "coverage_factor: 3"), "utf-8")
+    asked = json.loads(run("timing", *logs, "--spec", spec, "-o", "json:-").stdout)["spec"]
+    assert asked["asked_coverage"] == pytest.approx(0.9973002, abs=1e-7)
     entry = tmp_path / "own_clock.yaml"
     run("timing", *logs, "--as", "own_clock", "--write-catalog", entry)
     with_it = tmp_path / "with.yaml"
