@@ -20,6 +20,7 @@ from syncline_design.cli.shared import (
     watched,
 )
 from syncline_design.machine.streams import say
+from syncline_design.model.roles import ROLES
 
 if TYPE_CHECKING:
     from syncline_design.logs.inspection import LogInspection
@@ -56,7 +57,7 @@ def inspect(
     with watched(deadline, targets, quiet=quiet):
         case = None if spec is None else load(spec)
         choice = None if case is None else case.spec.log
-        found = inspect_logs(file, choice, _has_attitude(case))
+        found = inspect_logs(file, choice, _has_attitude(case), _arms(case))
     say_unreadable(found.unreadable)
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
@@ -67,6 +68,18 @@ def inspect(
 def _has_attitude(case: Case | None) -> bool:
     """Whether attitudes would be compared: a spec of one stage that has a sensor of them."""
     return case is None or (len(case.spec.stages) == 1 and case.spec.stages[0].attitude is not None)
+
+
+def _arms(case: Case | None) -> dict[str, tuple[float, float, float]]:
+    """The spec's lever arms by `stage.role`, to be held against those of the log."""
+    found = {}
+    for stage in () if case is None else case.spec.stages:
+        for name in ROLES:
+            role = stage.role(name)
+            if role is not None and role.lever_arm is not None:
+                x, y, z = (float(v) for v in role.lever_arm)
+                found[f"{stage.name}.{name}"] = x, y, z
+    return found
 
 
 def _write(found: LogInspection, case: Case, path: Path) -> None:

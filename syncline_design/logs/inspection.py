@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -17,6 +17,7 @@ from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording, S
 from syncline_design.logs.readers.timelines import calendar
 from syncline_design.logs.roles import Offer, Part, Role, Sureness, offers_of, parts_of
 from syncline_design.logs.run_parts import Known, one_run
+from syncline_design.logs.static_arms import ArmBeside, arms_beside
 from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
 from syncline_design.machine.records import Json, Named, Record, optional
@@ -140,6 +141,7 @@ class LogInspection(Record):
     streams: tuple[InspectedStream, ...]
     proposal: Proposal
     unreadable: tuple[UnreadFile, ...]
+    lever_arms: tuple[ArmBeside, ...] = ()
 
     @property
     def exit_code(self) -> int:
@@ -148,11 +150,13 @@ class LogInspection(Record):
 
 
 def inspect_logs(
-    paths: Sequence[Path], choice: LogChoice | None = None, poses: bool = True
-) -> LogInspection:
+    paths: Sequence[Path], choice: LogChoice | None = None, poses: bool = True,
+    arms: Mapping[str, tuple[float, float, float]] | None = None,
+) -> LogInspection:  # fmt: skip
     """Read the files and propose a mapping; a file that cannot be read is told, not raised.
 
     choice: what a spec already says of its log.  poses: whether attitudes may be compared too.
+    arms: the spec's lever arms by `stage.role`, to be held against those that a log states.
     """
     recordings: list[Recording] = []
     unread = []
@@ -170,7 +174,11 @@ def inspect_logs(
         streams += [_stream(path, one, outside.get(one.name, ())) for one in found]
     offers = offers_of(one_run(recordings))
     proposal = _proposal(offers, choice or LogChoice(), poses)
-    return LogInspection(SCHEMA, __version__, tuple(files), tuple(streams), proposal, tuple(unread))
+    static = [pose for one in recordings for stream in one.streams() for pose in stream.static]
+    beside = arms_beside(static, arms or {})
+    return LogInspection(
+        SCHEMA, __version__, tuple(files), tuple(streams), proposal, tuple(unread), beside
+    )  # fmt: skip
 
 
 def _file(recording: Recording, found: Sequence[Stream]) -> InspectedFile:

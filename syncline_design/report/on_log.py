@@ -47,6 +47,7 @@ def on_log(result: LogInspection) -> Document:
                      if result.proposal.lacking and result.streams else [], "Lacking"),
             *section("proposal", "Mapping", _proposal(result), "Mapping"),
             *section("streams", "Streams", show(_streams(result), silent=True), "Streams"),
+            *section("arms", "Lever arms that the log states", show(_arms(result)), "Lever arms"),
             *section("notes", "What the streams say of themselves", _notes(result), "Notes"),
             *section("unreadable", "Not read",
                      [Items(tuple(given(one.reason) for one in result.unreadable))]
@@ -123,6 +124,29 @@ def _streams(result: LogInspection) -> Table | None:
     heads = ("Stream", "Measures", "Messages #", "Rate [Hz] #", "First", "Last", "Timeline",
              "Frame")  # fmt: skip
     return table("Streams", heads, rows)
+
+
+def _arms(result: LogInspection) -> Table | None:
+    """Every frame on the vehicle, and the spec's arm where the frame's name tells its role."""
+    if not result.lever_arms:
+        return None
+    rows = [
+        (
+            Cell(one.frame, code=True, sub=f"in {one.body}"),
+            Cell(_place(one.log_m)),
+            Cell(one.role or "\u2013"),
+            Cell("\u2013" if one.spec_m is None else _place(one.spec_m)),
+            Cell("\u2013" if one.apart_m is None else numbers.length(one.apart_m), one.apart_m,
+                 "" if one.agrees else "warn", "" if one.agrees else "!"),
+        )
+        for one in result.lever_arms
+    ]  # fmt: skip
+    heads = ("Frame", "Log: forward, right, down [m]", "Role", "Spec [m]", "Apart #")
+    return table("Lever arms", heads, rows)
+
+
+def _place(place: tuple[float, float, float]) -> str:
+    return ", ".join(numbers.number(v, 4) for v in place)
 
 
 def _moment(one: InspectedStream, end: str) -> str:

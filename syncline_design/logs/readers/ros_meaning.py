@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Final
 
-from syncline_design.logs.readers.stream import Body, Frame
+from syncline_design.logs.readers.stream import Body, Frame, StaticPose
 
 Row = tuple[float, ...]
 NAN: Final = math.nan
@@ -46,6 +46,7 @@ class Meaning:
     body: Body = "unknown"
     notes: tuple[str, ...] = ()
     is_cloud: bool = False
+    static: tuple[StaticPose, ...] = ()
 
 
 def has_meaning(topic: str, kind: str) -> bool:
@@ -241,8 +242,16 @@ def _cloud(first: Any) -> Meaning:
 
 def _static(first: Any) -> Meaning:
     """What stands still on the vehicle: lever arms, said one by one."""
-    arms = tuple(_arm(one) for one in list(first.transforms)[:40])
-    return Meaning((), (), lambda m: (), notes=arms)
+    some = list(first.transforms)[:40]
+    poses = tuple(_static_pose(one) for one in some)
+    return Meaning((), (), lambda m: (), notes=tuple(_arm(one) for one in some), static=poses)
+
+
+def _static_pose(one: Any) -> StaticPose:
+    q = one.transform.rotation
+    x, y, z = _vector(one.transform.translation)
+    axes = float(q.x), float(q.y), float(q.z), float(q.w)
+    return StaticPose(str(one.child_frame_id), str(one.header.frame_id), (x, y, z), axes)
 
 
 def _arm(one: Any) -> str:

@@ -305,6 +305,7 @@ def _stream(name: str, tally: _Tally, partial: bool) -> Stream:
         kind=tally.channel.kind,
         columns=() if meaning is None else meaning.columns,
         points=points,
+        static=() if meaning is None else meaning.static,
     )
 
 

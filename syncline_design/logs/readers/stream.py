@@ -72,6 +72,17 @@ class PointTimes:
     clouds: int
 
 
+@dataclass(frozen=True, slots=True)
+class StaticPose:
+    """A frame that stands still in another: its place [m] and axes (x, y, z, w) there, forward,
+    left, up."""
+
+    child: str
+    parent: str
+    place_m: tuple[float, float, float]
+    quaternion: tuple[float, float, float, float]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Stream:
     """One topic, message kind or file; all that is known without looking at what it measures.
@@ -93,6 +104,7 @@ class Stream:
     kind: str = ""  # what the format calls it: `sensor_msgs/msg/Imu`
     columns: tuple[str, ...] = ()
     points: PointTimes | None = None
+    static: tuple[StaticPose, ...] = ()  # what its first message says of the vehicle's frames
     nature: Nature = "unknown"
 
     @property
