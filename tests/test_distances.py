@@ -314,3 +314,12 @@ def test_fixes_move_the_far_end(tmp_path: Path) -> None:
     fix = next(one for one in found["infeasibility"]["fixes"] if one["figure"] == "distance")
     assert fix["to"] == 40.0
     assert "far end of the distance of uav from 60 m to 40 m" in fix["text"]
+
+
+def test_no_more_intervals_than_can_be_looked_at(tmp_path: Path) -> None:
+    raw = drawn(1)
+    one = {**raw["stages"][0], "span": (1.0, 2.0)}
+    later = {**one, "sensors": {k: v for k, v in one["sensors"].items() if k != "position"}}
+    raw["stages"] = [one, *[later] * 4]
+    with pytest.raises(BadInput, match=r"stages\[4\]\.distance: too many intervals"):
+        load_text(written(raw, tmp_path), tmp_path / "spec.yaml")

@@ -66,14 +66,14 @@ def cheapest_by_hand(raw: Raw) -> float | None:
 
 def test_the_root_mean_square_decides_as_by_hand(tmp_path: Path) -> None:
     found, impossible = 0, 0
-    for seed in (*range(22), 41, 54, 64):
+    for seed in (*range(12), 41, 54):
         raw = drawn(seed, ("rmse",))
         wanted = cheapest_by_hand(raw)
         _, problem = loaded(raw, tmp_path)
         assert cost_of(problem, choose(problem)) == wanted, seed
         found, impossible = found + (wanted is not None), impossible + (wanted is None)
-    assert found == 22
-    assert impossible == 3
+    assert found == 12
+    assert impossible == 2
 
 
 def few(seed: int, kind: str, sensors: tuple[int, int, int]) -> Raw:

@@ -42,6 +42,7 @@ from syncline_design.spec.yaml_text import KeyPath
 MOST_REQUIREMENTS = 1_000
 MOST_STAGES = 32  # the work grows with the square of their number; chains have two or three
 MOST_MISSIONS = 100
+MOST_INTERVALS = 4  # stages with several distances: all holds at every combination of their ends
 MOST_EFFECTS = 1_000  # each acts on every simulated sample; a system is known by a few
 
 
@@ -172,6 +173,7 @@ class Spec(FileRecord):
             *_rate_errors(self),
             *_stage_errors(self),
             *_spacing_errors(self),
+            *_distance_errors(self),
         ]
         if errors:
             raise refusals(errors)
@@ -243,6 +245,17 @@ def _stage_errors(spec: Spec) -> list[Located]:
             if role is not None and role.is_empty:
                 errors.append(((*at, name), refusal("no sensor", "sensor or candidates")))
     return errors
+
+
+def _distance_errors(spec: Spec) -> list[tuple[KeyPath, PydanticCustomError]]:
+    several = [k for k, stage in enumerate(spec.stages) if stage.distance is not None]
+    return [
+        (
+            ("stages", k, "distance"),
+            refusal("too many intervals", f"at most {MOST_INTERVALS}", f"{len(several)}"),
+        )
+        for k in several[MOST_INTERVALS : MOST_INTERVALS + 1]
+    ]
 
 
 def _spacing_errors(spec: Spec) -> list[Located]:
