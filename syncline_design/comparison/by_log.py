@@ -21,7 +21,6 @@ _ALONE: Final = {
     "lever_arm": ", but for an equal error of the other lever arm, which undoes it",
     "mounting": ", but for a turn of the other sensor that undoes it",
 }
-_GROWING: Final = ("heading_drift",)  # what drifts shows with the log's length to the power 3/2
 READ: Final = 0.01  # of a limit that readings may lie beyond it
 MOVED: Final = 0.1  # of a limit: a log that stays below it does not show that the limit is kept
 _MOTION: Final = {"speed": ("speed", 1.0), "rate": ("turn_rate", math.pi / 180.0)}
@@ -179,7 +178,8 @@ def _hidden_words(shown: Smallest, log: LogEvidence) -> str:
         return f"{shown.effect} turns it{begins}, and no size of it shows"
     words = f"{shown.effect} turns it{begins or ' before it shows'}, "
     words += f"{'and shows ' if at else ''}from {_amount(shown.sure, unit)} on"
-    if shown.effect in _GROWING and at is not None:
+    if registry()[shown.effect].grows and at is not None:
+        # what drifts shows with the log's length to the power 3/2
         longer_s = log.found.log.duration_s * (shown.sure / at) ** (2.0 / 3.0)
         words += (f" (over the spec's horizon; a log of {format_duration(_rounded_up(longer_s))} "
                   "would show it)")  # fmt: skip

@@ -68,7 +68,8 @@ class OnPaper:
 
     def noisier(self, sensor: str, stage: str, factor: float) -> bool:
         """Whether a sensor so many times noisier than its figure turns the verdict."""
-        one = _entry("noise_understated", sensor, stage, {"factor": factor})
+        wider = next(one for one in registry().values() if one.opens == "factor")
+        one = _entry(wider.name, sensor, stage, {wider.parameters[0].name: factor})
         return self.sound and factor > 1.0 and not self.meets([one])
 
     def hides(self, shown: Smallest) -> bool:

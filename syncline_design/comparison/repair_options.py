@@ -21,6 +21,7 @@ from syncline_design.choice.variations import with_stage
 from syncline_design.choice.ways import INLINE
 from syncline_design.diagnosis.result import Estimate, Finding
 from syncline_design.effects import registry
+from syncline_design.effects.record import Origin
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.choices import MethodChoice
 from syncline_design.spec.edit import PinnedRole, with_effects
@@ -29,17 +30,6 @@ from syncline_design.verdict.bill import bill_of_materials
 from syncline_design.verdict.named import BillLine
 
 Kind = Literal["nothing", "calibrate", "rewire", "timestamping", "sensor"]
-# Effects that come with the way of stamping, and those that come with the sensor itself; every
-# other one hangs on the mounting, on the site or on the processing.
-OF_STAMPS = frozenset(
-    {"latency", "timestamp_jitter", "packetised_timestamps", "timestamp_step", "clock_drift",
-     "integer_second_slip"}
-)  # fmt: skip
-OF_SENSORS = frozenset(
-    {"range_bias", "range_scale", "azimuth_bias", "elevation_bias", "heading_bias",
-     "heading_drift", "noise_understated", "noise_episode", "correlated_noise", "heavy_tails",
-     "height_drift", "filter_lag", "acceleration_tilt", "turnaround_delay"}
-)  # fmt: skip
 INTERVAL = 1.96  # standard uncertainties of 95 %
 MOST_KEPT = 6  # options of one finding that others are combined with
 
@@ -57,6 +47,12 @@ class Remedy:
     assumes: str
     roles: tuple[PinnedRole, ...] = ()
     left: tuple[EffectChoice, ...] = ()
+
+
+def _origin(finding: Finding) -> Origin:
+    """What the finding's effect goes away with; what has no name of its own hangs on the build."""
+    effect = registry().get(finding.effect)
+    return "build" if effect is None else effect.comes_with
 
 
 def bought(before: Sequence[BillLine], after: Sequence[BillLine]) -> float | None:
@@ -111,9 +107,9 @@ def remedies(case: Case, whole: Case, finding: Finding) -> Iterator[Remedy]:
         )  # fmt: skip
     stage = next((one for one in case.stages if one.choice.name == finding.stage), None)
     role = None if stage is None or finding.also else stage.role(finding.sensor)  # type: ignore[arg-type]
-    if stage is None or role is None or finding.effect not in OF_STAMPS | OF_SENSORS:
+    if stage is None or role is None or _origin(finding) == "build":
         return
-    if finding.effect in OF_STAMPS and role.choice.primitive not in (None, "arrival"):
+    if _origin(finding) == "stamps" and role.choice.primitive not in (None, "arrival"):
         yield Remedy(
             "rewire", finding,
             f"put the {role.choice.primitive} wire of {_place(stage, role)} right",
@@ -227,7 +223,7 @@ def _scored(
 def _kind(now: tuple[str, str | None, str], option: Option, finding: Finding) -> Kind | None:
     if option.sensor != now[0]:
         return "sensor"
-    if finding.effect not in OF_STAMPS or option.names == now:
+    if _origin(finding) != "stamps" or option.names == now:
         return None
     return "timestamping" if option.primitive == now[1] else "rewire"
 

@@ -62,4 +62,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     accelerated=True,
+    comes_with="sensor",
 )

@@ -50,4 +50,5 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=90,
     breaks="mounting",
+    comes_with="sensor",
 )

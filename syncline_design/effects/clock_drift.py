@@ -46,4 +46,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     breaks="clock",
+    comes_with="stamps",
 )

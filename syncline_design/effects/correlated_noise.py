@@ -51,4 +51,5 @@ EFFECT = Effect(
     contribute=_contribute,
     opens="slow",
     brief=("slow, {std_m} over {time_constant_s}",),
+    comes_with="sensor",
 )

@@ -58,4 +58,5 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=100,
     breaks="mounting",
+    comes_with="sensor",
 )

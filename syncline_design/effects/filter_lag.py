@@ -90,4 +90,5 @@ EFFECT = Effect(
     contribute=_contribute,
     breaks="latency",
     memory="time_constant_s",
+    comes_with="sensor",
 )

@@ -47,4 +47,5 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=50,
     breaks="mounting",
+    comes_with="sensor",
 )

@@ -49,4 +49,6 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
+    comes_with="sensor",
+    grows=True,
 )

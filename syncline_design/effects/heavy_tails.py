@@ -81,4 +81,5 @@ EFFECT = Effect(
     unbudgeted=_unbudgeted,
     opens="tails",
     brief=("heavy tails ({degrees_of_freedom} degrees of freedom)", "{outlier_rate} outliers"),
+    comes_with="sensor",
 )

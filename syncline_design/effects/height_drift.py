@@ -51,4 +51,5 @@ EFFECT = Effect(
     contribute=_contribute,
     opens="down",
     brief=("slow in height, {std_m} over {time_constant_s}",),
+    comes_with="sensor",
 )

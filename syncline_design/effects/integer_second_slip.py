@@ -47,4 +47,5 @@ EFFECT = Effect(
         instead_of="latency",
     ),
     breaks="latency",
+    comes_with="stamps",
 )

@@ -60,4 +60,5 @@ EFFECT = Effect(
     rarity=10,
     breaks="latency",
     passing=True,
+    comes_with="stamps",
 )

@@ -65,4 +65,5 @@ EFFECT = Effect(
     contribute=_contribute,
     opens="episode",
     brief=("{factor} times as much from {from_s} to {to_s} after the start",),
+    comes_with="sensor",
 )

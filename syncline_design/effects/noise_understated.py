@@ -59,4 +59,5 @@ EFFECT = Effect(
     rarity=140,
     opens="factor",
     brief=("{factor} times the spec's",),
+    comes_with="sensor",
 )

@@ -58,4 +58,5 @@ EFFECT = Effect(
     spread=_spread,
     opens="size",
     breaks="timing",
+    comes_with="stamps",
 )

@@ -46,4 +46,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=40,
+    comes_with="sensor",
 )

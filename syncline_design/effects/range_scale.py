@@ -46,4 +46,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=70,
+    comes_with="sensor",
 )

@@ -232,6 +232,7 @@ def everywhere(stage: Stage, sensor: Target) -> bool:
 
 
 Promise = Literal["timing", "latency", "clock", "lever_arm", "mounting", "noise"]
+Origin = Literal["stamps", "sensor", "build"]
 Opening = Literal["", "factor", "slow", "down", "size", "tails", "episode"]
 # Figures that each opening fits, in the order of the effect's parameters.
 OPENED: Mapping[Opening, int] = {
@@ -286,6 +287,9 @@ class Effect:
     memory: the parameter that is the time constant of what it remembers, "" of one without memory.
     passing: may come and go while a system is at work; what is built in acts all along.
     breaks: which assumption on a built system it breaks; `noise`: that the sensor is as its figure.
+    comes_with: what it goes away with: another way of stamping, another sensor, or neither, where
+    it hangs on the mounting, the site or the processing.
+    grows: with the time since the start, so that a longer log shows a smaller one.
     sentence: for people, a format string over {sensor} and the parameters.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
     """
@@ -315,6 +319,8 @@ class Effect:
     memory: str = ""
     passing: bool = False
     breaks: Promise = "noise"
+    comes_with: Origin = "build"
+    grows: bool = False
     brief: tuple[str, ...] = ()
 
     @property

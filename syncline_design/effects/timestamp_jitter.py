@@ -52,4 +52,5 @@ EFFECT = Effect(
     opens="size",
     bounded_by_k=True,
     breaks="timing",
+    comes_with="stamps",
 )

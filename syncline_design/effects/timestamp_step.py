@@ -57,4 +57,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     breaks="timing",
+    comes_with="stamps",
 )

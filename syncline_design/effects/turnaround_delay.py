@@ -55,4 +55,5 @@ EFFECT = Effect(
     applies=_applies,
     rarity=120,
     breaks="latency",
+    comes_with="sensor",
 )
