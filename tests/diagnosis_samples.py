@@ -13,10 +13,15 @@ from syncline_design.comparison.meaning import (
     ErrorFigure,
     Summary,
 )
-from syncline_design.diagnosis.result import (
+from syncline_design.diagnosis.plotted import (
     AxisResiduals,
     CovariateMap,
     Coverage,
+    MapCell,
+    Plots,
+    Residuals,
+)
+from syncline_design.diagnosis.result import (
     Estimate,
     Finding,
     Fit,
@@ -24,14 +29,11 @@ from syncline_design.diagnosis.result import (
     HeldOut,
     Likelihoods,
     LogRead,
-    MapCell,
     Motion,
     Noise,
-    Plots,
     Provenance,
     Regime,
     Remaining,
-    Residuals,
     Rival,
     Saved,
     SpecRead,

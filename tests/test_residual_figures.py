@@ -10,8 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from syncline_design.diagnosis import remainder_plots
-from syncline_design.diagnosis.remainder_plots import normal_of, spectrum_of, track_of
-from syncline_design.diagnosis.result import (
+from syncline_design.diagnosis.plotted import (
     Arrow,
     AxisResiduals,
     NormalPlot,
@@ -20,6 +19,7 @@ from syncline_design.diagnosis.result import (
     Spectrum,
     Track,
 )
+from syncline_design.diagnosis.remainder_plots import normal_of, spectrum_of, track_of
 from syncline_design.report import figures_residuals as drawings
 from syncline_design.report.document import Chart
 from syncline_design.report.on_residuals import residual_nodes

@@ -15,6 +15,10 @@ from syncline_design.campaign.store import Entry, Stored
 from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import Weights, promise_of
 from syncline_design.diagnosis.findings import estimate, finding
+from syncline_design.diagnosis.plotted import (
+    Plots,
+    Residuals,
+)
 from syncline_design.diagnosis.result import (
     Diagnosis,
     Estimate,
@@ -26,9 +30,7 @@ from syncline_design.diagnosis.result import (
     LogRead,
     Noise,
     PerLog,
-    Plots,
     Remaining,
-    Residuals,
     Rival,
     SpecRead,
     WholeGap,

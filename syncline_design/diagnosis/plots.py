@@ -6,6 +6,14 @@ import numpy as np
 
 from syncline_design.diagnosis.fitting import Data
 from syncline_design.diagnosis.noise import marginal_variance
+from syncline_design.diagnosis.plotted import (
+    AxisResiduals,
+    CovariateMap,
+    Coverage,
+    MapCell,
+    Plots,
+    Residuals,
+)
 from syncline_design.diagnosis.remainder_plots import (
     listed,
     motion_of,
@@ -14,13 +22,7 @@ from syncline_design.diagnosis.remainder_plots import (
     track_of,
 )
 from syncline_design.diagnosis.result import (
-    AxisResiduals,
-    CovariateMap,
-    Coverage,
-    MapCell,
-    Plots,
     Regime,
-    Residuals,
 )
 from syncline_design.diagnosis.search import SearchResult
 from syncline_design.effects.record import Array

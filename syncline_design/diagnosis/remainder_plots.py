@@ -8,8 +8,13 @@ import numpy as np
 
 from syncline_design.diagnosis.fitting import Data
 from syncline_design.diagnosis.noise import white_covariance
+from syncline_design.diagnosis.plotted import (
+    Arrow,
+    NormalPlot,
+    Spectrum,
+    Track,
+)
 from syncline_design.diagnosis.regimes import covariates
-from syncline_design.diagnosis.result import Arrow, NormalPlot, Spectrum, Track
 from syncline_design.diagnosis.search import SearchResult
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import per_stamp

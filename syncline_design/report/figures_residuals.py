@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from syncline_design.diagnosis.result import NormalPlot, Spectrum, Track
+from syncline_design.diagnosis.plotted import (
+    NormalPlot,
+    Spectrum,
+    Track,
+)
 from syncline_design.report import axes as scales
 from syncline_design.report import figures_diagnosis as drawings
 from syncline_design.report import numbers

@@ -6,13 +6,15 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Final
 
-from syncline_design.diagnosis.result import (
+from syncline_design.diagnosis.plotted import (
     Coverage,
+    Plots,
+)
+from syncline_design.diagnosis.result import (
     Diagnosis,
     Fit,
     Gap,
     HeldOut,
-    Plots,
     UnseenBlock,
     WholeGap,
 )

@@ -7,7 +7,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Final
 
-from syncline_design.diagnosis.result import NormalPlot, Plots, Spectrum, Track
+from syncline_design.diagnosis.plotted import (
+    NormalPlot,
+    Plots,
+    Spectrum,
+    Track,
+)
 from syncline_design.report import figures_diagnosis as drawings
 from syncline_design.report import figures_residuals as of_residuals
 from syncline_design.report import numbers

@@ -88,22 +88,29 @@ def _lines(nodes: Iterable[Node], indent: str, paint: Paint) -> Iterator[str]:
             case Text():
                 mark = f"{paint(node.mark, node.tone)} " if node.mark else ""
                 yield from _wrapped(plain(node.words), indent, indent + mark)
-            case Facts(look="terms"):
-                for label, value in node.pairs:
-                    yield from _wrapped(plain(label), indent)
-                    yield from _wrapped(plain(value), f"{indent}  ")
             case Facts():
-                yield from _pairs(node.pairs, indent)
+                yield from (_terms if node.look == "terms" else _pairs)(node.pairs, indent)
             case Items():
-                mark = paint(node.mark, node.tone) if node.mark else "-"
-                for entry in node.entries:
-                    yield from _wrapped(plain(entry), f"{indent}  ", f"{indent}{mark} ")
+                yield from _items(node, indent, paint)
             case TableNode():
                 yield from table_lines(node.table, indent, paint, silent=node.silent)
             case Group():
                 yield from _lines(node.nodes, indent, paint)
             case _:
                 raise TypeError(f"a {node.kind} is for pages only")
+
+
+def _items(node: Items, indent: str, paint: Paint) -> Iterator[str]:
+    mark = paint(node.mark, node.tone) if node.mark else "-"
+    for entry in node.entries:
+        yield from _wrapped(plain(entry), f"{indent}  ", f"{indent}{mark} ")
+
+
+def _terms(pairs: Sequence[tuple[str, Inline]], indent: str) -> Iterator[str]:
+    """Label, and its sentences below it."""
+    for label, value in pairs:
+        yield from _wrapped(plain(label), indent)
+        yield from _wrapped(plain(value), f"{indent}  ")
 
 
 def _pairs(pairs: Sequence[tuple[str, Inline]], indent: str) -> Iterator[str]:

@@ -78,12 +78,7 @@ def homes(case: Case, kind: EntryKind, entry: str) -> Iterator[str]:
 def admissions(case: Case, kind: EntryKind, entry: str) -> Iterator[Case]:
     """The case with an entry as the only candidate of one place, for every place that suits it."""
     if kind == "hardware":
-        for method, one in case.catalog.timestamping.items():
-            if entry in one.requires:
-                yield from admissions(case, "timestamping", method)
-        for clock, other in case.catalog.clocks.items():
-            if entry in other.requires:
-                yield from admissions(case, "clock", clock)
+        yield from _by_hardware(case, entry)
         return
     for stage in case.stages:
         for role in stage.roles:
@@ -92,6 +87,16 @@ def admissions(case: Case, kind: EntryKind, entry: str) -> Iterator[Case]:
     if kind == "clock":
         for vehicle in dict.fromkeys(stage.choice.vehicle_name for stage in case.stages):
             yield _on_vehicle(case, vehicle, entry)
+
+
+def _by_hardware(case: Case, item: str) -> Iterator[Case]:
+    """Hardware comes with the methods and clocks that need it."""
+    for method, one in case.catalog.timestamping.items():
+        if item in one.requires:
+            yield from admissions(case, "timestamping", method)
+    for clock, other in case.catalog.clocks.items():
+        if item in other.requires:
+            yield from admissions(case, "clock", clock)
 
 
 def _suits(case: Case, role: RoleCase, kind: EntryKind, entry: str) -> bool:

@@ -6,10 +6,12 @@ once, and shared hardware counts for the mission that needs most channels of it.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from fractions import Fraction
 
 from syncline_design.spec.case import Case
+from syncline_design.spec.catalog import ClockEntry, TimestampingEntry
 from syncline_design.spec.selection import Selection
 from syncline_design.verdict.recheck_sums import BUDGETS, Bought, Budget, sum_of
 
@@ -23,7 +25,7 @@ def family_sums(
     bought: dict[Piece, Bought] = {}
     boards: dict[Piece, Bought] = {}
     for case, selection in missions:
-        channels: dict[tuple[str, str], int] = {}
+        channels: Counter[tuple[str, str]] = Counter()
         vehicles = {stage.choice.name: stage.choice.vehicle_name for stage in case.stages}
         for picked in selection.roles:
             stage = next(one for one in case.stages if one.choice.name == picked.stage)
@@ -36,17 +38,13 @@ def family_sums(
             if method is None:
                 continue
             bought[("method", *slot, picked.method)] = Bought(None, method)
-            for item, count in method.requires.items():
-                key = (vehicles[picked.stage], item)
-                channels[key] = channels.get(key, 0) + count
+            _connect(channels, vehicles[picked.stage], method)
         for clock in selection.clocks:
             entry = case.clock(clock.vehicle, clock.id)
             if entry is None or clock.id is None:
                 continue
             bought["clock", clock.vehicle, clock.id] = Bought(clock.id, entry)
-            for item, count in entry.requires.items():
-                key = (clock.vehicle, item)
-                channels[key] = channels.get(key, 0) + count
+            _connect(channels, clock.vehicle, entry)
         for (vehicle, item), count in channels.items():
             board = case.hardware[item].entry
             pieces = (count + board.channels - 1) // board.channels
@@ -54,3 +52,11 @@ def family_sums(
                 boards[vehicle, item] = Bought(item, board, pieces)
     everything = [*bought.values(), *boards.values()]
     return {name: sum_of(missions[0][0], everything, name) for name in BUDGETS}
+
+
+def _connect(
+    channels: Counter[tuple[str, str]], vehicle: str, entry: TimestampingEntry | ClockEntry
+) -> None:
+    """The channels of shared hardware that a method or clock takes on a vehicle."""
+    for item, count in entry.requires.items():
+        channels[vehicle, item] += count
