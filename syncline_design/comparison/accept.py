@@ -113,7 +113,7 @@ def _diagnosed(
     if not places and not (wanted and named):
         return None
     pinned = as_measured(case, seed)
-    found = diagnose(pinned, places, DiagnosisSettings(seed=seed))
+    found = diagnose(pinned, places, DiagnosisSettings(seed=seed, unseen_block=False))
     paper = OnPaper.beside(pinned, found, seed)
     return LogEvidence(found, paper, case.stages[-1].choice.name, _clocks(case, rests_on))
 

@@ -176,7 +176,9 @@ def told(one: Examined, case: Case | None = None, progress: Progress = silent) -
         first_disagreement_s=first_disagreement_s(view, result.base.error, result.model.precision),
         gap=replace(
             whole_gap(data, search, result, untouched),
-            unseen=unseen_block(data, result, lambda rows: _started(inputs, rows, settings)),
+            unseen=unseen_block(data, result, lambda rows: _started(inputs, rows, settings))
+            if settings.unseen_block
+            else None,
         ),
         steps=gap_steps(data, result, faults, untouched),
         unseen=_unseen(data, search, result, settings.exclude_effects),

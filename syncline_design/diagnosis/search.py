@@ -69,12 +69,14 @@ class DiagnosisSettings:
     """seed: of everything drawn.  false_alarm_rate: chance that a clean log is found at fault.
 
     max_effects: how many effects are named at most.  exclude_effects: names that must not be used.
+    unseen_block: whether to search once more without a block of the log, to judge on it.
     """
 
     seed: int = 0
     false_alarm_rate: float = 0.05
     max_effects: int = 8
     exclude_effects: tuple[str, ...] = ()
+    unseen_block: bool = True
 
 
 @dataclass(frozen=True, slots=True)
