@@ -12,6 +12,7 @@ from syncline_design.spec.load import BadInput, load_text
 from syncline_design.spec.validation import validate
 from syncline_design.spec.yaml_text import parse
 
+ROOT = Path(__file__).resolve().parent.parent
 LIDAR = """\
 sensors:
   my_lidar:
@@ -121,7 +122,7 @@ def test_a_wrong_fact_is_refused_where_it_stands(column: int, extra: str, words:
 
 def test_a_spec_that_draws_the_fault_in_is_refused_too(tmp_path: Path) -> None:
     (tmp_path / "mine.yaml").write_text(f"{LIDAR}    reach: {{min: 80 m, max: 70 m}}\n", "utf-8")
-    spec = Path("specs/usv_mapping.yaml").read_text("utf-8") + "catalogs: [mine.yaml]\n"
+    spec = (ROOT / "specs" / "usv_mapping.yaml").read_text("utf-8") + "catalogs: [mine.yaml]\n"
     with pytest.raises(BadInput, match=r"mine\.yaml:8:18: .*min above max"):
         load_text(spec, tmp_path / "spec.yaml")
 

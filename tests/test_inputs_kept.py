@@ -99,7 +99,7 @@ def test_an_output_is_refused_in_the_place_of_an_input(
         monkeypatch.setattr(f"syncline_design.{place}", computed)
     if command == "diff":
         monkeypatch.undo()
-        os.chdir(folder)
+        monkeypatch.chdir(folder)
     output = ALIASES[alias](Path(name))
     words = refused(folder, (*COMMANDS[command][0], "--output", f"json:{output}"))
     assert "is read by this command" in words or "a YAML file is there" in words

@@ -120,13 +120,14 @@ def test_limits_are_the_tightest_and_sync_is_implied() -> None:
     assert dict(limits.ids) == {"accuracy": "ACC2", "cost": "COST", "mass": "MASS"}
 
 
-def test_money_is_converted_exactly() -> None:
+def test_money_is_converted_to_the_cent_piece_by_piece() -> None:
+    """800.10 USD are 736.092 EUR, so 736.09 EUR."""
     text = USV.replace("cost: 800 EUR", "cost: 800.10 USD").replace(
         "currency: EUR", "currency: EUR\nexchange_rates: {USD: 0.92 EUR}"
     )
     option = by_role(build_problem(loaded(text)))["position"][0]
     gpio = load(SPECS[0]).catalog.timestamping["gpio"].cost
-    assert option.resources.cost == Fraction("800.10") * Fraction("0.92") + gpio.exact  # type: ignore[union-attr]
+    assert option.resources.cost == Fraction("736.09") + gpio.exact  # type: ignore[union-attr]
 
 
 def test_known_effects_add_to_tau_and_to_the_total() -> None:

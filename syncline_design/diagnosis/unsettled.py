@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from syncline_design.diagnosis.scene import Scene
 
 GONE = 1e-3  # share of the first state that no longer counts
+LEAST = 1e-9  # of the noise: a state that is smaller has no size of its own
 
 
 def without_unlogged_past(view: Scene, error: Array, acting: Sequence[Acting]) -> Array:
@@ -39,7 +40,9 @@ def _less(error: Array, view: Scene, one: Acting, constant_s: float, past: Logge
     rows, sensor = view.rows[one.stage], view.system.stages[one.stage].position
     noise_m = max(sensor.sigma) if sensor is not None else 0.0
     pulled = np.sqrt(np.mean(np.sum(rows.acceleration_mps2**2, axis=1)))
-    size_m = max(constant_s**2 * float(pulled), np.finfo(float).tiny)
+    size_m = constant_s**2 * float(pulled)
+    if size_m <= LEAST * noise_m:  # nothing moves, so nothing is remembered
+        return error
     for begun_s, a, b in _stretches(past):
         share = np.exp(-(past.at_s[a:b] - begun_s) / constant_s)
         b = a + int(np.count_nonzero(share > GONE))
