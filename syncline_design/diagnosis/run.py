@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from syncline_design import __version__
-from syncline_design.diagnosis.axes import without_still_axes
+from syncline_design.diagnosis.axes import still_axes_apart, varying_axes, without_still_axes
 from syncline_design.diagnosis.candidates import (
     candidates,
     directed_parts,
@@ -300,7 +300,9 @@ def prepared(inputs: Measured, log: Log, exclude: Sequence[str] = ()) -> Data:
     view = scene(inputs.system, log, inputs.known)
     found = candidates(view, exclude)
     parts = directed_parts(view, found)
-    data = with_shown_ranging(data_of(view, structure_of(view, parts)))
+    structure = structure_of(view, parts)
+    structure = still_axes_apart(structure, varying_axes(view.error(), structure))
+    data = with_shown_ranging(data_of(view, structure))
     return with_shown_survey(data, signatures(view, found))
 
 
