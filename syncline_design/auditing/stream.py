@@ -384,8 +384,3 @@ def _trace(raw: Series) -> tuple[EnvelopePoint, ...]:
         EnvelopePoint(float(times[p].mean()), float(late[p].min()), float(late[p].max()))
         for p in parts
     )  # fmt: skip
-
-
-def with_faults(one: Examined, faults: tuple[StampFault, ...]) -> Examined:
-    """The same stream with other faults."""
-    return replace(one, faults=faults)

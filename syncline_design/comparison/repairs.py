@@ -130,10 +130,6 @@ def _best_of_each_kind(scored: Sequence[_Scored]) -> Iterator[_Scored]:
         )
 
 
-def _by_error(one: _Scored) -> tuple[float, float, int]:
-    return one.error_m, one.price, 0
-
-
 def _order(one: _Scored) -> tuple[float, float, int]:
     """The cheapest first, of equals the better, then the least work."""
     return one.price, one.error_m, sum(remedy.kind != "nothing" for remedy in one.chosen)

@@ -159,29 +159,6 @@ def clean_errors(data: Data, model: Model, rng: np.random.Generator, count: int)
     return np.asarray(draws)
 
 
-def refit_factor(
-    data: Data,
-    model: Model,
-    free: Sequence[Signature],
-    rng: np.random.Generator,
-    gains: Gains,
-    log_p: LogP,
-    expected: float,
-) -> float:
-    """Mean least log p of simulated clean logs, noise refitted, over what known noise gives.
-
-    expected: the mean of the direct draws.  At least 1: the threshold is never loosened.
-    """
-    if len(data.view) > MOST_ROWS or not free:
-        return 1.0
-    own = np.nan_to_num(slopes(data.view, model.acting))
-    least = [
-        _least_log_p(data, model, free, own, error, gains, log_p)
-        for error in clean_errors(data, model, rng, LOGS)
-    ]
-    return max(1.0, float(np.mean(least)) / expected)
-
-
 def _least_log_p(
     data: Data,
     model: Model,

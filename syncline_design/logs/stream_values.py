@@ -13,7 +13,7 @@ import numpy as np
 
 from syncline_design.effects.kinematics import euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import Array
-from syncline_design.logs.columns import ATTITUDE, NED, POSITION, RANGING, RATE, TARGET, VELOCITY
+from syncline_design.logs.columns import ATTITUDE, POSITION, RANGING, RATE, TARGET, VELOCITY
 from syncline_design.logs.readers.stream import Body, Frame, Nanoseconds, Piece
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer
@@ -248,8 +248,3 @@ def separation_of(several: Sequence[Values]) -> float | None:
             if known.shape[0]:
                 return float(np.median(known))
     return None
-
-
-def ned_names(prefix: str = "") -> tuple[str, ...]:
-    """Columns of a place: `position_...` or, with the prefix of a reference, `reference_...`."""
-    return tuple(f"{prefix or 'position_'}{axis}_m" for axis in NED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Annotated, Any, Final
@@ -344,8 +344,3 @@ def check_text(found: CatalogCheck) -> str:
     said = f"{count} finding{'' if count == 1 else 's'}" if count else "no findings"
     lines = [visible(str(one)) for one in found.findings]
     return "\n".join([*lines, f"{found.entries} entries in {files}: {said}"]) + "\n"
-
-
-def known_types(catalog: Catalog) -> Sequence[str]:
-    """The types that sensors of a catalog have."""
-    return sorted({entry.type for entry in catalog.sensors.values() if entry.type})

@@ -33,16 +33,6 @@ class ChainMotion(Protocol):
         """R_nb at s, (n, 3, 3)."""
 
 
-def cross_matrix(vector: Array) -> Array:
-    """S(v) with S(v) u = v x u, (n, 3) -> (n, 3, 3)."""
-    matrix = np.zeros((*vector.shape[:-1], 3, 3))
-    x, y, z = vector[..., 0], vector[..., 1], vector[..., 2]
-    matrix[..., 0, 1], matrix[..., 0, 2] = -z, y
-    matrix[..., 1, 0], matrix[..., 1, 2] = z, -x
-    matrix[..., 2, 0], matrix[..., 2, 1] = -y, x
-    return matrix
-
-
 _SMALL_RAD = 1e-2
 
 

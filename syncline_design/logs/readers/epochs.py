@@ -62,11 +62,6 @@ def week_start_ns(week: int) -> int:
     return (GPS_EPOCH_S + week * WEEK_S) * NANO
 
 
-def week_of(gps_ns: int) -> int:
-    """The GPS week of a `gps` stamp."""
-    return (gps_ns - GPS_EPOCH_S * NANO) // WEEK_NS
-
-
 def held(nanoseconds: int) -> int:
     """Nanoseconds as 64 bits hold them, else UNSET."""
     return nanoseconds if -(2**63) <= nanoseconds < 2**63 else UNSET
