@@ -439,6 +439,27 @@ def test_stamps_and_receipts_of_one_sensor(clocked: Path, fault_s: float, status
     assert done.exit_code == {"holds": 3, "broken": 1}[status]
 
 
+def test_a_step_that_stays_within_what_is_assumed_breaks_nothing(clocked: Path) -> None:
+    """0.5 ms of the 2 ms assumed: every receipt stays within 2 ms of its stamp."""
+    log = stamped(clocked.parent / "uav_position.csv", -0.0005)
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == "holds", rows["position"]
+    assert "step" in rows["position"]["evidence"]
+    assert 0.0005 < rows["position"]["measured"]["value"] <= 0.002
+
+
+@pytest.mark.parametrize(("messages", "status"), [(58, "not_shown"), (59, "holds")])
+def test_a_few_messages_bear_no_bound_out(clocked: Path, messages: int, status: str) -> None:
+    """59 of 59 within a bound show 95 % of all within it with 95 % confidence: 0.95^59 < 0.05."""
+    assert 0.95**59 < 0.05 < 0.95**58
+    log = stamped(clocked.parent / "uav_position.csv", 0.0)
+    log.write_text("\n".join(log.read_text("utf-8").splitlines()[: messages + 1]) + "\n", "utf-8")
+    done = run("accept", clocked, log, "--only", "timing", "-o", "json:-")
+    rows = {row["role"]: row for row in json.loads(done.stdout)["assumptions"]}
+    assert rows["position"]["status"] == status, rows["position"]
+
+
 def test_faults_of_the_recorder_are_not_those_of_the_stamps(clocked: Path) -> None:
     """The recorder's clock is set forward by 3 s half way: of the stamps nothing is shown."""
     log = stamped(clocked.parent / "uav_position.csv", 0.0)

@@ -17,7 +17,8 @@ from syncline_design.model.quantity import format_duration
 
 # what undoes a departure, so that neither the log nor the objects' places show both together
 _ALONE: Final = {
-    "latency": ", but for a delay common to all sensors, which moves nothing that stands still",
+    "latency": ", but for a delay common to all sensors, which moves nothing that stands still, "
+    "and for one that acts for a part of the log only, which has to be larger to show",
     "lever_arm": ", but for an equal error of the other lever arm, which undoes it",
     "mounting": ", but for a turn of the other sensor that undoes it",
 }
@@ -98,8 +99,14 @@ def _immaterial(one: Assumed, own: Sequence[Finding], paper: OnPaper) -> Judgeme
 def _figure(one: Assumed, finding: Finding) -> MeasuredFigure | None:
     """A finding's size with its interval; of several components, of their root sum of squares.
 
-    None where the parameters are not in the assumption's unit.
+    None where the parameters are not in the assumption's unit, nor of noise its factor: degrees of
+    freedom are none.
     """
+    if one.unit == "1":
+        factor = finding.parameters.get("factor")
+        if factor is None:
+            return None
+        return MeasuredFigure(float(factor.value), *(factor.interval95 or (None, None)))
     parts = [p for p in finding.parameters.values() if _fits(p, one.unit)]
     values = [float(p.value) for p in parts]
     if not parts or len(parts) < len(finding.parameters):
@@ -117,7 +124,7 @@ def _figure(one: Assumed, finding: Finding) -> MeasuredFigure | None:
 
 
 def _fits(part: Estimate, unit: str) -> bool:
-    return not isinstance(part.value, str) and part.unit == ("" if unit == "1" else unit)
+    return not isinstance(part.value, str) and part.unit == unit
 
 
 def _doubt(one: Assumed, log: LogEvidence) -> str:
