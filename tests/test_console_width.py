@@ -16,7 +16,7 @@ from syncline_design.verdict.verify import CheckSettings
 from tests.checked import check_file
 
 ROOT = Path(__file__).resolve().parent.parent
-SPECS = ("usv_wire_missing", "infeasible_example", "rov_relay")
+SPECS = ("usv_wire_missing", "infeasible_example", "position_track")
 WIDTHS = (40, 60, 80, 100, 160)
 
 
