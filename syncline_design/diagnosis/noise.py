@@ -7,7 +7,7 @@ is a finding.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -32,6 +32,7 @@ TIME_MOST_S = 120.0
 TIME_USUAL_S = 25.0  # centre of the weak prior on time constants: minutes or fractions of one
 FACTOR_SPREAD = 0.15  # of the prior on log factor, below the limit
 TIME_SPREAD = 1.0  # its standard deviation in log T
+KEPT = 3  # factored covariances of one structure
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,6 +109,9 @@ class Structure:
     stamped: Array | None = None
     one_reading: bool = True  # of the vehicle for all rows of a stamp
     survey: Array | None = None
+    factored: dict[NoiseLevel, Precision] = field(
+        init=False, default_factory=dict, compare=False, repr=False
+    )
 
     @property
     def shared(self) -> bool:
@@ -271,9 +275,19 @@ def loadings(structure: Structure, level: NoiseLevel) -> tuple[Array, Array]:
 
 
 def precision(structure: Structure, level: NoiseLevel) -> Precision:
-    """The factored covariance of the structure at a noise level."""
-    known = _in_time(structure, level)
-    return known if structure.survey is None else with_lasting(known, structure.survey)
+    """The factored covariance of the structure at a noise level.
+
+    Rivals are fitted from the same noise one after the other, so the last few are kept.
+    """
+    kept = structure.factored
+    known = kept.pop(level, None)
+    if known is None:
+        known = _in_time(structure, level)
+        known = known if structure.survey is None else with_lasting(known, structure.survey)
+        while len(kept) >= KEPT:
+            del kept[next(iter(kept))]
+    kept[level] = known
+    return known
 
 
 def _in_time(structure: Structure, level: NoiseLevel) -> Precision:

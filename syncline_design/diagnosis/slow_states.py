@@ -29,6 +29,8 @@ from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import NoiseLevel, Sensor, white_covariance
+from syncline_design.diagnosis.positive import inverse as inverse_of
+from syncline_design.diagnosis.positive import solution
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
@@ -351,7 +353,7 @@ class States:
             prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
             scale = np.sqrt(np.diag(normal) + prior)
             whole = (normal + np.diag(prior)) / scale[:, None] / scale
-            inverse = np.linalg.pinv(whole, rcond=1e-12) / scale[:, None] / scale
+            inverse = inverse_of(whole, 1e-12) / scale[:, None] / scale
             values = inverse @ score
             energy = (values[width:] ** 2 + np.diag(inverse)[width:]) / share
             for c in range(size2.shape[0]):
@@ -473,8 +475,7 @@ def _freed(
     scale[scale == 0.0] = 1.0
     cross = normal[np.ix_(nuisance, wanted)]
     right = np.concatenate([cross, score[nuisance, None]], axis=1) / scale[:, None]
-    solved = np.linalg.lstsq(inner / scale[:, None] / scale, right, rcond=1e-12)[0]
-    solved = solved / scale[:, None]
+    solved = solution(inner / scale[:, None] / scale, right, 1e-12) / scale[:, None]
     return (
         normal[np.ix_(wanted, wanted)] - cross.T @ solved[:, :-1],
         score[wanted] - cross.T @ solved[:, -1],
