@@ -369,10 +369,10 @@ def test_samples_are_asked_of_a_ranging_sensor(tmp_path: Path) -> None:
     assert flaw.path == "requirements[1].kind"
 
 
-@pytest.mark.parametrize("corrects", [[], ["travel_time"]])
-def test_what_moves_while_sound_travels_is_said(corrects: list[str], tmp_path: Path) -> None:
+@pytest.mark.parametrize("corrects", [None, ["travel_time"]])
+def test_what_moves_while_sound_travels_is_said(corrects: list[str] | None, tmp_path: Path) -> None:
     """(2 + 500 * 4 deg) m/s for 2 * 500 / 1500 s: 24.6044 m."""
-    own = SONAR | {"corrects": corrects}
+    own = SONAR | ({} if corrects is None else {"corrects": corrects})
     verdict = said(tmp_path, spec_of(["own"], {"medium": "water"}), own=own)
     (told,) = [one for one in verdict["warnings"] if one["code"] == "travel-time"]
     assert (told["entry"], told["key"]) == ("own", "corrects")

@@ -40,13 +40,15 @@ PINT_NAMES = {
     "mdeg/s": "millidegree/second", "deg/min": "degree/minute", "deg/h": "degree/hour",
     "nmi": "nautical_mile", "kn": "knot", "%": "percent", "min": "minute", "h": "hour", "d": "day",
     "g": "gram", "mg": "milligram", "kg": "kilogram", "m/s2": "m/s**2", "m/s^2": "m/s**2",
+    **{f"{angle}/{square}": f"{name}/s**2" for square in ("s2", "s^2") for angle, name in (
+        ("rad", "radian"), ("mrad", "milliradian"), ("deg", "degree"), ("mdeg", "millidegree"))},
     "ppb": "1e-9*dimensionless", "degC": "delta_degC",
 }  # fmt: skip
 SI_UNITS = {
     D.LENGTH: "meter", D.TIME: "second", D.ANGLE: "radian", D.SPEED: "meter/second",
     D.ANGULAR_RATE: "radian/second", D.MASS: "kilogram", D.POWER: "watt",
     D.RATIO: "dimensionless", D.FREQUENCY: "hertz", D.ACCELERATION: "meter/second**2",
-    D.TEMPERATURE: "delta_degC",
+    D.ANGULAR_ACCELERATION: "radian/second**2", D.TEMPERATURE: "delta_degC",
 }  # fmt: skip
 
 

@@ -39,13 +39,14 @@ from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
     SensorEntry,
 )
-from syncline_design.spec.exact import fraction_of, norm
+from syncline_design.spec.exact import bend_of, fraction_of, norm, travel_m
 from syncline_design.spec.existence import (
     SOUND_MPS,
     RuledOut,
     Surroundings,
     interval_of,
     is_acoustic,
+    is_charged,
     out_of_reach,
     spacing_m,
     strongest,
@@ -56,11 +57,16 @@ from syncline_design.spec.existence import (
 @dataclass(frozen=True, slots=True)
 class SensorEffects:
     """What known effects add where one sensor takes a role: its whole extra tau, exactly the
-    systematic errors that hang on it, and their share in proportion to its noise."""
+    systematic errors that hang on it (with `underway_m`), and their share in proportion to its
+    noise."""
 
     tau_s: float = 0.0
     systematic_m: Fraction = Fraction(0)
     noise_m: Fraction = Fraction(0)
+
+    def and_underway(self, more_m: Fraction) -> SensorEffects:
+        """With what moves while samples are apart or sound is under way [m]."""
+        return replace(self, systematic_m=self.systematic_m + more_m) if more_m else self
 
 
 BySensor = Mapping[tuple[str, RoleName, str], SensorEffects]  # stage name, role, sensor
@@ -113,6 +119,32 @@ def sensor_error(sensor: SensorEntry, role: RoleName, motion: Motion) -> Fractio
         return norm(sensor.sigma_attitude or 0.0, 3) * motion.distance
     bearing = norm(sensor.sigma_bearing or 0.0, 2) * motion.distance
     return fraction_of(sensor.sigma_range or 0.0) + bearing
+
+
+def underway_m(
+    sensor: SensorEntry, role: RoleName, motion: Motion, case: Case, stage: StageCase
+) -> Fraction:
+    """What a sensor adds by sound under way and by interpolation [m]: see model/underway.py.
+
+    A ranging sensor's fixes are the next stage's positions; its rate is at most c / (2 d).
+    """
+    platform = stage.platform.entry
+    if role == "position":
+        return bend_of(platform.acceleration, sensor.rate, Fraction(0))
+    if role == "attitude":
+        turn = bend_of(platform.angular_acceleration, sensor.rate, Fraction(0))
+        return turn * motion.distance
+    sound = fraction_of(stage.choice.sound_speed or SOUND_MPS)
+    found = echo = Fraction(0)
+    if is_acoustic(sensor.type):
+        echo = 2 * motion.distance / sound
+        if is_charged(sensor, case.spec.strict_facts):
+            found = travel_m(motion.speed, motion.turning, motion.distance, sound)
+    following = case.stages[stage.index + 1 : stage.index + 2]
+    return found + sum(
+        (bend_of(one.platform.entry.acceleration, sensor.rate, echo) for one in following),
+        Fraction(0),
+    )
 
 
 def own_rate(role: RoleName, motion: Motion) -> Fraction | None:
@@ -323,7 +355,7 @@ class Candidates:
     def _why(self, place: int) -> RuledOut:
         """Why a sensor cannot work here, its strongest reason."""
         sensor, barred = self.role.sensors[place], self.barred[place]
-        around = surroundings(self.stage, self.case.spec)
+        around = surroundings(self.case, self.stage)
         found = [] if barred is None else [barred]
         if sensor.entry.modality == "ranging":
             found += out_of_reach(sensor.id, sensor.entry, around)
@@ -361,7 +393,7 @@ def candidates(
     ways: list[Way] = []
     by_signals: dict[tuple[str, ...], Indices] = {}
     barred, of_sensor, terms, limited = [], [], [], []
-    around = surroundings(stage, case.spec)
+    around = surroundings(case, stage)
     for sensor in unhurried(role.sensors):
         signals = tuple(sensor.entry.serves)
         if signals not in by_signals:
@@ -379,10 +411,16 @@ def candidates(
     ]
     fixed, turned = np.array(terms, dtype=float).reshape(-1, 2).T
     name = stage.choice.name
-    effects = tuple(by_sensor.get((name, role.role, one.id), usual) for one in role.sensors)
+    motion = motion_of(stage)
+    effects = tuple(
+        by_sensor.get((name, role.role, one.id), usual).and_underway(
+            underway_m(one.entry, role.role, motion, case, stage)
+        )
+        for one in role.sensors
+    )
     sensors = np.repeat(np.arange(len(shown)), [len(own) for own in shown])
     return Candidates(
-        case, stage, role, motion_of(stage), effects, tuple(barred), tuple(ways), tuple(of_sensor),
+        case, stage, role, motion, effects, tuple(barred), tuple(ways), tuple(of_sensor),
         sensors, np.concatenate([NO_WAY[:0], *shown]), fixed, turned, near, far,
         rate, sound, works > 0.0,
     )  # fmt: skip

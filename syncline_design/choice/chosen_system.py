@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
@@ -19,6 +20,7 @@ from syncline_design.spec.catalog import (
     TimestampError,
     UniformError,
 )
+from syncline_design.spec.existence import SOUND_MPS, is_acoustic, is_charged
 from syncline_design.spec.facts import FieldOfView
 
 Vector = tuple[float, float, float]
@@ -31,7 +33,7 @@ def system_of(case: Case, problem: Problem, design: Design) -> System:
         for table, place in zip(problem.roles, design.options, strict=True)
     }
     stages = tuple(
-        _stage(stage, {role: chosen.get((stage.index, role)) for role in ROLES})
+        _stage(case, stage, {role: chosen.get((stage.index, role)) for role in ROLES})
         for stage in case.stages
     )
     offsets = []
@@ -76,16 +78,17 @@ def clock_error(entry: ClockEntry) -> timing.TimingError:
     return replace(offset, drifted_s=abs(float(entry.drift)) * float(entry.holdover))
 
 
-def _stage(stage: StageCase, chosen: dict[RoleName, Option | None]) -> Stage:
+def _stage(case: Case, stage: StageCase, chosen: dict[RoleName, Option | None]) -> Stage:
     choice, entry = stage.choice, stage.platform.entry
     platform = Platform(
         float(entry.v_max), float(entry.omega_max), float(entry.distance), float(entry.baseline),
         None if choice.distance is None else float(stage.distances[0]),
+        float(entry.acceleration or 0.0), float(entry.angular_acceleration or 0.0),
     )  # fmt: skip
     sensors = {
         name: None
         if option is None or (role := stage.role(name)) is None
-        else _sensor(choice.vehicle_name, role, option)
+        else _sensor(case, stage, role, option)
         for name, option in chosen.items()
     }
     transponder = choice.position.lever_arm if stage.index > 0 and choice.position else None
@@ -110,7 +113,7 @@ def _vector(arm: Sequence[float] | None) -> Vector | None:
     return None if arm is None else (float(arm[0]), float(arm[1]), float(arm[2]))
 
 
-def _sensor(vehicle: str, role: RoleCase, option: Option) -> Sensor:
+def _sensor(case: Case, stage: StageCase, role: RoleCase, option: Option) -> Sensor:
     entry = role.sensor(option.sensor)
     stamping = role.inline or role.method(option.method)
     assert entry is not None
@@ -120,10 +123,32 @@ def _sensor(vehicle: str, role: RoleCase, option: Option) -> Sensor:
         role=role.role,
         sigma=sigma_of(entry, role.role),
         timing=timing_error(stamping.error),
-        timeline=UTC if option.timeline == "utc" else host_timeline(vehicle),
+        timeline=UTC if option.timeline == "utc" else host_timeline(stage.choice.vehicle_name),
         lever_arm_m=_vector(role.choice.lever_arm),
         type=entry.type,
+        **_apart(case, stage, role.role, entry),
     )
+
+
+def _apart(case: Case, stage: StageCase, role: RoleName, entry: SensorEntry) -> dict[str, Any]:
+    """How far apart a sensor's samples are and how long its sound is under way, where it matters:
+    where the vehicle that they are interpolated for is said to accelerate, or sound is charged."""
+    later = case.stages[stage.index + 1 : stage.index + 2]
+    told = {
+        "position": (stage.platform.entry.acceleration,),
+        "attitude": (stage.platform.entry.angular_acceleration,),
+        "ranging": tuple(one.platform.entry.acceleration for one in later),
+    }[role]
+    interpolated = any(one is not None for one in told)
+    echoes = role == "ranging" and is_acoustic(entry.type)
+    travels = echoes and is_charged(entry, case.spec.strict_facts)
+    return {
+        "rate_hz": None if entry.rate is None or not interpolated else float(entry.rate),
+        "sound_mps": float(stage.choice.sound_speed or SOUND_MPS)
+        if echoes and (interpolated or travels)
+        else None,
+        "travels": travels,
+    }
 
 
 def sigma_of(entry: SensorEntry, role: RoleName) -> Vector:

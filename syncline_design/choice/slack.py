@@ -224,6 +224,13 @@ def _gone(problem: Problem) -> str:
     return "sync"
 
 
+def hangs_on_motion(case: Case, problem: Problem) -> bool:
+    """Whether something besides noise and timing changes with how a platform moves."""
+    return bool(case.effects) or any(
+        bool((table.pool().added != table.pool().error).any()) for table in problem.roles
+    )
+
+
 WhatIf = Callable[[Problem, PlatformFigure, float], Problem]
 
 
@@ -232,7 +239,7 @@ def _platform_what_if(case: Case, problem: Problem, build: Build, stage: int) ->
 
     Known effects and simulation hang on how a platform moves: there the whole is built anew.
     """
-    if not case.effects and problem.judge is None:
+    if not hangs_on_motion(case, problem) and problem.judge is None:
         return Moving.of(case, problem, stage).at
 
     def built(_: Problem, figure: PlatformFigure, at: float) -> Problem:

@@ -8,7 +8,7 @@ from pkgutil import iter_modules
 
 from syncline_design.effects.record import Effect
 
-NOT_EFFECTS = frozenset({"acting", "kinematics", "record"})
+NOT_EFFECTS = frozenset({"acting", "kinematics", "record", "underway"})
 
 
 @cache

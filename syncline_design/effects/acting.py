@@ -19,11 +19,13 @@ from syncline_design.effects.record import (
     Target,
     Values,
 )
+from syncline_design.effects.underway import OF_CAUSE
 from syncline_design.model.known import Known
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import SimulationError, System
+from syncline_design.model.underway import Underway, underway
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +47,32 @@ ByStage = Mapping[str, tuple[Acting, ...]]
 
 
 def acting_of(system: System) -> tuple[Acting, ...]:
-    """The known effects of a system's stages, in their order."""
+    """The known effects of a system's stages, in their order; then what no spec lists."""
+    return (*listed(system), *implied(system))
+
+
+def acts(system: System) -> bool:
+    """Whether anything departs from the spec beside noise and timestamps."""
+    return bool(system.effects) or bool(underway(system))
+
+
+def implied(system: System) -> tuple[Acting, ...]:
+    """What is interpolated, and sound under way, as effects."""
+    return tuple(
+        Acting(OF_CAUSE[one.cause], one.role, one.stage, _values_of(one))
+        for one in underway(system)
+    )
+
+
+def _values_of(one: Underway) -> Values:
+    if one.cause == "travel":
+        assert one.sensor.sound_mps is not None
+        return {"share": 2.0 / one.sensor.sound_mps}
+    return {"size": one.size}
+
+
+def listed(system: System) -> tuple[Acting, ...]:
+    """The known effects that a spec lists, where they act."""
     if not system.effects:
         return ()
     known = registry()
@@ -147,6 +174,8 @@ def known_of(system: System) -> Known:
     for index, stage in enumerate(system.stages):
         basis = basis_of(system, index)
         for one, added in stage_contributions(system, index):
+            if one.effect.implied:
+                continue
             if added.tau_s and one.sensor != "target":
                 key: tuple[str, RoleName] = (stage.name, one.sensor)
                 extra[key] = extra.get(key, 0.0) + added.tau_s

@@ -37,6 +37,8 @@ class StageRows:
     start_s: when the mission began, on the clock of time_s; None: at the first row, as in a log.
     independent: each row is a sample of a mission of its own, so what is correlated in time is
     drawn anew in each; False: the rows follow each other in time.
+    pull, twist: unit vectors (n, 3), body axes, along which the path and the attitude bend between
+    two samples; None: in any direction.
     lagged: of a time constant T [s], by how much a low pass of the path up to each row lags
     behind the place (n, 3) and behind R_nb (n, 3, 3), NED; None: only the present is known.
     """
@@ -57,6 +59,8 @@ class StageRows:
     start_s: float | None = None
     independent: bool = False
     lagged: Callable[[float], tuple[Array, Array]] | None = None
+    pull: Array | None = None
+    twist: Array | None = None
 
     def __len__(self) -> int:
         return int(self.time_s.shape[0])
@@ -184,13 +188,15 @@ class Contribution:
 
     tau_s: to the timestamp error's bound of its sensor; systematic_m: displaces the estimate by at
     most this; turn_rad: turns the measured attitude, and with it the line of sight and the arms;
-    sight_rad: turns the line of sight in the body.
+    sight_rad: turns the line of sight in the body; shift_s: of position and attitude against the
+    ranging sensor, beside tau.
     """
 
     tau_s: float = 0.0
     systematic_m: float = 0.0
     turn_rad: float = 0.0
     sight_rad: float = 0.0
+    shift_s: float = 0.0
 
     def total_m(self, basis: Basis) -> float:
         """Systematic term of the budget [m]: systematic + sight d + turn (d + |l_L - l_G|)."""
@@ -292,6 +298,7 @@ class Effect:
     grows: with the time since the start, so that a longer log shows a smaller one.
     sentence: for people, a format string over {sensor} and the parameters.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
+    implied: no spec lists it; it follows from how often and by what a system measures.
     """
 
     name: str
@@ -322,6 +329,7 @@ class Effect:
     comes_with: Origin = "build"
     grows: bool = False
     brief: tuple[str, ...] = ()
+    implied: bool = False
 
     @property
     def wanders(self) -> bool:

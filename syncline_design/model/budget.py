@@ -26,9 +26,10 @@ from syncline_design.model.pairing import (
 )
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
+from syncline_design.model.underway import underway
 
 SyncModelName = Literal["syncline", "per_sensor"]
-TermKind = Literal["sensor", "sync", "systematic"]
+TermKind = Literal["sensor", "sync", "systematic", "underway"]
 Systematic = Sequence[tuple[str, str, float]]  # (term, stage name, value [m])
 
 V_TAU = "v_max*tau"
@@ -145,7 +146,9 @@ def budget(system: System, known: Known = NOTHING_KNOWN) -> Budget:
     stages = tuple(_stage_row(stage, i == 0, pairs) for i, stage in enumerate(system.stages))
     sensors = _sensor_rows(system, known)
     sensor_error = math.fsum(row.sensor_error_m for row in sensors)
-    systematic_m = math.fsum(value for _, _, value in known.systematic)
+    moved = [(one.term, system.stages[one.stage].name, one.value_m) for one in underway(system)]
+    beside = (*known.systematic, *moved)
+    systematic_m = math.fsum(value for _, _, value in beside)
     rate = math.fsum(row.sync_rate_mps for row in stages)
     tau = largest(pair.tau_s for pair in pairs)
     tau_crit = min(syncline.tau_crit_s(*_sums(end)) for end in at_ends(system))
@@ -153,8 +156,8 @@ def budget(system: System, known: Known = NOTHING_KNOWN) -> Budget:
     per_sensor = math.fsum(pair.sync_error_m for pair in pairs)
     error_m = sensor_error + systematic_m
     ledgers = (
-        _ledger(system, known.systematic, _sync_terms(pairs, tau)),
-        _ledger(system, known.systematic, _sync_terms(pairs, None)),
+        _ledger(system, known.systematic, moved, _sync_terms(pairs, tau)),
+        _ledger(system, known.systematic, moved, _sync_terms(pairs, None)),
     )
     ratio = _ratio(tau, tau_crit)
     return Budget(
@@ -330,14 +333,15 @@ def _sync_terms(pairs: Sequence[PairRow], tau: float | None) -> tuple[tuple[str,
 
 
 def _ledger(
-    system: System, systematic: Systematic, sync_terms: Systematic
+    system: System, systematic: Systematic, moved: Systematic, sync_terms: Systematic
 ) -> tuple[LedgerTerm, ...]:
-    """All terms: per stage its sensor errors, then its sync errors; systematic ones last."""
+    """All terms: per stage its sensor errors, then its sync errors; last those beside them."""
     rows: list[tuple[str, str, float, TermKind]] = []
     for stage in system.stages:
         rows += [(term, stage.name, value, "sensor") for term, value in _stage_terms(stage)]
         rows += [(t, s, value, "sync") for t, s, value in sync_terms if s == stage.name]
     rows += [(term, stage_name, value, "systematic") for term, stage_name, value in systematic]
+    rows += [(term, stage_name, value, "underway") for term, stage_name, value in moved]
     total = math.fsum(value for _, _, value, _ in rows)
     return tuple(
         LedgerTerm(term, stage_name, value, kind, value / total if total != 0.0 else 0.0)

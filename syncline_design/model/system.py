@@ -24,6 +24,7 @@ class Platform:
     """How a vehicle moves: v_max [m/s], omega_max [rad/s], range d [m], largest lever arm b [m].
 
     nearest_m: where its object is at any range from there to d, the least of them [m].
+    acceleration_mps2, angular_acceleration_radps2: at most, 0 where nobody says.
     """
 
     v_max_mps: float
@@ -31,6 +32,8 @@ class Platform:
     distance_m: float
     baseline_m: float = 0.0
     nearest_m: float | None = None
+    acceleration_mps2: float = 0.0
+    angular_acceleration_radps2: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +47,8 @@ class Sensor:
     lever_arm_m: body vector [m], None when the spec gives none.  Position: l_G, from the
     reference point to the antenna; ranging: l_L, from the reference point to the ranging sensor.
     type: the catalog's free type word (gnss, ins, lidar, usbl, mbes ...).
+    rate_hz: how often it measures, told where samples are interpolated; sound_mps: speed of sound
+    of one that waits for its echo; travels: whether nobody corrects for the way of the sound.
     """
 
     id: str
@@ -53,6 +58,9 @@ class Sensor:
     timeline: str = UTC
     lever_arm_m: tuple[float, float, float] | None = None
     type: str = ""
+    rate_hz: float | None = None
+    sound_mps: float | None = None
+    travels: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ class Dimension(Enum):
     RATIO = "ratio"
     FREQUENCY = "frequency"
     ACCELERATION = "acceleration"
+    ANGULAR_ACCELERATION = "angular acceleration"
     TEMPERATURE = "temperature"
     DIMENSIONLESS = "plain number"
 
@@ -77,6 +78,12 @@ UNITS: dict[str, tuple[Dimension, Fraction]] = {
     **_prefixed(_D.FREQUENCY, "Hz", ("m", "", "k", "M", "G")),
     "m/s^2": (_D.ACCELERATION, Fraction(1)),
     "m/s2": (_D.ACCELERATION, Fraction(1)),
+    **{
+        f"{prefix}{angle}/{square}": (_D.ANGULAR_ACCELERATION, _PREFIX[prefix] * size)
+        for prefix in ("m", "")
+        for angle, size in (("rad", Fraction(1)), ("deg", DEG))
+        for square in ("s^2", "s2")
+    },
     "degC": (_D.TEMPERATURE, Fraction(1)),  # stays Celsius: only ever compared
 }
 
@@ -92,6 +99,7 @@ EXAMPLES: dict[Dimension, str] = {
     _D.RATIO: "20 ppm",
     _D.FREQUENCY: "10 Hz",
     _D.ACCELERATION: "9.81 m/s^2",
+    _D.ANGULAR_ACCELERATION: "30 deg/s^2",
     _D.TEMPERATURE: "20 degC",
     _D.DIMENSIONLESS: "1.0",
 }
@@ -120,6 +128,7 @@ LADDERS: dict[Dimension, tuple[str, ...]] = {
     _D.RATIO: ("ppb", "ppm", "%"),
     _D.FREQUENCY: ("mHz", "Hz", "kHz", "MHz", "GHz"),
     _D.ACCELERATION: ("m/s^2",),
+    _D.ANGULAR_ACCELERATION: ("deg/s^2",),
     _D.TEMPERATURE: ("degC",),
 }
 
@@ -128,7 +137,8 @@ SI_UNITS = {
     Dimension.LENGTH: "m", Dimension.TIME: "s", Dimension.ANGLE: "rad", Dimension.SPEED: "m/s",
     Dimension.ANGULAR_RATE: "rad/s", Dimension.MASS: "kg", Dimension.POWER: "W",
     Dimension.RATIO: "1", Dimension.DIMENSIONLESS: "1", Dimension.FREQUENCY: "Hz",
-    Dimension.ACCELERATION: "m/s^2", Dimension.TEMPERATURE: "degC",
+    Dimension.ACCELERATION: "m/s^2", Dimension.ANGULAR_ACCELERATION: "rad/s^2",
+    Dimension.TEMPERATURE: "degC",
 }  # fmt: skip
 
 # Suffixes of column and parameter names; the first is the SI one of its dimension.

@@ -267,7 +267,7 @@ class LedgerBar:
     kind: str  # sensor, sync or systematic
 
 
-_HATCH = {"sensor": "", "sync": "///", "systematic": "xxx"}
+_HATCH = {"sensor": "", "sync": "///", "systematic": "xxx", "underway": "..."}
 
 
 def ledger(

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 KEYS: dict[str, str] = {
-    "acceleration": "Largest acceleration that a test drive may ask of the vehicle.",
+    "acceleration": "Largest acceleration of the vehicle: in a test drive, and between two fixes.",
+    "angular_acceleration": "Largest angular acceleration: between two attitudes.",
     "address": "Where the source can be read: a web address, or the number of the document.",
     "allow_discontinued": "yes: what is no longer sold, or not yet, may be chosen; it is said.",
     "area": "North and east extent within which a test drive has to stay: [300 m, 200 m].",

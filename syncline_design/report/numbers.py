@@ -148,6 +148,7 @@ _DIMENSIONS: Final = {
     "m/s": Dimension.SPEED,
     "rad/s": Dimension.ANGULAR_RATE,
     "m/s^2": Dimension.ACCELERATION,
+    "rad/s^2": Dimension.ANGULAR_ACCELERATION,
 }
 
 

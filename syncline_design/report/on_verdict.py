@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -262,8 +263,10 @@ def _syncline(verdict: Verdict) -> list[Node]:
         ("Total error", numbers.length(syncline.total_m)),
         ("Drifts, grids, heave charged for", numbers.horizon(verdict.horizon)),
     ]
-    if syncline.systematic_error_m:
-        facts.insert(-2, ("Known effects", numbers.length(syncline.systematic_error_m)))
+    for kind, label in (("systematic", "Known effects"), ("underway", "Between samples")):
+        beside = [term.value_m for term in syncline.ledger if term.kind == kind]
+        if beside:
+            facts.insert(-2, (label, numbers.length(math.fsum(beside))))
     column = Group((Facts(tuple(facts)), *verdict_figures.explorer(verdict)))
     return [Group((*chart, column), "split"), *show(verdict_tables.models(syncline))]
 

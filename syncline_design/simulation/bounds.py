@@ -144,17 +144,18 @@ def _added(system: System, index: int, known: Known) -> Added:
     d = distance_m(stage)
     d = d if stage.platform.nearest_m is None else float(stage.platform.nearest_m)
     stretched = stage.ranging.sigma[0] / d if stage.ranging is not None and d > 0.0 else 0.0
-    turn = euler = sight = offset = 0.0
+    turn = euler = sight = offset = later = 0.0
     for one, what in acting_effects.stage_contributions(system, index):
-        if one.effect.kind == "stochastic":
+        if one.effect.kind == "stochastic" and not one.effect.implied:
             euler += what.turn_rad
         else:
             turn += what.turn_rad
         sight += what.sight_rad
+        later += what.shift_s
         offset += what.systematic_m * (1.0 + stretched if one.sensor == "ranging" else 1.0)
     position = pair_extra_s(system, index, "position", known)
     attitude = pair_extra_s(system, index, "attitude", known)
-    return Added(position, attitude, turn, euler, sight, offset)
+    return Added(position + later, attitude + later, turn, euler, sight, offset)
 
 
 def pair_extra_s(system: System, index: int, role: RoleName, known: Known) -> float:

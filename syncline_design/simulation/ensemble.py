@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from syncline_design.effects.acting import acting_of, tilts
+from syncline_design.effects.acting import acting_of, implied, listed, tilts
 from syncline_design.model.quantity import format_duration
 from syncline_design.model.system import System
 from syncline_design.simulation.draws import entering
@@ -21,7 +21,7 @@ def ensemble_of(
         "the moment of the trajectory" if envelope == "trajectory" else "directions of motion"
     )
     drawn.append("line of sight")
-    if acting:
+    if listed(system):
         drawn += (
             ["time and place of that moment, from the file"]
             if of_a_file
@@ -29,6 +29,8 @@ def ensemble_of(
         )
     if any(one.effect.wanders for one in acting):  # one stationary draw a sample
         drawn.append("slow noise, at its stationary size")
+    if any(one.effect.kind == "stochastic" for one in implied(system)):
+        drawn.append("how far between two samples, and which way the path bends there")
     constants = _constants(system)
     told = (
         "every sample is a mission of its own, so quantiles run over missions, not within one; "

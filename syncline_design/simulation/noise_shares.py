@@ -22,6 +22,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from syncline_design.effects.acting import acts
 from syncline_design.effects.record import Array
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.roles import ROLES, RoleName
@@ -89,7 +90,7 @@ def surely_keeps(system: System, wanted: Wanted, limit_m: float) -> bool:
     |de/dEuler angle| <= d + |l_L - l_G|, |de/drange| = 1, |de/dbearing| <= d; normal timestamp
     errors count to SURE_SIGMA deviations, beyond which one in 5e8 lies.  Without known effects.
     """
-    if system.effects or wanted.rule is not None:
+    if acts(system) or wanted.rule is not None:
         return False
     squares = sum(
         _largest_noise(stage, index == 0, wanted) for index, stage in enumerate(system.stages)

@@ -7,7 +7,7 @@ and looks, when and where it is, and, where one mission is asked for, what is co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from syncline_design.effects.record import Array
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.roles import ROLES
 from syncline_design.model.system import Stage, System
+from syncline_design.model.underway import Cause, underway
 from syncline_design.simulation import kernel
 from syncline_design.simulation.ascent import (
     SYSTEM,
@@ -90,7 +91,7 @@ class Situations:
     @property
     def linear(self) -> bool:
         """Whether no effect acts and no shift turns a vehicle by more than propagation allows."""
-        if self.system.effects:
+        if self.acting:
             return False
         k = self.system.coverage_factor
         widest = 2.0 * sum(max(map(abs, v.ends_s(k))) for v in self.timing.variables)
@@ -130,8 +131,11 @@ class Situations:
         for index, stage in enumerate(self.system.stages):
             picked = chosen(self.blocks, columns, index)
             draw = _draw(self.system, index, picked, shifts, total)
-            rows = placed_rows(draw, moment, leaning(self.system.horizon, picked["lean"]))
-            state, motion, noise = rows
+            state, motion, noise = placed_rows(
+                draw, moment, leaning(self.system.horizon, picked["lean"])
+            )
+            state = replace(state, pull=_bending(picked, "pull"), twist=_bending(picked, "twist"))
+            rows = (state, motion, noise)
             if drawn is not None:
                 found = numbers_drawn(self.acting, stage.name, state)
                 drawn += found
@@ -213,6 +217,10 @@ def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
             kinds += _sights(index, stage)
             if stage.platform.nearest_m is not None:
                 kinds.append((index, "distance", "ball", 1))
+    bends: dict[Cause, str] = {"path": "pull", "turn": "twist"}
+    kinds += [
+        (one.stage, bends[one.cause], "sphere", 3) for one in underway(system) if one.cause in bends
+    ]
     return stacked(kinds)
 
 
@@ -238,6 +246,11 @@ def _draw(
         range_noise_m=np.zeros(count),
         **stage_shifts(system, index, shifts, count),
     )
+
+
+def _bending(picked: dict[str, Array], name: str) -> Array | None:
+    """Unit vectors (n, 3) along which a path bends between samples, where one is interpolated."""
+    return picked[name].T if name in picked else None
 
 
 def _sights(index: int, stage: Stage) -> list[tuple[int, str, Kind, int]]:

@@ -39,7 +39,7 @@ _SETTLED = 0.01  # an ascent has arrived when an iteration gains less than this 
 def _is_placed(system: System) -> bool:
     """Whether heading, tilt, time or place can matter: else the fast level kernel will do."""
     aimed = any(stage.ranging is not None for stage in system.stages)
-    return bool(system.effects) or (aimed and system.horizon.tilt_rad > 0.0)
+    return acting_effects.acts(system) or (aimed and system.horizon.tilt_rad > 0.0)
 
 
 def blocks(system: System) -> tuple[FreeVector, ...]:

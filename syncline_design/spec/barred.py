@@ -22,11 +22,12 @@ from syncline_design.spec.existence import (
 )
 from syncline_design.spec.facts import Medium
 from syncline_design.spec.gnss import deaf_sensor, is_submerged, untimed_clock, untimed_method
-from syncline_design.spec.spec import Spec
 
 
-def surroundings(stage: StageCase, spec: Spec) -> Surroundings:
+def surroundings(case: Case, stage: StageCase) -> Surroundings:
     """What a stage of a spec asks of its sensors."""
+    spec = case.spec
+    following = next(iter(case.stages[stage.index + 1 : stage.index + 2]), None)
     choice, (near, far) = stage.choice, stage.distances
     asked = (one.limit for one in spec.requirements if one.kind == "sample_spacing")
     return Surroundings(
@@ -41,7 +42,19 @@ def surroundings(stage: StageCase, spec: Spec) -> Surroundings:
         stage.platform.entry.v_max,
         min(asked, default=None),
         choice.sound_speed or SOUND_MPS,
+        tuple(_interpolated(stage, following)),
     )
+
+
+def _interpolated(stage: StageCase, following: StageCase | None) -> Iterator[tuple[str, str]]:
+    """Roles of a stage whose samples are interpolated, each with whose acceleration counts."""
+    own = stage.platform.entry
+    if own.acceleration is not None:
+        yield "position", stage.choice.name
+    if own.angular_acceleration is not None and stage.role("ranging") is not None:
+        yield "attitude", stage.choice.name
+    if following is not None and following.platform.entry.acceleration is not None:
+        yield "ranging", following.choice.name
 
 
 def path_medium(stage: StageCase) -> Medium | None:

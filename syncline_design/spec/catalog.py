@@ -25,6 +25,7 @@ from syncline_design.spec.facts import (
 )
 from syncline_design.spec.fields import (
     Acceleration,
+    AngularAcceleration,
     AngularRate,
     AtLeastOne,
     Count,
@@ -186,6 +187,7 @@ class PlatformEntry(Entry):
     medium: Medium | None = None  # of the path to the object
     motion: Motion | None = None  # what a test drive may ask of it, with the figures below
     acceleration: Acceleration | None = None
+    angular_acceleration: AngularAcceleration | None = None
     minimum_turn_radius: NonNegativeLength | None = None
     minimum_speed: Speed | None = None
     area: DriveArea | None = None
@@ -211,7 +213,7 @@ class SensorEntry(Product):
     medium: Medium | None = None
     field_of_view: FieldOfView | None = None
     rate: Rate | None = None
-    corrects: tuple[Corrected, ...] = ()
+    corrects: tuple[Corrected, ...] | None = None  # []: the maker corrects for nothing
     depth_rating: PositiveLength | None = None
 
     @model_validator(mode="after")

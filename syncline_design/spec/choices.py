@@ -18,6 +18,7 @@ from syncline_design.spec.facts import (
 )
 from syncline_design.spec.fields import (
     Acceleration,
+    AngularAcceleration,
     AngularRate,
     FileRecord,
     Money,
@@ -39,7 +40,7 @@ from syncline_design.spec.log_block import split_column as split_column
 # What a spec may say of a platform, put over the catalog's.
 PLATFORM_FIGURES = (
     "name", "v_max", "omega_max", "distance", "baseline", "medium", "motion", "acceleration",
-    "minimum_turn_radius", "minimum_speed", "area", "height",
+    "angular_acceleration", "minimum_turn_radius", "minimum_speed", "area", "height",
 )  # fmt: skip
 
 
@@ -55,6 +56,7 @@ class PlatformChoice(FileRecord):
     medium: Medium | None = None
     motion: Motion | None = None
     acceleration: Acceleration | None = None
+    angular_acceleration: AngularAcceleration | None = None
     minimum_turn_radius: NonNegativeLength | None = None
     minimum_speed: Speed | None = None
     area: DriveArea | None = None

@@ -32,6 +32,19 @@ def norm(figures: float | Sequence[float], axes: int) -> Fraction:
     return square_root(sum((fraction_of(v) ** 2 for v in values), Fraction(0)))
 
 
+def travel_m(speed: Fraction, turning: Fraction, distance: Fraction, sound: Fraction) -> Fraction:
+    """(v_max + d omega_max) 2 d / c [m], turning being d omega_max: see model/underway.py."""
+    return (speed + turning) * 2 * distance / sound
+
+
+def bend_of(acceleration: float | None, rate: float | None, echo: Fraction) -> Fraction:
+    """a T^2 / 8, T = max(1 / rate, echo) [s] as far as both are told: see model/underway.py."""
+    if acceleration is None:
+        return Fraction(0)
+    apart = echo if rate is None else max(1 / fraction_of(rate), echo)
+    return fraction_of(acceleration) * apart**2 / 8
+
+
 def tau_bound(error: TimestampError, coverage_factor: float) -> Fraction:
     """Bound of |mu| [s]: see timing.bound, here in fractions."""
     if error.bound is not None:

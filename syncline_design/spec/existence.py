@@ -33,7 +33,8 @@ class Surroundings:
 
     nearest, farthest: distance to the object [m]; medium: of the path to it; reflectivity: of the
     object, 0.8 for 80 %; speed: the vehicle's largest [m/s]; spacing: between two samples at that
-    speed, at most [m]; sound_speed: in the water [m/s].
+    speed, at most [m]; sound_speed: in the water [m/s]; interpolated: roles whose samples are
+    interpolated for a vehicle that is said to accelerate, with that vehicle's stage.
     """
 
     stage: str
@@ -47,6 +48,7 @@ class Surroundings:
     speed: float | None = None
     spacing: float | None = None
     sound_speed: float = SOUND_MPS
+    interpolated: tuple[tuple[str, str], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,6 +122,10 @@ def not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterat
         if around.spacing is not None and sensor.rate is None:
             asked = f"samples are to be {_length(around.spacing)} apart at most"
             yield _unknown(identity, "rate", asked)
+    moves = dict(around.interpolated).get(sensor.modality)
+    if moves and sensor.rate is None and not (sensor.modality == "ranging" and around.spacing):
+        asked = f"{moves} accelerates between its samples"
+        yield _unknown(identity, "rate", asked)
     if around.depth and sensor.depth_rating is None:
         yield _unknown(identity, "depth_rating", f"{around.stage} is at {_length(around.depth)}")
     if around.temperature is not None and sensor.temperature is None:
@@ -129,6 +135,13 @@ def not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterat
 def is_acoustic(kind: str) -> bool:
     """Whether a sensor's type names one that ranges by sound: usbl, mbes, single_beam, sonar."""
     return _ACOUSTIC.search(kind.casefold()) is not None
+
+
+def is_charged(sensor: SensorEntry, strict: bool) -> bool:
+    """Whether the way of the sound counts in the ledger: nobody corrects for it, or a spec that is
+    strict about facts is not told whether somebody does."""
+    silent = sensor.corrects is None and strict
+    return is_acoustic(sensor.type) and (sensor.corrects == () or silent)
 
 
 def too_sparse(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:

@@ -19,6 +19,7 @@ from syncline_design.choice.options import Option
 from syncline_design.choice.outcome import Unfinished
 from syncline_design.choice.table import Cut, Design, Judge, Judgement, Problem, RoleTable
 from syncline_design.effects import registry
+from syncline_design.effects.acting import acts
 from syncline_design.machine.input_files import FileContent
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
@@ -257,7 +258,7 @@ class _SpecJudge:
         With known effects errors have a mean of their own, and sums of noise alone say little.
         """
         known, requirement = self.simulations.learned, self._requirement(name)
-        if requirement.kind not in STATED_KINDS or self.case.effects:
+        if requirement.kind not in STATED_KINDS or acts(system):
             return
         wanted = wanted_of(requirement)
         alike = (one for one in known if one.case is self.case and one.requirement == name)

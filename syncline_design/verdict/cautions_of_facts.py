@@ -55,7 +55,7 @@ def _chosen(case: Case, system: System) -> Iterator[Chosen]:
 
 def _silent(case: Case, one: Chosen) -> Iterator[Caution]:
     stage, name, entry = one
-    for fact in not_told(name, entry, surroundings(stage, case.spec)):
+    for fact in not_told(name, entry, surroundings(case, stage)):
         yield Caution("unknown-fact", fact.reason, entry=fact.entry, key=fact.key)
 
 
@@ -92,12 +92,13 @@ def _favoured(chosen: list[Chosen]) -> Iterator[Caution]:
 def _travelling(case: Case, verified: Verified, chosen: list[Chosen]) -> Iterator[Caution]:
     """What vehicle and object move while sound is on its way: (v + d omega) 2 d / c [m].
 
-    It is in no figure of the verdict: the maker takes it out, or somebody has to.
+    The maker takes it out (then no figure has it), or says that he does not (then the ledger has
+    it), or nobody says: then no figure has it, and somebody has to look.
     """
     for stage, name, entry in chosen:
         if entry.modality != "ranging" or not is_acoustic(entry.type):
             continue
-        platform, sound = stage.platform.entry, surroundings(stage, case.spec).sound_speed
+        platform, sound = stage.platform.entry, surroundings(case, stage).sound_speed
         echo = 2.0 * platform.distance / sound
         moved = (platform.v_max + platform.distance * platform.omega_max) * echo
         where = (
@@ -106,7 +107,11 @@ def _travelling(case: Case, verified: Verified, chosen: list[Chosen]) -> Iterato
             f"({format_quantity(echo, Dimension.TIME)})"
         )
         said = "; the entry says that the maker corrects for it, and no figure here has it"
-        if "travel_time" not in entry.corrects:
+        if entry.corrects == ():
+            said = "; the entry says that the maker does not correct for it, and the ledger has it"
+        elif entry.corrects is None and case.spec.strict_facts:
+            said = "; nobody says whether the maker corrects for it, so the ledger has it"
+        elif entry.corrects is None:
             turned = ", ".join(_turned(case, verified, moved))
             said = "; no figure here has it: look up whether the maker corrects for it"
             said += f", without that {turned} would fail" if turned else ""

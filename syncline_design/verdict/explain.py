@@ -17,6 +17,7 @@ from syncline_design.model.pairing import distance_m
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
 from syncline_design.model.timing import Constant, Empirical, Normal, TimingError, Uniform
+from syncline_design.model.underway import Underway, underway
 from syncline_design.spec.requirement import STATED_KINDS
 from syncline_design.verdict.named import ExplainedRequirement, ExplainedStep, NamedDesign
 from syncline_design.verdict.tree import ErrorFigures, RequirementResult, Source
@@ -219,6 +220,7 @@ def _error(worked: Worked) -> Iterator[ExplainedStep]:
     for number, (term, stage_name, value) in enumerate(known_of(worked.system).systematic, 1):
         about = f"{term} on {stage_name}, as the budget charges it"
         parts.append(ExplainedStep(f"effect_{number}", about, _n(value), value, "m"))
+    parts += _underway(worked)
     yield from parts
     pairs = list(_pairs(worked))
     told: set[str] = set()
@@ -229,10 +231,48 @@ def _error(worked: Worked) -> Iterator[ExplainedStep]:
                 yield step
     sync = _sync(worked, pairs)
     yield from sync
+    parts = [part for part in parts if part.unit == "m"]
     names = [part.name for part in parts]
     total = math.fsum([*(part.value for part in parts), sync[-1].value])
-    formula = "sum of the sensor terms, known effects and the sync error"
+    formula = "sum of the sensor terms, known effects, what is under way, and the sync error"
     yield ExplainedStep("total", formula, " + ".join([*names, sync[-1].name]), total, "m")
+
+
+def _underway(worked: Worked) -> Iterator[ExplainedStep]:
+    """Sound under way and interpolation, each from its figures."""
+    for one in underway(worked.system):
+        stage = worked.system.stages[one.stage]
+        platform, d = stage.platform, distance_m(stage)
+        source = worked.source(one.sensor.id)
+        if one.cause == "travel":
+            echo = f"2 * {_n(d)} / {_n(one.sensor.sound_mps or 0.0)}"
+            rate = f"({_n(platform.v_max_mps)} + {_n(d)} * {_n(platform.omega_max_radps)})"
+            about, numbers = "(v_max + d omega_max) 2 d / c", f"{rate} * {echo}"
+            yield ExplainedStep(_name("travel", stage), about, numbers, one.value_m, "m", source)
+            continue
+        apart = ExplainedStep(
+            _name(f"T_{one.role}", stage), *_apart(one), one.interval_s, "s", source
+        )
+        yield apart
+        if one.cause == "path":
+            about = "a_max T^2 / 8"
+            numbers = f"{_n(platform.acceleration_mps2)} * {apart.name}**2 / 8"
+        else:
+            about = "alpha_max T^2 / 8 d"
+            numbers = f"{_n(platform.angular_acceleration_radps2)} * {apart.name}**2 / 8 * {_n(d)}"
+        name = _name(f"between_{one.role}", stage)
+        yield ExplainedStep(name, about, numbers, one.value_m, "m", source)
+
+
+def _apart(one: Underway) -> tuple[str, str]:
+    """(formula, numbers) of the time between two samples."""
+    rate, sound = one.sensor.rate_hz, one.sensor.sound_mps
+    waits = [] if rate is None else [("1 / rate", f"1 / {_n(rate)}")]
+    if sound is not None:
+        waits.append(("2 d / c", f"2 * {_n(distance_m(one.owner))} / {_n(sound)}"))
+    if len(waits) == 1:
+        return waits[0]
+    return "max(1 / rate, 2 d / c)", f"max({', '.join(numbers for _, numbers in waits)})"
 
 
 def _sync(worked: Worked, pairs: Sequence[Pair]) -> list[ExplainedStep]:
@@ -309,7 +349,8 @@ def _ratios_at(worked: Worked) -> Iterator[ExplainedStep]:
         )
         names.append("tau_sys / tau_crit_sys")
         values.append(steps["tau_sys"].value / steps["tau_crit_sys"].value)
-    yield from (one for one in steps.values() if not one.name.startswith("effect_"))
+    beside = ("effect_", "travel_", "between_", "T_")
+    yield from (one for one in steps.values() if not one.name.startswith(beside))
     largest = ", ".join(["0.0", *names])
     yield ExplainedStep(
         "ratio", "largest tau / tau_crit", f"max({largest})", max([0.0, *values]), "1"

@@ -25,7 +25,7 @@ from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import NOTHING_KNOWN, Case, Known, RoleCase, StageCase
 from syncline_design.spec.catalog import SensorEntry
 from syncline_design.spec.selection import RoleSelection, Selection
-from syncline_design.verdict.recheck_facts import impossible, sample_spacing
+from syncline_design.verdict.recheck_facts import impossible, sample_spacing, underway
 from syncline_design.verdict.recheck_sums import BUDGETS, Bought, money, owned_pieces, sum_of
 
 DIGITS = 60
@@ -116,10 +116,10 @@ def _recheck(case: Case, selection: Selection, known: Known) -> Recheck:
     found_at = [
         _figures(case, selection, chosen, dict(zip(names, moves, strict=True))) for moves in ends
     ]
-    worst = max(found_at, key=lambda one: one.sensor_error + one.sync_error)
+    worst = max(found_at, key=lambda one: one.sensor_error + one.sync_error + one.underway)
     ratio = max(one.ratio for one in found_at)
     fixed = sum((Decimal(v) for *_, v in known.systematic), Decimal(0))
-    total = worst.sensor_error + worst.sync_error + fixed
+    total = worst.sensor_error + worst.sync_error + worst.underway + fixed
     bought = list(_bought(case, selection, chosen))
     amounts = {name: sum_of(case, bought, name) for name in BUDGETS}
     found: dict[str, Fraction | None] = {name: amounts[name] for name in BUDGETS}
@@ -149,6 +149,7 @@ class _Figures:
     tau_sys: Decimal
     sync_error: Decimal
     ratio: Decimal
+    underway: Decimal
 
 
 def _figures(
@@ -168,7 +169,10 @@ def _figures(
     ratios = [_ratio(rate * tau_sys, sensor_error)]
     for (stage, role), one in chosen.items():
         ratios.append(_ratio(one.tau * _own_rate(role, moves[stage]), errors[stage, role]))
-    return _Figures(sensor_error, rate, tau_sys, sync_error, max(ratios))
+    away = {name: Fraction(d) for name, (_, _, d) in moves.items()}
+    moved = underway(case, selection, away)
+    moved_m = Decimal(moved.numerator) / Decimal(moved.denominator)
+    return _Figures(sensor_error, rate, tau_sys, sync_error, max(ratios), moved_m)
 
 
 def _decimal(value: float) -> Decimal:

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from fractions import Fraction
 from itertools import pairwise
 from typing import Any
@@ -148,6 +148,53 @@ def _standing(case: Case, stage: Any, name: str, sensor: Any) -> Iterator[str]:
         if asked and sensor.modality == "ranging" and sensor.rate is None:
             yield f"{name} does not tell its rate"
         yield from (f"{name} does not tell its {key}" for key in _silent(stage, sensor))
+        if sensor.rate is None and _interpolated_for(case, stage, sensor.modality) is not None:
+            yield f"{name} does not tell its rate"
+
+
+def underway(case: Case, selection: Selection, distances: Mapping[str, Fraction]) -> Fraction:
+    """What is added for sound under way and for samples that are interpolated [m].
+
+    distances: of the objects [m], by stage.  A sonar that says that it corrects for nothing (of a
+    strict spec: that does not say): its stage moves at v_max + d omega_max for the 2 d / c until
+    the echo is back.  Whoever accelerates is off the straight line between two samples T apart by
+    a T^2 / 8 at most, an attitude times d; a sonar does not ping again before its echo is back; who
+    is located by the stage before has its fixes.
+    """
+    stages = {stage.choice.name: stage for stage in case.stages}
+    total = Fraction(0)
+    for one in selection.roles:
+        stage: Any = stages[one.stage]
+        sensor, platform = stage.role(one.role).sensor(one.sensor), stage.platform.entry
+        d = distances[one.stage]
+        speed, turn = _exact(platform.v_max), _exact(platform.omega_max)
+        echo = Fraction(0)
+        if one.role == "ranging" and SONAR.search(sensor.type.lower()):
+            sound = stage.choice.sound_speed
+            echo = 2 * d / (Fraction(1500) if sound is None else _exact(sound))
+            told = sensor.corrects
+            if case.spec.strict_facts if told is None else "travel_time" not in told:
+                total += echo * speed + echo * turn * d
+        accelerates = _interpolated_for(case, stage, one.role)
+        if accelerates is not None:
+            apart = max(echo, Fraction(0) if sensor.rate is None else 1 / _exact(sensor.rate))
+            bend = _exact(accelerates) * apart * apart / 8
+            total += bend * d if one.role == "attitude" else bend
+    return total
+
+
+def _interpolated_for(case: Case, stage: Any, role: str) -> Any:
+    """The acceleration between the samples of a role; None: nobody says one, or it does not enter.
+
+    Of a ranging sensor that of the vehicle it locates for the next stage.
+    """
+    if role == "position":
+        return stage.platform.entry.acceleration
+    if role == "attitude":
+        ranges = stage.role("ranging") is not None
+        return stage.platform.entry.angular_acceleration if ranges else None
+    after = [one for one in case.stages if one.index == stage.index + 1]
+    return after[0].platform.entry.acceleration if after else None
 
 
 def _sold(case: Case, name: str, entry: Any) -> Iterator[str]:

@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
+from syncline_design.effects.acting import acts
 from syncline_design.model.system import UTC, Sensor, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.figures import worst_case_m
@@ -116,7 +117,7 @@ def reached_m(system: System, wanted: Wanted | Certified, limit_m: float, seed: 
     """
     if isinstance(wanted, Wanted) and surely_keeps(system, wanted, limit_m):
         return 0.0
-    if not system.effects and _noise_fails(_well_timed(system), wanted, limit_m, seed):
+    if not acts(system) and _noise_fails(_well_timed(system), wanted, limit_m, seed):
         return _above(limit_m)
     if isinstance(wanted, Wanted) and surely_exceeds(system, wanted, limit_m, seed):
         return _above(limit_m)
