@@ -37,7 +37,7 @@ from syncline_design.choice.family_tables import (
     useful_clocks_of,
     useful_ways,
 )
-from syncline_design.choice.options import MARGIN, Floats, ResourceName
+from syncline_design.choice.options import MARGIN, Floats, Indices, ResourceName
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.remaining import Ceiling
 from syncline_design.machine.deadline import in_force
@@ -75,41 +75,49 @@ def primary_of(family: Family) -> ResourceName:
 
 
 def family_front(
-    family: Family, resource: ResourceName = "cost", also: Also | None = None
+    family: Family,
+    resource: ResourceName = "cost",
+    also: Also | None = None,
+    *,
+    accuracy: bool = False,
 ) -> tuple[FamilyPoint, ...]:
     """The exact front over designs that meet every requirement but accuracy.
 
     By rising amount and falling error; errors that agree to 12 figures count as equal.  also: what
-    a design has to satisfy besides.
+    a design has to satisfy besides; accuracy: of every mission too.
     """
     if family.is_empty:
         return ()
     problems = tuple(replace(problem, objective=resource) for problem in family.problems)
     tables = tabulate_family(replace(family, problems=problems), resource)
-    tables = replace(tables, accuracy=np.full(len(tables.rates), math.inf))
+    if not accuracy:
+        tables = replace(tables, accuracy=np.full(len(tables.rates), math.inf))
     if also is not None:
-        return tuple(_step_by_step(tables, also))
+        return tuple(_step_by_step(tables, also, accuracy=accuracy))
     found = _merged(tables, guarded=False, least=False)
     points = _front_of(tables, found)
-    if not any(broken_by_family(family, one.sums, accuracy=False) for one in points):
+    known = [one for one in points if not broken_by_family(family, one.sums, accuracy=accuracy)]
+    if len(known) == len(points):
         return tuple(_point(tables, one) for one in points)
-    if tables.guards_sync:
-        known = [one for one in points if not broken_by_family(family, one.sums, accuracy=False)]
+    if tables.guards_sync and not accuracy:
         with suppress(TooLarge):
             found = _merged(tables, guarded=True, least=False, known=known)
             return tuple(_point(tables, one) for one in _front_of(tables, found, known))
-    return tuple(_step_by_step(tables))
+    return tuple(_step_by_step(tables, accuracy=accuracy))
 
 
-def _step_by_step(tables: FamilyTables, also: Also | None = None) -> Iterator[FamilyPoint]:
+def _step_by_step(
+    tables: FamilyTables, also: Also | None = None, *, accuracy: bool = False
+) -> Iterator[FamilyPoint]:
     """The front by rising amount: the least amount below the error of the point before."""
+    limits = tables.accuracy
     while True:
-        one = next(_iter(tables, also, accuracy=False), None)
+        one = next(_iter(tables, also, accuracy=accuracy), None)
         if one is None:
             return
         yield _point(tables, one)
         cap = one.sums.error_m * (1.0 - APART)
-        tables = replace(tables, accuracy=np.full(len(tables.rates), cap))
+        tables = replace(tables, accuracy=np.minimum(limits, cap))
 
 
 def _point(tables: FamilyTables, one: Found) -> FamilyPoint:
@@ -130,6 +138,37 @@ def iter_family(family: Family, also: Also | None = None) -> Iterator[Found]:
     """
     if not family.is_empty:
         yield from _iter(tabulate_family(family, primary_of(family)), also, accuracy=True)
+
+
+def iter_differing(
+    family: Family, groups: Sequence[Indices], also: Also | None = None
+) -> Iterator[Found]:
+    """The best design of each choice of groups of ways (their sensors), best first.
+
+    groups: of each role the group of every way.  Each part without the groups of the design that
+    was found in it is solved anew (Lawler, as below).
+    """
+    if family.is_empty:
+        return
+    counter = itertools.count()
+    heap: list[tuple[FamilyRank, int, FamilyTables, Found]] = []
+
+    def push(part: FamilyTables) -> None:
+        found = next(_iter(part, also, accuracy=True), None)
+        if found is not None:
+            heapq.heappush(heap, (found.rank, next(counter), part, found))
+
+    push(tabulate_family(family, primary_of(family)))
+    while heap:
+        *_, part, found = heapq.heappop(heap)
+        yield found
+        for r, chosen in enumerate(found.design.ways):
+            own = part.roles[r]
+            same = groups[r][own.place] == groups[r][chosen]
+            if not same.all():
+                others = own.take(~same)
+                push(replace(part, roles=(*part.roles[:r], others, *part.roles[r + 1 :])))
+            part = replace(part, roles=(*part.roles[:r], own.take(same), *part.roles[r + 1 :]))
 
 
 def _iter(tables: FamilyTables, also: Also | None, *, accuracy: bool) -> Iterator[Found]:

@@ -52,11 +52,11 @@ def parts_with(problem: Problem, kind: EntryKind, identity: str) -> Iterator[Nar
     options = [np.arange(len(table.options)) for table in problem.roles]
     clocks = [list(range(len(table.clocks))) for table in problem.vehicles]
     for r, table in enumerate(problem.roles):
-        rows = np.flatnonzero(_hold(table.options, kind, identity))
+        rows = np.flatnonzero(hold(table.options, kind, identity))
         if len(rows):
             yield narrowed(problem, [*options[:r], rows, *options[r + 1 :]], clocks)
     for v, vehicle in enumerate(problem.vehicles):
-        mine = [i for i, one in enumerate(vehicle.clocks) if _holds(one, kind, identity)]
+        mine = [i for i, one in enumerate(vehicle.clocks) if holds(one, kind, identity)]
         if mine:
             yield narrowed(problem, options, [*clocks[:v], mine, *clocks[v + 1 :]])
 
@@ -74,12 +74,10 @@ def best_with(problem: Problem, kind: EntryKind, identity: str) -> Design | None
 
 def without(problem: Problem, sensor: str) -> Narrowed:
     """The designs with this sensor in no role."""
-    return kept(
-        problem, lambda _, options: ~_hold(options, "sensor", sensor), lambda _, clock: True
-    )
+    return kept(problem, lambda _, options: ~hold(options, "sensor", sensor), lambda _, clock: True)
 
 
-def _hold(options: Options, kind: EntryKind, identity: str) -> Bools:
+def hold(options: Options, kind: EntryKind, identity: str) -> Bools:
     """Which options are, use or require an entry."""
     if kind == "hardware":
         needing = [any(name == identity for name, _ in needs) for needs in options.needs]
@@ -96,7 +94,7 @@ def _hold(options: Options, kind: EntryKind, identity: str) -> Bools:
     return np.isin(numbers, numbers[named])
 
 
-def _holds(clock: ClockOption, kind: EntryKind, identity: str) -> bool:
+def holds(clock: ClockOption, kind: EntryKind, identity: str) -> bool:
     if kind == "hardware":
         return any(name == identity for name, _ in clock.requires)
     return kind == "clock" and clock.id == identity

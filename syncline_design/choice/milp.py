@@ -11,7 +11,7 @@ optimal is therefore recomputed exactly, and excluded by a cut when it does not 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from importlib import metadata
 from typing import Any
@@ -42,9 +42,9 @@ def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
     """A design with the least objective and, among those, the least error; None if none is."""
     if is_empty(problem):
         return None
-    solver = _Solver(deadline)
+    solver = Solver(deadline)
     solver.demand_canary()
-    model = _Model(problem, solver.cp, deadline)
+    model = Model(problem, solver.cp, deadline)
     first = model.solve(solver, model.objective())
     if first is None or problem.objective == "error":
         return first
@@ -56,7 +56,7 @@ def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
     return second
 
 
-class _Solver:
+class Solver:
     """cvxpy with HiGHS: imported here only, checked for its version, one thread, both gaps 0."""
 
     def __init__(self, deadline: Deadline) -> None:
@@ -127,13 +127,26 @@ class _TimingClass:
     rows: np.ndarray
 
 
+@dataclass(frozen=True, slots=True)
+class Variables:
+    """What is decided: options by role, clocks by vehicle, units by (vehicle, tracked hardware)."""
+
+    x: list[Any]
+    c: list[Any]
+    units: dict[tuple[int, int], Any]
+
+
 @dataclass
-class _Model:
-    """Variables and rows of one problem."""
+class Model:
+    """Variables and rows of one problem.
+
+    shared: of a mission, its variables by those of its family, which holds the budgets as well.
+    """
 
     problem: Problem
     cp: Any
     deadline: Deadline
+    shared: Callable[[Tables], Variables] | None = None
     tables: Tables = field(init=False)
     rows: list[Any] = field(init=False, default_factory=list)
 
@@ -143,13 +156,8 @@ class _Model:
         )
         self.tables = tabulate(self.problem, objective)
         cp = self.cp
-        self.x = [cp.Variable(len(role), boolean=True) for role in self.tables.roles]
-        self.c = [cp.Variable(len(v.clocks), boolean=True) for v in self.problem.vehicles]
-        self.units = {
-            (v, k): cp.Variable(integer=True)
-            for v in range(len(self.problem.vehicles))
-            for k in range(len(self.tables.tracked))
-        }
+        given = self._variables() if self.shared is None else self.shared(self.tables)
+        self.x, self.c, self.units = given.x, given.c, given.units
         self.classes = [list(_classes(self.tables, r)) for r in range(len(self.x))]
         self._demand_size()
         self.demands = list(self._demands())
@@ -157,6 +165,15 @@ class _Model:
         self.z = cp.Variable(len(self.ceilings), boolean=True)
         self.rows += [cp.sum(x) == 1 for x in (*self.x, *self.c, self.z)]
         self._add_rows()
+
+    def _variables(self) -> Variables:
+        cp, vehicles = self.cp, self.problem.vehicles
+        tracked = range(len(self.tables.tracked))
+        return Variables(
+            [cp.Variable(len(role), boolean=True) for role in self.tables.roles],
+            [cp.Variable(len(v.clocks), boolean=True) for v in vehicles],
+            {(v, k): cp.Variable(integer=True) for v in range(len(vehicles)) for k in tracked},
+        )
 
     def _add_rows(self) -> None:
         place = {bound: k for k, bound in enumerate(self.ceilings)}
@@ -168,7 +185,7 @@ class _Model:
         self._add_hardware()
         self._add_accuracy()
         self._add_sync()
-        for k, scale in enumerate(self.tables.keys):
+        for k, scale in enumerate(self.tables.keys if self.shared is None else ()):
             budget = self.problem.limits.budget(scale.name)
             if budget is not None:
                 amount = max(1, scale.whole(budget))
@@ -253,7 +270,7 @@ class _Model:
             total = total + float(scale.whole(each.of(scale.name))) * factor * units
         return total
 
-    def _total(self, scale_m: float) -> Any:
+    def total(self, scale_m: float) -> Any:
         """Total error over `scale_m`, without the fixed terms."""
         error = sum((role.error / scale_m) @ self.x[r] for r, role in enumerate(self.tables.roles))
         if self.problem.sync_model == "syncline":
@@ -347,7 +364,7 @@ class _Model:
     def error(self) -> Any:
         """The total error in small parts of a typical one."""
         least = sum(float(role.error.min()) for role in self.tables.roles)
-        return self._total((least or 1.0) / ERROR_STEPS)
+        return self.total((least or 1.0) / ERROR_STEPS)
 
     def hold_objective(self, design: Design) -> None:
         """No more of the objective than this design needs."""
@@ -356,7 +373,7 @@ class _Model:
         amount = scale.whole(evaluate(self.problem, design).amount(scale.name))
         self.rows.append(self._amount(0, 1.0 / max(1, amount)) <= amount / max(1, amount))
 
-    def solve(self, solver: _Solver, objective: Any) -> Design | None:
+    def solve(self, solver: Solver, objective: Any) -> Design | None:
         """The best design that stands up to exact arithmetic; None when proven that none is."""
         for _ in range(MOST_CUTS):
             program = self.cp.Problem(self.cp.Minimize(objective), self.rows)

@@ -175,11 +175,12 @@ def family_designs_table(designs: Sequence[RankedDesign], currency: str) -> Tabl
             *(amount_cell(getattr(one, name), name, currency) for name in _RESOURCES),
             Cell(numbers.length(one.error_m), one.error_m),
             *_named_cells(one.design),
+            ways_cell(one, currency),
         ]
         for place, one in enumerate(designs, 1)
     ]
     heads = ("Place", "Cost #", "Mass #", "Power #", "Largest error #")
-    return table("Best designs", (*heads, *_named_heads(designs[:1])), rows)
+    return table("Best designs", (*heads, *_named_heads(designs[:1]), "Ways of stamping it"), rows)
 
 
 def family_front_table(

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from fractions import Fraction
+from typing import Literal
 
 from syncline_design.choice.evaluate import chosen_options, evaluate
 from syncline_design.choice.holding import outcome_of, without
@@ -10,7 +12,7 @@ from syncline_design.choice.outcome import FrontPoint, Infeasible
 from syncline_design.choice.table import Design, Problem
 from syncline_design.spec.case import Case
 from syncline_design.verdict.choice_data import full_design
-from syncline_design.verdict.named import Alternative, Bargain
+from syncline_design.verdict.named import Alternative, Bargain, NamedDesign
 
 LEAST_GAIN = 0.05  # share of the error, or of the price, that a bargain takes off at least
 LEAST_RATIO = 2.0  # by how much that share exceeds the share it costs
@@ -75,14 +77,31 @@ def bargains(
     sums = evaluate(problem, chosen)
     if sums.cost is None or sums.error_m <= 0.0:
         return
-    price, error = float(sums.cost), sums.error_m
     limit = problem.limits.accuracy_m
-    allowed = error if limit is None or problem.objective == "error" else limit
-    known = [p for p in points if not p.undecided]
-    paid = price or min((float(p.amount) for p in known if p.amount > 0), default=0.0)
+    allowed = sums.error_m if limit is None or problem.objective == "error" else limit
+    known = [
+        (Fraction(p.amount), p.error_m, full_design(case, problem, p.design))
+        for p in points
+        if not p.undecided
+    ]
+    yield from worth_it(known, sums.cost, sums.error_m, allowed)
+
+
+def worth_it(
+    known: Sequence[tuple[Fraction, float, NamedDesign]],
+    cost: Fraction,
+    error: float,
+    allowed: float,
+) -> Iterator[Bargain]:
+    """Bargains among points of a front (amount, error, design), seen from a design.
+
+    allowed: the error that it may have, where it is the price that is least.
+    """
+    paid = float(cost) or min((float(amount) for amount, *_ in known if amount > 0), default=0.0)
     found: list[tuple[float, Bargain]] = []
-    for point in known:
-        extra, reached = float(point.amount - sums.cost), point.error_m
+    for amount, reached, shown in known:
+        extra = float(amount - cost)
+        kind: Literal["better", "cheaper"]
         if extra > 0.0 and reached < error:
             gain, pain, kind, start = 1.0 - reached / error, extra / paid, "better", error
         elif extra < 0.0 and reached > allowed:
@@ -90,8 +109,7 @@ def bargains(
         else:
             continue
         if gain >= LEAST_GAIN and gain >= LEAST_RATIO * pain:
-            shown = full_design(case, problem, point.design)
-            one = Bargain(kind, extra, float(point.amount), start, reached, shown)  # type: ignore[arg-type]
+            one = Bargain(kind, extra, float(amount), start, reached, shown)
             found.append((gain / pain if pain else float("inf"), one))
     found.sort(key=lambda pair: -pair[0])
     for kind in ("better", "cheaper"):

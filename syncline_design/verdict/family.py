@@ -15,8 +15,11 @@ import numpy as np
 
 from syncline_design.choice.family import Family, FamilyDesign, family_of
 from syncline_design.choice.family_best import FamilyPoint, Found, family_front, iter_family
+from syncline_design.choice.family_parts import Whole, narrowed_family
+from syncline_design.choice.family_roads import choose_by_road, in_hand
 from syncline_design.choice.judged import judgement
-from syncline_design.choice.options import Indices, ResourceName, Resources
+from syncline_design.choice.options import ResourceName, Resources
+from syncline_design.choice.outcome import OutOfTime, Proof, Road
 from syncline_design.choice.prices import resources_of
 from syncline_design.choice.problem import sole_design
 from syncline_design.choice.table import Design, Problem
@@ -29,6 +32,7 @@ from syncline_design.verdict.likely import Likelihood, likelihood_of
 Build = Callable[[Case], Problem]
 End = Literal["low", "high"]
 ALL = ""  # the mission of a spec that has none
+MERGED = Proof("front", optimal=True, rechecked=True)
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +75,7 @@ class Chosen:
     found: Found | None = None
     undecided: bool = False
     passed_open: int = 0  # better designs that are left open
+    proof: Proof = MERGED
 
 
 def is_family(case: Case) -> bool:
@@ -154,19 +159,39 @@ def _differing(missions: Sequence[Mission]) -> dict[int, dict[str, Resources]]:
     return out
 
 
-def choose_family(work: Work) -> Chosen | None:
+def choose_family(work: Work, method: Road = "auto") -> Chosen | None:
     """The first design that meets every requirement of every mission; None: there is none.
 
-    Where simulation leaves open every design that keeps the sums, the first of those.
+    Where simulation leaves open every design that keeps the sums, the first of those.  A deadline
+    that ends the search leaves a design that meets, not proven the best, where one was found.
     """
+    held = in_hand(work.family, passing(work))
+    try:
+        return _proven(work, method)
+    except OutOfTime:
+        if held is None:
+            raise
+        proof = held.proof(work.family, method)
+        designs = work.family.designs(held.found.design)
+        return Chosen(designs, work.family.problems, held.found, proof=proof)
+
+
+def _proven(work: Work, method: Road) -> Chosen | None:
     left_open: list[FamilyDesign] = []
-    problems = work.family.problems
-    one = next(accepted(work, left_open), None)
+    problems, passes = work.family.problems, passing(work, left_open)
+    by_sums = choose_by_road(work.family, method)
+    one, proof = by_sums.found, by_sums.proof
+    if one is None:
+        return None
+    if passes is not None and not passes(one.design):
+        left_open.clear()  # what is left open comes again in its order
+        one = next(accepted(work, left_open), None)
     if one is not None:
         designs = work.family.designs(one.design)
-        return Chosen(designs, problems, one, passed_open=len(left_open))
+        return Chosen(designs, problems, one, passed_open=len(left_open), proof=proof)
     if left_open:
-        return Chosen(work.family.designs(left_open[0]), problems, None, undecided=True)
+        first = work.family.designs(left_open[0])
+        return Chosen(first, problems, None, undecided=True, proof=proof)
     return None
 
 
@@ -182,15 +207,20 @@ def accepted(work: Work, left_open: list[FamilyDesign] | None = None) -> Iterato
         return
     if left_open is not None:
         left_open.clear()  # what the rest leaves open comes in its own order
-    family, places = promising_family(work.family)
-    for one in iter_family(family, lambda design: passes(_whole(design, places))):
-        yield replace(one, design=_whole(one.design, places))
+    family, whole = promising_family(work.family)
+    for one in iter_family(family, lambda design: passes(whole(design))):
+        yield replace(one, design=whole(one.design))
 
 
-def promising_family(family: Family) -> tuple[Family, tuple[Indices, ...]]:
+def on_part(work: Work, part: Family) -> Work:
+    """The same questions asked of a part of the family."""
+    return replace(work, family=part)
+
+
+def promising_family(family: Family) -> tuple[Family, Whole]:
     """The family without ways that simulation rules out by one sensor alone, in any mission.
 
-    With the places of the ways that are left.
+    With how its designs are the whole family's.
     """
     kept = [np.ones(len(role), dtype=bool) for role in family.roles]
     for m, problem in enumerate(family.problems):
@@ -202,15 +232,7 @@ def promising_family(family: Family) -> tuple[Family, tuple[Indices, ...]]:
             _, first = np.unique(sensors, return_index=True)
             gone = [p for p in first.tolist() if problem.judge.hopeless(problem, r, p)]
             kept[r] &= ~np.isin(sensors[role.places[m]], sensors[gone])
-    places = tuple(np.flatnonzero(one) for one in kept)
-    roles = tuple(role.take(own) for role, own in zip(family.roles, places, strict=True))
-    return replace(family, roles=roles), places
-
-
-def _whole(design: FamilyDesign, places: Sequence[Indices]) -> FamilyDesign:
-    """A design of a part as one of the whole family."""
-    ways = (int(own[way]) for own, way in zip(places, design.ways, strict=True))
-    return replace(design, ways=tuple(ways))
+    return narrowed_family(family, [np.flatnonzero(one) for one in kept])
 
 
 def front_of(work: Work, resource: ResourceName = "cost") -> tuple[FamilyPoint, ...]:
@@ -218,9 +240,9 @@ def front_of(work: Work, resource: ResourceName = "cost") -> tuple[FamilyPoint, 
     passes = passing(work)
     if passes is None:
         return family_front(work.family, resource)
-    family, places = promising_family(work.family)
-    points = family_front(family, resource, lambda design: passes(_whole(design, places)))
-    return tuple(replace(one, design=_whole(one.design, places)) for one in points)
+    family, whole = promising_family(work.family)
+    points = family_front(family, resource, lambda design: passes(whole(design)))
+    return tuple(replace(one, design=whole(one.design)) for one in points)
 
 
 def passing(

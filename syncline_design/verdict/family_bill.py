@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from syncline_design.choice.outcome import NoVerdict
 from syncline_design.verdict.bill import total
-from syncline_design.verdict.family_choice import Sums
+from syncline_design.verdict.family_named import Sums
 from syncline_design.verdict.named import BillLine, NamedDesign, SharedHardware
 from syncline_design.verdict.recheck_sums import BUDGETS
 from syncline_design.verdict.tree import Verdict

@@ -4,15 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from fractions import Fraction
-from typing import Any
 
 from syncline_design.choice.family_best import FamilyPoint
 from syncline_design.choice.front import staircase
-from syncline_design.choice.options import ResourceName
-from syncline_design.choice.outcome import FrontPoint, Proof
-from syncline_design.machine.deadline import in_force
-from syncline_design.verdict.choice_data import MOST_EXCLUDED, full_design, ruled_out
+from syncline_design.machine.deadline import Pieces, in_force
 from syncline_design.verdict.family import (
     Build,
     Chosen,
@@ -22,25 +17,16 @@ from syncline_design.verdict.family import (
     intervals,
     work_of,
 )
-from syncline_design.verdict.named import ChoiceResult, Exclusion, FrontDesign, RankedDesign
-from syncline_design.verdict.recheck_sums import BUDGETS, Budget
+from syncline_design.verdict.family_named import (
+    Sums,
+    as_point,
+    front_design,
+    ranked,
+    ruled_out_of,
+)
+from syncline_design.verdict.family_others import alternatives, bargains, next_best
+from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.tree import Robustness
-
-Sums = dict[Budget, Fraction | None]
-
-
-def ranked(work: Work, chosen: Chosen) -> RankedDesign:
-    """A family's design with what it takes and its largest error."""
-    assert chosen.found is not None
-    sums = chosen.found.sums
-    worst = max(range(len(sums.missions)), key=lambda m: sums.missions[m].error_m)
-    scenario = work.scenarios[worst]
-    shown = full_design(scenario.case, work.family.problems[worst], chosen.designs[worst])
-    amounts = [None if (a := sums.amount(name)) is None else float(a) for name in BUDGETS]
-    cost, mass, power = amounts
-    return RankedDesign(
-        cost, mass, power, sums.error_m, replace(shown, cost=cost, mass=mass, power=power)
-    )
 
 
 def robustness_of(work: Work, sums: Sums, build: Callable[[], Build]) -> Robustness | None:
@@ -63,49 +49,29 @@ def robustness_of(work: Work, sums: Sums, build: Callable[[], Build]) -> Robustn
     )
 
 
-def choice_of_family(work: Work) -> ChoiceResult:
-    """The proof, the front of the family, what was ruled out in any mission."""
-    in_force().doing("working out the front")
-    points = front_of(work)
+def choice_of_family(work: Work, chosen: Chosen, pieces: Pieces) -> ChoiceResult:
+    """The proof, the front, what comes next and what else could be bought, what was ruled out."""
+    nothing: tuple[FamilyPoint, ...] = ()
+    points = pieces.made("front", lambda: front_of(work), nothing)
     excluded, count = ruled_out_of(work)
-    return ChoiceResult(
-        proof=Proof("front", optimal=True, rechecked=True),
+    found = ChoiceResult(
+        proof=chosen.proof,
         front=tuple(front_design(work, point) for point in points),
         staircase=staircase([as_point(work, point) for point in points]),
         excluded=excluded,
         excluded_count=count,
     )
-
-
-def ruled_out_of(work: Work) -> tuple[tuple[Exclusion, ...], int]:
-    """What was ruled out in any mission, each row once; in some of them alone: in which."""
-    rows: dict[Exclusion, list[str]] = {}
-    several = bool(work.case.missions)
-    for one in work.scenarios:
-        for row in ruled_out(one.problem)[0]:
-            names = rows.setdefault(row, [])
-            if one.mission not in names:
-                names.append(one.mission)
-    told = [
-        replace(row, reason=f"in mission {', '.join(names)}: {row.reason}")
-        if several and len(names) < len(work.missions)
-        else row
-        for row, names in rows.items()
-    ]
-    return tuple(told[:MOST_EXCLUDED]), len(told)
-
-
-def as_point(work: Work, point: FamilyPoint) -> FrontPoint:
-    """A point with the design of the first mission."""
-    return FrontPoint(point.amount, point.error_m, work.family.designs(point.design)[0])
-
-
-def front_design(work: Work, point: FamilyPoint, resource: ResourceName = "cost") -> FrontDesign:
-    """A point of a front in names; amount and error are the family's."""
-    designs, scenario = work.family.designs(point.design), work.scenarios[0]
-    shown = full_design(scenario.case, scenario.problem, designs[0])
-    amounts: dict[str, Any] = {resource: float(point.amount)}
-    return FrontDesign(**amounts, error_m=point.error_m, design=replace(shown, **amounts))
+    if chosen.found is None:
+        return found
+    return replace(
+        found,
+        next_best=tuple(pieces.listed("next best designs", lambda: next_best(work, chosen))),
+        next_best_every=tuple(
+            pieces.listed("next best of every design", lambda: next_best(work, chosen, every=True))
+        ),
+        alternatives=tuple(pieces.listed("alternatives", lambda: alternatives(work, chosen))),
+        bargains=tuple(pieces.listed("bargains", lambda: bargains(work, chosen, points))),
+    )
 
 
 def cannot_share(work: Work, build: Callable[[], Build]) -> tuple[str, ...]:

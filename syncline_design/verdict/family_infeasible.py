@@ -8,7 +8,8 @@ from dataclasses import replace
 from syncline_design.choice.outcome import Conflict, Explanation
 from syncline_design.spec.case import Mission
 from syncline_design.verdict.family import ALL, Build, Work, choose_family, work_of
-from syncline_design.verdict.family_choice import cannot_share, ruled_out_of
+from syncline_design.verdict.family_choice import cannot_share
+from syncline_design.verdict.family_named import ruled_out_of
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Verdict
 from syncline_design.verdict.verified import frame

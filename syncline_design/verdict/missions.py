@@ -11,7 +11,6 @@ from syncline_design.choice.family import FamilyEvaluation
 from syncline_design.choice.outcome import (
     NoVerdict,
     OutOfTime,
-    Proof,
 )
 from syncline_design.choice.problem import selection_of, with_everything
 from syncline_design.choice.table import Design, Problem
@@ -28,13 +27,9 @@ from syncline_design.verdict.family import (
     work_of,
 )
 from syncline_design.verdict.family_bill import bill_of, bought
-from syncline_design.verdict.family_choice import (
-    Sums,
-    choice_of_family,
-    ranked,
-    robustness_of,
-)
+from syncline_design.verdict.family_choice import choice_of_family, robustness_of
 from syncline_design.verdict.family_infeasible import infeasible_family
+from syncline_design.verdict.family_named import Sums, ranked
 from syncline_design.verdict.likely import CONFIDENCE
 from syncline_design.verdict.named import (
     ChoiceResult,
@@ -58,12 +53,12 @@ from syncline_design.verdict.verify import (
     CheckSettings,
     build_of,
     unfinished_verdict,
+    unproven,
     verdict_on,
     verify,
 )
 
 _WORST_FIRST: dict[str, int] = {"fails": 0, "infeasible": 0, "indeterminate": 1, "meets": 2}
-PROVEN = ChoiceResult(proof=Proof("front", optimal=True, rechecked=True))
 SHARE = "CHOOSE_FOR"  # the implied requirement of a choice for a probability
 _STATUS_ORDER = {"fail": 0, "indeterminate": 1, "pass": 2}
 
@@ -84,12 +79,27 @@ class Judged:
         return word_of(self.rows)
 
 
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A family's verdict; work and chosen: where it came to a choice."""
+
+    verdict: Verdict
+    work: Work | None = None
+    chosen: Chosen | None = None
+
+
 def check_family(case: Case, settings: CheckSettings) -> Verdict:
     """The verdict on a spec of several missions, or one chosen for figures in their intervals."""
+    return judged_family(case, settings).verdict
+
+
+def judged_family(case: Case, settings: CheckSettings) -> Found:
+    """The verdict, with the choice that it is on."""
 
     def build() -> Build:
         return build_of(settings)
 
+    work: Work | None = None
     try:
         in_force().doing("choosing")
         work = work_of(case, build, settings.seed)
@@ -99,13 +109,14 @@ def check_family(case: Case, settings: CheckSettings) -> Verdict:
             if found.verdict != "fails" or not any(
                 names_candidates(one.case) for one in work.missions
             ):
-                return found
-        chosen = choose_family(work) if pinned is None else None
+                return Found(found, work, pinned)
+        chosen = choose_family(work, settings.method) if pinned is None else None
         if chosen is None:
-            return infeasible_family(work, settings, build)
-        return _verdict_on(work, chosen, settings, build, PROVEN)
+            return Found(infeasible_family(work, settings, build), work)
+        choice = ChoiceResult(proof=chosen.proof)
+        return Found(_verdict_on(work, chosen, settings, build, choice), work, chosen)
     except OutOfTime as error:
-        return unfinished_verdict(case, None, settings, str(error))
+        return Found(unfinished_verdict(case, None, settings, str(error)), work)
 
 
 def _verdict_on(
@@ -132,17 +143,23 @@ def _verdict_on(
         ]
     shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], _least_margin(one.rows)))
     nothing: Robustness | None = None
-    robust = pieces.made(
-        "the choice at given figures", lambda: robustness_of(work, sums, build), nothing
-    )
+    robust = nothing
+    if work.case.spec.choose_for != "nominal":
+        robust = pieces.made(
+            "the choice at given figures", lambda: robustness_of(work, sums, build), nothing
+        )
     told = choice
     if choice.proof is not None:
-        told = pieces.made("front", lambda: choice_of_family(work), choice)
+        told = choice_of_family(work, chosen, pieces)
     found = _assembled(work, judged, shown, sums, settings, told)
     found = replace(
         found,
         robustness=robust,
-        warnings=(*(Caution(*one) for one in pieces.cautions), *found.warnings),
+        warnings=(
+            *unproven(chosen.proof),
+            *(Caution(*one) for one in pieces.cautions),
+            *found.warnings,
+        ),
     )
     return found if work.likelihood is None else _with_probability(work, chosen, found)
 

@@ -6,28 +6,29 @@ from collections.abc import Iterator
 from typing import Any
 
 from syncline_design import __version__
-from syncline_design.choice.family_best import Found
 from syncline_design.choice.front import staircase
 from syncline_design.choice.outcome import Proof
 from syncline_design.choice.problem import selection_of
-from syncline_design.machine.deadline import OutOfTime, in_force
+from syncline_design.machine.deadline import Pieces
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import pinned_spec_text
 from syncline_design.spec.edit_missions import pinned_missions_text
 from syncline_design.spec.load import BadInput, Flaw
-from syncline_design.verdict.acceptance import Simulations
-from syncline_design.verdict.family import Build, Chosen, Work, accepted, front_of, work_of
-from syncline_design.verdict.family_choice import as_point, front_design, ranked, ruled_out_of
-from syncline_design.verdict.missions import check_family
+from syncline_design.verdict.family import MERGED, Chosen, Work, front_of
+from syncline_design.verdict.family_named import as_point, front_design, ranked, ruled_out_of
+from syncline_design.verdict.family_others import next_best, with_stampings
+from syncline_design.verdict.missions import judged_family
+from syncline_design.verdict.named import RankedDesign
 from syncline_design.verdict.optimise import (
+    NO_TABLES,
     MadeFrom,
     Optimisation,
     Optimised,
     OptimizeSettings,
     pinned_role,
 )
-from syncline_design.verdict.tree import Caution
+from syncline_design.verdict.tree import Caution, Verdict
 from syncline_design.verdict.verify import CheckSettings
 
 LEFT_OUT = Caution(
@@ -41,46 +42,72 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best payloads of a family, with its front where that is asked for."""
     _refuse_unanswered(case, settings)
 
-    def build() -> Build:
-        return Simulations(settings.seed).problem_of
-
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
         settings.seed, settings.method, monte_carlo=simulated or settings.report
     )
-    verdict = check_family(case, checking)
-    work = work_of(case, build, settings.seed)
+    judged = judged_family(case, checking)
+    verdict, work = judged.verdict, judged.work
+    if work is None:
+        return _unfinished(case, settings, verdict)
     more: dict[str, Any] = {"infeasibility": verdict.infeasibility}
-    found: list[Found] = []
-    cut_short: list[str] = []
-    if verdict.design is not None and verdict.verdict in ("meets", "indeterminate"):
-        try:
-            in_force().doing("choosing")
-            found = list(_differing(work, settings))
-        except OutOfTime:
-            cut_short.append("next best designs")
-        more = _front(work, settings) if settings.pareto else {}
-    designs = [Chosen(work.family.designs(o.design), work.family.problems, o) for o in found]
+    designs: list[RankedDesign] = []
+    pieces = Pieces()
+    if judged.chosen is not None and judged.chosen.found is not None:
+        designs = _designs(work, judged.chosen, settings, pieces)
+        more = pieces.made("front", lambda: _front(work, settings), {}) if settings.pareto else {}
+        choice = verdict.choice
+        if choice is not None:
+            more |= {"alternatives": choice.alternatives, "bargains": choice.bargains}
     excluded, count = ruled_out_of(work)
+    proof = judged.chosen.proof if judged.chosen is not None else MERGED
     result = Optimisation(
         verdict=verdict.verdict,
         spec=SpecName(case.spec.name, str(case.path)),
-        proof=Proof("front", optimal=verdict.verdict != "indeterminate", rechecked=True),
+        proof=proof,
         combinations=str(work.family.combinations),
-        designs=tuple(ranked(work, one) for one in designs),
-        warnings=(*verdict.warnings, LEFT_OUT),
+        designs=tuple(designs),
+        warnings=(*_told(verdict, settings), LEFT_OUT),
         excluded=excluded,
         excluded_count=count,
-        cut_short=tuple(cut_short),
-        provenance=MadeFrom(
-            __version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed
-        ),
+        cut_short=tuple(pieces.cut_short),
+        provenance=_provenance(case, settings),
         **more,
     )
-    text = _pinned_text(work, designs[0]) if designs else None
+    text = None
+    if designs and judged.chosen is not None:
+        text = _pinned_text(work, judged.chosen)
     first = work.scenarios[0].problem
     shown = verdict if settings.report else None
     return Optimised(case, first, settings, (), (), result, shown, text)
+
+
+def _told(verdict: Verdict, settings: OptimizeSettings) -> Iterator[Caution]:
+    """What `check` warns of, but that nothing was simulated, where a page does not ask for it."""
+    for one in verdict.warnings:
+        if settings.report or one.code != "no-monte-carlo":
+            yield one
+
+
+def _provenance(case: Case, settings: OptimizeSettings) -> MadeFrom:
+    return MadeFrom(__version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed)
+
+
+def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Optimised:
+    """What there is to say when the time limit came before any table."""
+    result = Optimisation(
+        verdict="indeterminate",
+        spec=SpecName(case.spec.name, str(case.path)),
+        proof=Proof(settings.method, False, False),
+        combinations=None,
+        excluded=(),
+        excluded_count=0,
+        cut_short=("choosing",),
+        provenance=_provenance(case, settings),
+        message=f"No verdict: {verdict.warnings[0].message}.",
+    )
+    shown = verdict if settings.report else None
+    return Optimised(case, NO_TABLES, settings, (), (), result, shown)
 
 
 def _refuse_unanswered(case: Case, settings: OptimizeSettings) -> None:
@@ -94,25 +121,19 @@ def _refuse_unanswered(case: Case, settings: OptimizeSettings) -> None:
         raise BadInput((Flaw(str(case.path), *place, key, message, hint=hint),))
 
 
-def _differing(work: Work, settings: OptimizeSettings) -> Iterator[Found]:
-    """The best designs, each with other sensors than those before; `every`: all of them."""
-    seen: set[tuple[str, ...]] = set()
-    count = 0
-    for one in accepted(work):
-        names = _sensors(work, one)
-        if settings.every or names not in seen:
-            seen.add(names)
-            yield one
-            count += 1
-        if count == settings.count:
-            return
-
-
-def _sensors(work: Work, one: Found) -> tuple[str, ...]:
-    designs = zip(work.family.problems, work.family.designs(one.design), strict=True)
-    return tuple(
-        role.sensor for problem, design in designs for role in selection_of(problem, design).roles
+def _designs(
+    work: Work, chosen: Chosen, settings: OptimizeSettings, pieces: Pieces
+) -> list[RankedDesign]:
+    """The chosen payload, then the next best."""
+    first = ranked(work, chosen) if settings.every else with_stampings(work, chosen)
+    more = settings.count - 1
+    if not more:
+        return [first]
+    following = pieces.listed(
+        "next best designs",
+        lambda: next_best(work, chosen, every=settings.every, count=more),
     )
+    return [first, *following]
 
 
 def _front(work: Work, settings: OptimizeSettings) -> dict[str, Any]:

@@ -220,7 +220,7 @@ def open_verdict(
     missing = choice.front_left_out
     warnings = (
         *_passed_over(picked),
-        *_unproven(picked),
+        *unproven(picked.choice.proof),
         *(Caution(code, message) for code, message in pieces.cautions),
         *found.warnings,
         *([Caution("unpriced", left_out_text(missing, "cost"))] if missing else ()),
@@ -229,9 +229,8 @@ def open_verdict(
     return replace(found, verdict="indeterminate" if is_open else found.verdict, warnings=warnings)
 
 
-def _unproven(picked: Picked) -> Iterator[Caution]:
+def unproven(proof: Proof) -> Iterator[Caution]:
     """What the time limit left open about a design that meets."""
-    proof = picked.choice.proof
     if not proof.optimal:
         gap = "" if proof.gap is None else f" (by {100 * proof.gap:.3g} % at most)"
         message = f"the time limit ended the search: a better design than this may exist{gap}"

@@ -1,0 +1,90 @@
+"""Parts of a family: with some of the ways and clocks alone, and the way back to the whole one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from syncline_design.choice.family import Family, FamilyDesign
+from syncline_design.choice.holding import EntryKind, hold, holds
+from syncline_design.choice.options import Bools, Indices
+
+Whole = Callable[[FamilyDesign], FamilyDesign]
+
+
+def narrowed_family(
+    family: Family, places: Sequence[Indices], clocks: Sequence[Indices] | None = None
+) -> tuple[Family, Whole]:
+    """The family with these ways of each role alone, and how its designs are the whole one's.
+
+    clocks: of each vehicle, where not all stay.
+    """
+    own = [np.arange(one.shape[1]) for one in family.clocks] if clocks is None else clocks
+    roles = tuple(role.take(some) for role, some in zip(family.roles, places, strict=True))
+    left = tuple(table[:, some] for table, some in zip(family.clocks, own, strict=True))
+
+    def whole(design: FamilyDesign) -> FamilyDesign:
+        ways = (int(some[way]) for some, way in zip(places, design.ways, strict=True))
+        chosen = (int(some[one]) for some, one in zip(own, design.clocks, strict=True))
+        return FamilyDesign(tuple(ways), tuple(chosen))
+
+    return replace(family, roles=roles, clocks=left), whole
+
+
+def all_ways(family: Family) -> list[Indices]:
+    """The places of all ways of every role."""
+    return [np.arange(len(role)) for role in family.roles]
+
+
+def ways_with(family: Family, r: int, kind: EntryKind, identity: str) -> Bools:
+    """Which ways of a role hold an entry in some mission."""
+    found = np.zeros(len(family.roles[r]), dtype=bool)
+    for problem, places in zip(family.problems, family.roles[r].places, strict=True):
+        found |= hold(problem.roles[r].options, kind, identity)[places]
+    return found
+
+
+def parts_holding(family: Family, kind: EntryKind, identity: str) -> Iterator[Family]:
+    """For each role and vehicle that may hold an entry: the designs in which it does."""
+    for r in range(len(family.roles)):
+        rows = np.flatnonzero(ways_with(family, r, kind, identity))
+        if len(rows):
+            ways = all_ways(family)
+            yield narrowed_family(family, [*ways[:r], rows, *ways[r + 1 :]])[0]
+    vehicles = family.problems[0].vehicles
+    clocks = [np.arange(own.shape[1]) for own in family.clocks]
+    for v, (vehicle, own) in enumerate(zip(vehicles, family.clocks, strict=True)):
+        mine = [
+            p for p, i in enumerate(own[0].tolist()) if holds(vehicle.clocks[i], kind, identity)
+        ]
+        if mine:
+            some = [*clocks[:v], np.array(mine, dtype=np.intp), *clocks[v + 1 :]]
+            yield narrowed_family(family, all_ways(family), some)[0]
+
+
+def without_sensor(family: Family, sensor: str) -> Family:
+    """The designs with this sensor in no role of any mission."""
+    rows = [
+        np.flatnonzero(~ways_with(family, r, "sensor", sensor)) for r in range(len(family.roles))
+    ]
+    return narrowed_family(family, rows)[0]
+
+
+def sensor_groups(family: Family, r: int) -> Indices:
+    """Of each way of a role a number that ways of the same sensors, mission by mission, share."""
+    columns = []
+    for problem, places in zip(family.problems, family.roles[r].places, strict=True):
+        names = [option.sensor for option in problem.roles[r].options]
+        columns.append(np.unique(names, return_inverse=True)[1].ravel()[places])
+    return np.asarray(np.unique(np.array(columns).T, axis=0, return_inverse=True)[1].ravel())
+
+
+def same_sensors(family: Family, design: FamilyDesign) -> Family:
+    """The designs of the same sensors, however they are stamped and whatever clocks there are."""
+    rows = []
+    for r, way in enumerate(design.ways):
+        groups = sensor_groups(family, r)
+        rows.append(np.flatnonzero(groups == groups[way]))
+    return narrowed_family(family, rows)[0]
