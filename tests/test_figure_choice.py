@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import json
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +32,8 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.figure_front import drawn_requirement, figure_front
-from syncline_design.verdict.stated import Certified, value_m, wanted_of
+from syncline_design.verdict.stated import Certified, stated, value_m, wanted_of
+from syncline_design.verdict.worst_cuts import taught
 from test_statistical_figures import chain
 
 
@@ -202,3 +204,73 @@ def test_what_a_front_is_drawn_over_is_said(tmp_path: Path) -> None:
     assert [step["tightest_m"] for step in found["staircase"]] == figures
     with pytest.raises(ValueError, match="against"):
         api.optimize(tmp_path / "s.yaml", pareto=True, against="tallness")  # type: ignore[arg-type]
+
+
+LATE = {
+    "effects": [
+        {"effect": "latency", "sensor": "attitude", "parameters": {"latency_s": "3 ms"}},
+        {"effect": "range_bias", "sensor": "ranging", "parameters": {"bias_m": "5 cm"}},
+        {"effect": "heading_bias", "sensor": "attitude", "parameters": {"bias_rad": "0.2 deg"}},
+    ]
+}
+
+
+def with_keys(raw: Raw, folder: Path, **keys: object) -> Case:
+    """The problem with delays on one side and more keys in its spec."""
+    document = json.loads(written(raw, folder))
+    own = json.loads((folder / "own.yaml").read_text())
+    for number, method in enumerate(own["timestamping"].values()):
+        method["error"] = {"distribution": "uniform", "low": f"{-20 * number} ms", "high": "1 ms"}
+    (folder / "own.yaml").write_text(json.dumps(own))
+    return load_text(json.dumps({**document, **keys}), folder / "spec.yaml")
+
+
+@pytest.mark.parametrize("keys", [{}, LATE])
+def test_what_a_worst_case_teaches_is_below_every_worst_case(
+    keys: dict[str, object], tmp_path: Path
+) -> None:
+    """The sum that rules designs out against the certificate itself, design by design."""
+    wanted = Certified()
+    for seed in (3, 4):
+        raw = drawn(seed, ("worst_case",))
+        raw["d"] = 60.0 if seed == 3 else 5.0
+        case = with_keys(raw, tmp_path, **keys)
+        problem = Simulations().problem_of(case)
+        every = [design for design, _ in all_designs(problem)]
+        values = [value_m(system_of(case, problem, one), wanted, 1.0, 0) for one in every]
+        for teacher in (0, len(every) // 2, len(every) - 1):
+            system = system_of(case, problem, every[teacher])
+            at = stated(system, wanted, 1.0, 0)
+            rule = taught(case, problem, system, "R0", (wanted, at))
+            cut = rule.cut(problem, 1.0)
+            sums = [sum(float(w[i]) for w, i in zip(cut.weights, one.options, strict=True))
+                    for one in every]  # fmt: skip
+            assert np.all(np.array(sums) <= np.array(values) * (1.0 + 1e-9)), seed
+            if not keys:  # what effects and the drift of one-sided delays add is left out
+                assert sums[teacher] > 0.75 * values[teacher]
+            limit = 0.5 * (min(sums) + max(sums))
+            asked = [rule.rules_out(problem, one, limit) for one in every]
+            assert asked == [total > limit * (1.0 + 1e-9) for total in sums]
+
+
+@pytest.mark.parametrize(
+    ("kind", "keys"), [("worst_case", {}), ("worst_case", LATE), ("rmse", LATE)]
+)
+def test_choices_that_learn_agree_with_judging_all(
+    kind: str, keys: dict[str, object], tmp_path: Path
+) -> None:
+    """Cheapest of all designs, each by its own figure, against the search that leaves some out."""
+    for seed in (5, 6, 7, 8) if kind == "worst_case" else (5,):
+        raw = drawn(seed, (kind,))
+        if kind != "worst_case":
+            raw["sensors"] = few(seed, kind, (2, 2, 2))["sensors"]
+        raw["requirements"] = [(kind, 0.8 if kind == "worst_case" else 0.3)]
+        case = with_keys(raw, tmp_path, **keys)
+        problem = Simulations().problem_of(case)
+        wanted = wanted_of(case.spec.requirements[0])
+        limit, best = raw["requirements"][0][1], None
+        for design, sums in sorted(all_designs(problem), key=lambda pair: pair[1].cost or 0):
+            if value_m(system_of(case, problem, design), wanted, limit, 0) <= limit:
+                best = float(sums.cost or 0)
+                break
+        assert cost_of(problem, choose(problem)) == best, seed

@@ -147,6 +147,16 @@ def underway_m(
     )
 
 
+def may_be_underway(case: Case) -> bool:
+    """Whether some sensor that a spec may use adds by sound under way or by interpolation."""
+    return any(
+        underway_m(one.entry, role.role, motion_of(stage), case, stage) > 0
+        for stage in case.stages
+        for role in stage.roles
+        for one in role.sensors
+    )
+
+
 def own_rate(role: RoleName, motion: Motion) -> Fraction | None:
     """What a sensor's own tau_crit is taken against [m/s]; None where motion does not matter."""
     rate = motion.speed if role == "position" else motion.rate

@@ -13,13 +13,13 @@ from datetime import date
 from fractions import Fraction
 from typing import Any, NoReturn
 
+from syncline_design.choice.candidates import may_be_underway
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import problem_of
 from syncline_design.choice.options import Option
 from syncline_design.choice.outcome import Unfinished
 from syncline_design.choice.table import Cut, Design, Judge, Judgement, Problem, RoleTable
 from syncline_design.effects import registry
-from syncline_design.effects.acting import acts
 from syncline_design.machine.input_files import FileContent
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
@@ -39,7 +39,8 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS, Requirement
 from syncline_design.verdict.cuts import MOST_LEARNED, Learned, learned
-from syncline_design.verdict.stated import Certified, reached_m, value_m, wanted_of
+from syncline_design.verdict.stated import Certified, reached_m, stated, value_m, wanted_of
+from syncline_design.verdict.worst_cuts import Taught, taught
 
 HOPELESS = 1.01  # a sensor is ruled out when its noise alone fails a limit by this factor
 WHAT_IF_CAP = 400_000  # samples after which a what-if is left open, and so not offered
@@ -91,7 +92,7 @@ class Simulations:
     systems: set[System] = field(default_factory=set)
     refusals: int = 0  # of systems beyond the most
     asked: Case | None = None  # the spec itself; every other one is a what-if
-    learned: list[Learned] = field(default_factory=list)
+    learned: list[Learned | Taught] = field(default_factory=list)
     figures: dict[tuple[System, Wanted | Certified], float] = field(default_factory=dict)
 
     def decide(
@@ -255,16 +256,20 @@ class _SpecJudge:
     def _learn(self, system: System, name: str) -> None:
         """Remember where a system failed a figure, for all that come after it.
 
-        With known effects errors have a mean of their own, and sums of noise alone say little.
+        Known effects that displace by their own only make errors larger (T. W. Anderson); those
+        that change the noise, or turn some designs only, leave the sums of noise without a say.
         """
         known, requirement = self.simulations.learned, self._requirement(name)
-        if requirement.kind not in STATED_KINDS or acts(system):
+        if requirement.kind not in STATED_KINDS:
             return
-        wanted = wanted_of(requirement)
+        wanted, bare, seed = wanted_of(requirement), _nameless(system), self.simulations.seed
         alike = (one for one in known if one.case is self.case and one.requirement == name)
-        if isinstance(wanted, Wanted) and sum(1 for _ in alike) < MOST_LEARNED:
-            bare = _nameless(system)
-            seed = self.simulations.seed
+        if sum(1 for _ in alike) >= MOST_LEARNED:
+            return
+        if isinstance(wanted, Certified):
+            at = stated(bare, wanted, float(requirement.limit), seed)
+            known.append(taught(self.case, self.asked, bare, name, (wanted, at)))
+        elif not self._noise_is_changed() and not may_be_underway(self.case):
             known.append(learned(self.case, self.asked, bare, name, wanted, seed))
 
     def _requirement(self, name: str) -> Requirement:
