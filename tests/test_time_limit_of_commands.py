@@ -7,6 +7,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,6 +19,7 @@ from syncline_design.machine.deadline import (
     OVERDUE_S,
     Deadline,
     OutOfTime,
+    heard_again,
     in_force,
     overdue,
     within_s,
@@ -72,8 +74,7 @@ def test_a_long_simulation_ends_with_its_processes(workers: str) -> None:
 def test_reading_counts_too(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file that takes long to read: no step of that looks at the clock by itself."""
     monkeypatch.setattr("syncline_design.machine.deadline.OVERDUE_S", 0.01)  # quick machines too
-    # an alarm inside a weak reference's callback is lost: the next one counts
-    monkeypatch.setattr("syncline_design.machine.deadline.AGAIN_S", 0.05)
+    monkeypatch.setattr("syncline_design.machine.deadline.AGAIN_S", 60.0)  # once has to do
     large = tmp_path / "large.yaml"
     entries = "".join(f"  k{i}: {{a: {i}, b: [1, 2, 3]}}\n" for i in range(44_000))
     large.write_text(f"{SPEC.read_text('utf-8')}more:\n{entries}", "utf-8")
@@ -177,6 +178,51 @@ def test_the_alarm_ends_what_does_not_ask() -> None:
         time.sleep(30.0)
     assert OVERDUE_S <= time.monotonic() - started < 15.0
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
+
+
+class _Dying:
+    """Something whose finalizer is struck by an interrupt."""
+
+    def __init__(self, struck: Callable[[], object]) -> None:
+        self.struck = struck
+
+    def __del__(self) -> None:
+        self.struck()
+
+
+def _sleeps_on(struck: Callable[[], object]) -> None:
+    """Python prints what a finalizer raises and goes on: 20 s would be slept."""
+    one = _Dying(struck)
+    del one
+    time.sleep(20.0)
+
+
+def test_an_alarm_that_strikes_in_a_finalizer_comes_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("syncline_design.machine.deadline.AGAIN_S", 60.0)
+    started = time.monotonic()
+    with heard_again(), overdue(Deadline(0.0)), pytest.raises(OutOfTime):
+        _sleeps_on(lambda: time.sleep(5.0))
+    assert OVERDUE_S <= time.monotonic() - started < 15.0
+
+
+def test_an_interrupt_that_strikes_in_a_finalizer_comes_again() -> None:
+    started = time.monotonic()
+    with heard_again(), pytest.raises(KeyboardInterrupt):
+        _sleeps_on(lambda: signal.raise_signal(signal.SIGINT))
+    assert time.monotonic() - started < 15.0
+
+
+def test_what_else_a_finalizer_raises_goes_where_it_went(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: list[str] = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda lost: seen.append(str(lost.exc_value)))
+
+    def fails() -> None:
+        raise ValueError("of its own")
+
+    with heard_again():
+        one = _Dying(fails)
+        del one
+    assert seen == ["of its own"]
 
 
 def test_no_alarm_without_a_limit_or_outside_the_main_thread() -> None:

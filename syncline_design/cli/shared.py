@@ -87,14 +87,14 @@ def guarded(command: Callable[P, int]) -> Callable[P, None]:
 
     @functools.wraps(command)
     def run(*args: P.args, **kwargs: P.kwargs) -> None:
-        from syncline_design.machine.deadline import a_command
+        from syncline_design.machine.deadline import a_command, heard_again
         from syncline_design.machine.input_files import ReplacedInputError, noting
         from syncline_design.machine.result_files import OutputError
         from syncline_design.spec.load import BadInput
 
         _COMMAND.set(command.__name__)
         try:
-            with noting(), a_command():
+            with heard_again(), noting(), a_command():
                 code = command(*args, **kwargs)
         except typer.Exit:
             raise

@@ -7,8 +7,10 @@ not come, a library at work) are ended by `overdue` a second later, as Ctrl-C wo
 
 from __future__ import annotations
 
+import _thread
 import math
 import signal
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -158,6 +160,60 @@ def overdue(deadline: Deadline) -> Iterator[None]:
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+
+
+ONCE_MORE_S = 0.01  # after which a lost interrupt comes again
+
+
+@contextmanager
+def heard_again() -> Iterator[None]:
+    """Send an interrupt again that strikes in a callback, from which no exception gets out.
+
+    What Python runs while it collects garbage (finalizers, callbacks of weak references, closing
+    generators) prints its exceptions and goes on: Ctrl-C and the alarm would be lost there, and a
+    collection takes long enough to be struck.
+    """
+    before = sys.unraisablehook
+
+    def again(lost: sys.UnraisableHookArgs) -> None:
+        kind = lost.exc_type
+        if kind is not None and issubclass(kind, KeyboardInterrupt):
+            _interrupt_later()
+        elif kind is not None and issubclass(kind, OutOfTime):
+            _alarm_later()
+        else:
+            before(lost)
+
+    sys.unraisablehook = again
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
+def _alarm_later() -> None:
+    """The alarm of `overdue` once more; nothing where none is set."""
+    main = threading.current_thread() is threading.main_thread()
+    if main and hasattr(signal, "setitimer") and any(signal.getitimer(signal.ITIMER_REAL)):
+        signal.setitimer(signal.ITIMER_REAL, ONCE_MORE_S, AGAIN_S)
+
+
+def _interrupt_later() -> None:
+    """Ctrl-C once more, by a real signal: it has to wake what sleeps."""
+
+    in_the_hook = threading.Lock()
+    in_the_hook.acquire()
+
+    def strike() -> None:
+        in_the_hook.acquire()
+        time.sleep(ONCE_MORE_S)
+        if hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        else:
+            _thread.interrupt_main()
+
+    _thread.start_new_thread(strike, ())
+    in_the_hook.release()
 
 
 T = TypeVar("T")

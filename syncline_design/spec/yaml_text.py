@@ -186,12 +186,13 @@ def parse(text: str, file: str = "<text>") -> ParsedFile:
 
 
 def _events(text: str) -> Iterator[Any]:
+    """The events of a document.
+
+    Nothing is tidied up at the end: it would run wherever a generator that was left is collected.
+    """
     parser: Any = _CParser(text) if _CParser is not None else _PythonParser(text)
-    try:
-        while parser.check_event():
-            yield parser.get_event()
-    finally:
-        parser.dispose()
+    while parser.check_event():
+        yield parser.get_event()
 
 
 class _PythonParser(yaml.reader.Reader, yaml.scanner.Scanner, yaml.parser.Parser):
