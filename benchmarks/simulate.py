@@ -27,7 +27,8 @@ import numpy as np
 from syncline_design.model.system import Platform, Sensor, Stage, System
 from syncline_design.model.timing import TimingError, Uniform
 from syncline_design.simulation import SimulationSettings, cross_check
-from syncline_design.simulation.sampling import JOB, error_distribution, keep_freed_memory
+from syncline_design.simulation.run import error_distribution
+from syncline_design.simulation.sampling import JOB, keep_freed_memory
 from syncline_design.simulation.worker import Share, count_share, tally
 
 DEG = math.pi / 180.0

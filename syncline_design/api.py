@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from syncline_design.simulation import Simulation
     from syncline_design.studies import Progress, StudyResult
     from syncline_design.verdict.figure_front import FigureKind
-    from syncline_design.verdict.optimise import Optimisation
+    from syncline_design.verdict.optimisation import Optimisation
     from syncline_design.verdict.tree import Verdict
 
 __all__ = [
@@ -113,7 +113,8 @@ def check(
     from syncline_design.choice.outcome import METHODS
     from syncline_design.comparison.verdict_file import read_verdicts
     from syncline_design.verdict.baseline import against
-    from syncline_design.verdict.verify import CheckSettings, check_loaded
+    from syncline_design.verdict.settings import CheckSettings
+    from syncline_design.verdict.verify import check_loaded
 
     arguments.word("method", method, METHODS)
     arguments.day("today", today)
@@ -138,14 +139,16 @@ def optimize(
     """
     from syncline_design.choice.options import RESOURCES
     from syncline_design.choice.outcome import METHODS
-    from syncline_design.verdict import optimise
+    from syncline_design.verdict.figure_front import FIGURES
+    from syncline_design.verdict.optimisation import OptimizeSettings
+    from syncline_design.verdict.optimise import optimize as optimised
 
     best = arguments.whole("best", best, 1)
     arguments.word("resource", resource, RESOURCES)
     arguments.word("method", method, METHODS)
     if against is not None:
-        arguments.word("against", against, optimise.FIGURES)
-    settings = optimise.OptimizeSettings(
+        arguments.word("against", against, FIGURES)
+    settings = OptimizeSettings(
         best,
         pareto,
         resource,
@@ -156,7 +159,7 @@ def optimize(
         why_not=_entries(why_not),
     )
     with _limited(time_limit_s):
-        return optimise.optimize(_case(spec), settings).result
+        return optimised(_case(spec), settings).result
 
 
 def simulate(
@@ -190,7 +193,7 @@ def diagnose(
     from syncline_design.campaign.joint import diagnose_joint
     from syncline_design.comparison.meaning import meaning, with_design
     from syncline_design.planning.next_drive import next_drive
-    from syncline_design.verdict.optimise import as_measured
+    from syncline_design.verdict.pinned import as_measured
 
     seed = _seed(seed)
     rate = arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
@@ -230,7 +233,7 @@ def plan(
     diagnosis: what one could not tell apart.  flown: a log held against what is asked.
     """
     from syncline_design.planning import run, setup, wanted
-    from syncline_design.verdict.optimise import as_measured
+    from syncline_design.verdict.pinned import as_measured
 
     seed = _seed(seed)
     least = arguments.amount("minutes", minutes, 0.0)
@@ -270,7 +273,7 @@ def diff(
 ) -> Difference:
     """What changed between two specs, or two verdicts written as JSON."""
     from syncline_design.comparison import diff as comparison
-    from syncline_design.verdict.verify import CheckSettings
+    from syncline_design.verdict.settings import CheckSettings
 
     files = arguments.path("old", old), arguments.path("new", new)
     with _limited(time_limit_s):
@@ -336,7 +339,7 @@ def watch(
     """
     from syncline_design.campaign import watching
     from syncline_design.diagnosis import DiagnosisSettings
-    from syncline_design.verdict.optimise import as_measured
+    from syncline_design.verdict.pinned import as_measured
 
     rate = arguments.amount("false_alarm_rate", false_alarm_rate, *arguments.FALSE_ALARM_RATES)
     seed, kept = _seed(seed), arguments.path("store", store)

@@ -23,7 +23,7 @@ from syncline_design.spec.catalog import SECTIONS, Catalog
 from syncline_design.spec.load import load
 from syncline_design.spec.spec import EffectChoice
 from syncline_design.spec.yaml_text import ParsedFile
-from syncline_design.verdict.optimise import as_measured
+from syncline_design.verdict.pinned import as_measured
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 ROOT = Path(__file__).parents[1]

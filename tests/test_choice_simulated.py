@@ -23,7 +23,7 @@ from syncline_design.report.optimisations import render_optimize
 from syncline_design.report.render_console import console
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
-from syncline_design.verdict import acceptance, verify
+from syncline_design.verdict import acceptance, settings
 from syncline_design.verdict import optimise as optimisation
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.optimise import (
@@ -319,7 +319,7 @@ def test_lists_that_simulation_cuts_short_say_so(
     assert "gave up" not in console(on_choice(whole))
     assert whole.result.gave_up == ()
     monkeypatch.setattr(optimisation, "Simulations", few)
-    monkeypatch.setattr(verify, "Simulations", few)
+    monkeypatch.setattr(settings, "Simulations", few)
     found = optimize(loaded, OptimizeSettings(count=9, pareto=True, report=True))
     data = found.result.to_json()
     assert len(data["designs"]) <= 3

@@ -110,7 +110,7 @@ def _worst_ratios(platform: str) -> list[float]:
     from syncline_design.choice.chosen_system import system_of
     from syncline_design.simulation import comparison
     from syncline_design.spec.load import load_text
-    from syncline_design.verdict.verify import picked_design
+    from syncline_design.verdict.pinned import picked_design
 
     how = "primitive: pps, timestamping: hardware"
     text = (
@@ -149,7 +149,7 @@ def test_how_often_errors_exceed_the_syncline_is_as_the_pages_say() -> None:
     from syncline_design.model.budget import budget
     from syncline_design.simulation import SimulationSettings, sample_errors
     from syncline_design.spec.load import load
-    from syncline_design.verdict.verify import picked_design
+    from syncline_design.verdict.pinned import picked_design
 
     assert f"{100 * chi2.sf(3.0, 3):.0f} %" == "39 %"
     loaded = load(ROOT / "specs" / "uav_corridor.yaml")

@@ -14,10 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from random_problems import random_problem, with_random_limits
-from syncline_design.choice import front as front_module
+from syncline_design.choice import merged_front as front_module
 from syncline_design.choice.enumerate import all_designs, best_by_enumeration
 from syncline_design.choice.evaluate import broken, error_key, evaluate, rank
-from syncline_design.choice.front import front, merged_front
+from syncline_design.choice.front import front
+from syncline_design.choice.merged_front import merged_front
 from syncline_design.choice.options import Option, Resources
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.pareto import Columns, undominated

@@ -23,6 +23,7 @@ from syncline_design.simulation import (
     SimulationSettings,
     cross_check,
     decide,
+    run,
     sample_errors,
     sampling,
     simulate,
@@ -237,9 +238,9 @@ def test_jobs_are_independent_streams() -> None:
 def test_many_samples_are_binned_and_agree_with_kept_ones(monkeypatch) -> None:
     """Above KEPT_VALUES only counts are kept; order statistics agree to a bin, 0.025 %."""
     settings = SimulationSettings(samples=100_000, seed=9, limit_m=0.04)
-    kept = sampling.error_distribution(fixed_wing(), settings)
-    monkeypatch.setattr(sampling, "KEPT_VALUES", 1000)
-    binned = sampling.error_distribution(fixed_wing(), settings)
+    kept = run.error_distribution(fixed_wing(), settings)
+    monkeypatch.setattr(run, "KEPT_VALUES", 1000)
+    binned = run.error_distribution(fixed_wing(), settings)
     assert isinstance(kept, Values)
     assert isinstance(binned, Binned)
     assert binned.count == kept.count == 100_000

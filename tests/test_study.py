@@ -19,7 +19,7 @@ from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import parse
 from syncline_design.studies import StudyResult, StudySettings, load_study, run_study
 from syncline_design.studies.definition import figure_of, grid_values, sample_values
-from syncline_design.studies.result import study_verdict
+from syncline_design.studies.finished import study_verdict
 from syncline_design.studies.summary import boundaries, heat_map, summarise, winners
 from syncline_design.studies.table import columns
 from syncline_design.verdict.verify import CheckSettings

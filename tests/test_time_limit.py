@@ -17,12 +17,13 @@ import pytest
 
 from random_problems import random_problem
 from syncline_design.choice import ranked
+from syncline_design.choice.best_first import lower_bound
 from syncline_design.choice.decide import best, choose
 from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.outcome import Choice
 from syncline_design.choice.partition import iter_differing
 from syncline_design.choice.problem import build_problem
-from syncline_design.choice.ranked import iter_best, lower_bound
+from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import Design, Problem
 from syncline_design.cli.app import app
 from syncline_design.machine.deadline import (

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from syncline_design.choice.problem import build_problem
 from syncline_design.cli.app import app
 from syncline_design.spec.load import load
-from syncline_design.verdict.optimise import pinned_text
+from syncline_design.verdict.pinned import pinned_text
 from syncline_design.verdict.verify import CheckSettings
 from tests.checked import check_file
 
@@ -150,7 +150,7 @@ def test_pinned_specs_are_the_designs_that_they_pin(tmp_path: Path) -> None:
 def check_open(path: Path) -> dict[str, Any] | None:
     """The verdict of a drawn spec whose design was written beside it; None where it has none."""
     from syncline_design.spec.load import BadInput
-    from syncline_design.verdict.verify import picked_design
+    from syncline_design.verdict.pinned import picked_design
 
     try:
         loaded = load(path)

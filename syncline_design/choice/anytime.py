@@ -12,12 +12,12 @@ from fractions import Fraction
 
 import numpy as np
 
+from syncline_design.choice.best_first import lower_bound
 from syncline_design.choice.evaluate import Amount, broken, evaluate, known_or_more, rank
 from syncline_design.choice.narrowed import Narrowed, narrowed
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import Choice, Proof, TooLarge
 from syncline_design.choice.partition import best_of
-from syncline_design.choice.ranked import lower_bound
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Deadline, OutOfTime
 

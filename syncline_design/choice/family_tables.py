@@ -9,7 +9,7 @@ from fractions import Fraction
 import numpy as np
 
 from syncline_design.choice.family import Family
-from syncline_design.choice.front import demand_structure, useful_clocks
+from syncline_design.choice.merged_front import demand_structure, useful_clocks
 from syncline_design.choice.options import (
     INT64_ROOM,
     Bools,

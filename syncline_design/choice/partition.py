@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from syncline_design.choice.evaluate import Known, Rank, broken, evaluate, rank, resource_of
-from syncline_design.choice.front import merged_front
+from syncline_design.choice.merged_front import merged_front
 from syncline_design.choice.narrowed import Narrowed, narrowed
 from syncline_design.choice.options import Indices
 from syncline_design.choice.table import Design, Problem

@@ -10,10 +10,10 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 
+from syncline_design.choice.best_first import iter_first
 from syncline_design.choice.evaluate import error_key, evaluate
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import Deadline, FrontPoint
-from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import Problem
 
 MOST_STEPS = 200_000  # partial designs after which another road has to do it
@@ -30,7 +30,7 @@ def searched_front(
         most = min(least, math.inf if limit is None else limit)
         limits = replace(problem.limits, accuracy_m=None if math.isinf(most) else most)
         smaller = replace(problem, limits=limits, objective=resource, judge=None)
-        for design in iter_best(smaller, deadline, MOST_STEPS):
+        for design in iter_first(smaller, deadline, MOST_STEPS):
             sums = evaluate(problem, design)
             amount = sums.amount(resource)
             if error_key(sums.error_m) < least and amount is not None:

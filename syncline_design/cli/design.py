@@ -31,7 +31,7 @@ from syncline_design.cli.shared import (
 from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.optimise import Optimised
+    from syncline_design.verdict.optimisation import Optimised
     from syncline_design.verdict.tree import Checked, Verdict
 
 
@@ -64,8 +64,9 @@ def check(
     from syncline_design.report.several import skipped_text, summary_line
     from syncline_design.report.write import STDOUT, OutputError
     from syncline_design.spec.folders import spec_files
+    from syncline_design.verdict.settings import CheckSettings
     from syncline_design.verdict.tree import Refused
-    from syncline_design.verdict.verify import CheckSettings, check_files
+    from syncline_design.verdict.verify import check_files
 
     with watched(deadline, quiet=quiet):
         found = spec_files(spec, skip_others=skip_others)
@@ -155,7 +156,8 @@ def optimize(
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
     from syncline_design.verdict.admitted import NoSuchEntry
-    from syncline_design.verdict.optimise import OptimizeSettings, optimize
+    from syncline_design.verdict.optimisation import OptimizeSettings
+    from syncline_design.verdict.optimise import optimize
 
     targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
     drawn, figure = _axes(resource, against)
@@ -203,7 +205,7 @@ def _refuse_elsewhere(path: Path, catalogs: Sequence[str]) -> None:
 
 def _write_design(found: Optimised, path: Path) -> None:
     from syncline_design.spec.edit import write_spec
-    from syncline_design.verdict.optimise import pinned_text
+    from syncline_design.verdict.pinned import pinned_text
 
     text = found.text or pinned_text(found.case, found.problem, found.designs[0])
     write_spec(text, path)
@@ -284,7 +286,7 @@ def diff(
     from syncline_design.comparison.diff import diff as compare
     from syncline_design.report.on_difference import DIFF_FORMATS, on_difference, render_diff
     from syncline_design.report.render_console import console
-    from syncline_design.verdict.verify import CheckSettings
+    from syncline_design.verdict.settings import CheckSettings
 
     targets = output_targets(output, DIFF_FORMATS, [old, new])
     with watched(deadline, targets, quiet=quiet):

@@ -65,7 +65,7 @@ def plan(
     from syncline_design.report.plans import render_plan
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
-    from syncline_design.verdict.optimise import as_measured
+    from syncline_design.verdict.pinned import as_measured
 
     asked = _asked(separate, reach)
     reads = [spec, *([diagnosis] if diagnosis is not None else []), *(flown or ())]

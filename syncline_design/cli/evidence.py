@@ -133,7 +133,7 @@ def diagnose(
     from syncline_design.report.on_diagnosis import on_diagnosis
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
-    from syncline_design.verdict.optimise import as_measured
+    from syncline_design.verdict.pinned import as_measured
 
     together = _joint(joint=joint, logs=log, starts=starts, store=store)
     reads = [spec, *(log or ()), *([] if store is None else [store])]

@@ -64,7 +64,7 @@ def watch(
     from syncline_design.report.on_watch import WATCH_FORMATS, on_watch, render_watch
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
-    from syncline_design.verdict.optimise import as_measured
+    from syncline_design.verdict.pinned import as_measured
 
     files = tuple(file or ())
     targets = output_targets(output, WATCH_FORMATS, [store, spec, *files])

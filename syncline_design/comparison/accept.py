@@ -32,9 +32,10 @@ from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case
 from syncline_design.verdict.measured import coverage_of
-from syncline_design.verdict.optimise import as_measured
+from syncline_design.verdict.pinned import as_measured
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Verdict
-from syncline_design.verdict.verify import CheckSettings, check_loaded
+from syncline_design.verdict.verify import check_loaded
 
 CLOCKS: Final = ("timing", "clock")  # what logs of clocks can show
 

@@ -13,9 +13,10 @@ from syncline_design.spec.catalog import ClockEntry
 from syncline_design.spec.choices import ClockChoice
 from syncline_design.verdict.measured import COMMONLY, coverage_of
 from syncline_design.verdict.named import NamedRole
-from syncline_design.verdict.optimise import as_measured
+from syncline_design.verdict.pinned import as_measured
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Verdict, Word
-from syncline_design.verdict.verify import CheckSettings, check_loaded
+from syncline_design.verdict.verify import check_loaded
 
 
 @dataclass(frozen=True, slots=True)

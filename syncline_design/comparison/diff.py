@@ -22,8 +22,9 @@ from syncline_design.spec.files import Collection
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
 from syncline_design.spec.load import BadInput, catalogs_of, load_document, without_simulated
 from syncline_design.spec.yaml_text import KeyPath, ParsedFile, parse
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import RequirementResult, Verdict
-from syncline_design.verdict.verify import CheckSettings, check_loaded
+from syncline_design.verdict.verify import check_loaded
 
 MOST_TRIED = 8  # changes that are also tried one by one
 _ABSENT = object()

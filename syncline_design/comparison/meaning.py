@@ -18,9 +18,10 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice
 from syncline_design.verdict.named import NamedDesign
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
 from syncline_design.verdict.verified import frame
-from syncline_design.verdict.verify import CheckSettings, check_loaded
+from syncline_design.verdict.verify import check_loaded
 
 WORDS = {
     "meets": "meets its requirements",

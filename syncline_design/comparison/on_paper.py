@@ -16,7 +16,8 @@ from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice
-from syncline_design.verdict.verify import CheckSettings, check_loaded
+from syncline_design.verdict.settings import CheckSettings
+from syncline_design.verdict.verify import check_loaded
 
 HALVINGS: Final = 8  # of the octaves below a size, in the search for where it begins to matter
 OCTAVES: Final = 12.0

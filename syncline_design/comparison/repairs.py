@@ -19,8 +19,9 @@ from syncline_design.spec.case import Case
 from syncline_design.verdict.admitted import with_whole_catalog
 from syncline_design.verdict.bill import bill_of_materials
 from syncline_design.verdict.recheck import recheck
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Word
-from syncline_design.verdict.verify import CheckSettings, check_loaded
+from syncline_design.verdict.verify import check_loaded
 
 MOST_COMBINED = 200  # ways to put several findings right that are worked out
 MOST_SHOWN = 8

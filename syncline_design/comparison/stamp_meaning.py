@@ -16,9 +16,10 @@ from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_timestamping_text
 from syncline_design.verdict.named import NamedRole
-from syncline_design.verdict.optimise import as_measured
+from syncline_design.verdict.pinned import as_measured
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Verdict
-from syncline_design.verdict.verify import CheckSettings, check_loaded
+from syncline_design.verdict.verify import check_loaded
 
 ARRIVAL: Final = "arrival"
 _ON_ARRIVAL: Final = ("stamped_on_arrival", "packetised")

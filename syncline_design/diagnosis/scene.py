@@ -49,7 +49,7 @@ class Scene:
     def error(self, acting: Sequence[Acting] = ()) -> Array:
         """Corrected georeferencing error [m], NED, (n, 3); NaN where the truth is not known."""
         error = _corrected_error(self, self._departures(acting))
-        return without_unlogged_past(self, error, (*self.known, *acting))
+        return without_unlogged_past(self.system, self.rows, error, (*self.known, *acting))
 
     def _departures(self, acting: Sequence[Acting]) -> list[Departures]:
         ranged = self.log.kind != "position"

@@ -10,35 +10,36 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from syncline_design.diagnosis.past import LoggedPast
 from syncline_design.effects.acting import Acting
-from syncline_design.effects.record import Array
-
-if TYPE_CHECKING:
-    from syncline_design.diagnosis.scene import Scene
+from syncline_design.effects.record import Array, StageRows
+from syncline_design.model.system import Stage, System
 
 GONE = 1e-3  # share of the first state that no longer counts
 LEAST = 1e-9  # of the noise: a state that is smaller has no size of its own
 
 
-def without_unlogged_past(view: Scene, error: Array, acting: Sequence[Acting]) -> Array:
+def without_unlogged_past(
+    system: System, rows: Sequence[StageRows], error: Array, acting: Sequence[Acting]
+) -> Array:
     """The error (n, 3) [m] less what the states before the log leave in it."""
     for one in acting:
-        past = view.rows[one.stage].lagged
+        past = rows[one.stage].lagged
         constant_s = float(one.values[one.effect.memory]) if one.effect.memory else 0.0
         if constant_s > 0.0 and isinstance(past, LoggedPast) and not past.from_positions:
-            error = _less(error, view, one, constant_s, past)
+            stage = system.stages[one.stage]
+            error = _less(error, stage, rows[one.stage], constant_s, past)
     return error
 
 
-def _less(error: Array, view: Scene, one: Acting, constant_s: float, past: LoggedPast) -> Array:
+def _less(
+    error: Array, stage: Stage, rows: StageRows, constant_s: float, past: LoggedPast
+) -> Array:
     left = error.copy()
-    rows, sensor = view.rows[one.stage], view.system.stages[one.stage].position
-    noise_m = max(sensor.sigma) if sensor is not None else 0.0
+    noise_m = max(stage.position.sigma) if stage.position is not None else 0.0
     pulled = np.sqrt(np.mean(np.sum(rows.acceleration_mps2**2, axis=1)))
     size_m = constant_s**2 * float(pulled)
     if size_m <= LEAST * noise_m:  # nothing moves, so nothing is remembered

@@ -11,7 +11,7 @@ from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Design, Problem
 from syncline_design.report.csv_out import plain_csv
-from syncline_design.verdict.optimise import Optimised
+from syncline_design.verdict.optimisation import Optimised
 
 
 def optimisation_csv(found: Optimised) -> str:

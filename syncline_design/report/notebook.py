@@ -14,7 +14,7 @@ from syncline_design.report.words import OUTCOMES
 if TYPE_CHECKING:
     from syncline_design.diagnosis.result import Finding
     from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
-    from syncline_design.verdict.optimise import Optimisation
+    from syncline_design.verdict.optimisation import Optimisation
 
 _HERE: Final = __name__
 _REPORT: Final = "syncline_design.report"

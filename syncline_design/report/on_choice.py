@@ -36,7 +36,7 @@ from syncline_design.report.words import KINDS, OBJECTIVES, OUTCOMES
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
 from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
-from syncline_design.verdict.optimise import Optimisation, Optimised
+from syncline_design.verdict.optimisation import Optimisation, Optimised
 
 
 def on_choice(found: Optimised) -> Document:

@@ -10,7 +10,7 @@ from syncline_design.report.on_choice import hinges_nodes, incomplete_lines
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.render_html import html
-from syncline_design.verdict.optimise import Optimised
+from syncline_design.verdict.optimisation import Optimised
 
 
 def render_optimize(name: str, found: Optimised) -> str:

@@ -20,7 +20,7 @@ from syncline_design.report.json_out import json_text
 from syncline_design.simulation import results as simulation
 from syncline_design.spec import catalog_check
 from syncline_design.studies import data as study
-from syncline_design.verdict import optimise
+from syncline_design.verdict import optimisation
 from syncline_design.verdict import tree as verdict
 
 RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
@@ -32,7 +32,7 @@ RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "diagnosis": (meaning.DiagnosisAndDesign, diagnosis.SCHEMA),
     "difference": (difference.Difference, difference.SCHEMA),
     "log": (inspection.LogInspection, inspection.SCHEMA),
-    "optimisation": (optimise.Optimisation, optimise.SCHEMA),
+    "optimisation": (optimisation.Optimisation, optimisation.SCHEMA),
     "plan": (planning.Plan, planning.SCHEMA),
     "reproduction": (reproduce.Reproduction, reproduce.SCHEMA),
     "simulation": (simulation.Simulation, simulation.SCHEMA),

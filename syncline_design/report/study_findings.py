@@ -11,7 +11,8 @@ from syncline_design.report.github import github_command
 from syncline_design.report.sarif import sarif_log
 from syncline_design.report.study_words import outcome, rule_sentence
 from syncline_design.report.text import visible
-from syncline_design.studies.result import CaseResult, StudyResult
+from syncline_design.studies.finished import CaseResult
+from syncline_design.studies.result import StudyResult
 from syncline_design.studies.table import reason
 
 

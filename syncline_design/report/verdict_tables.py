@@ -21,8 +21,8 @@ from syncline_design.verdict.bill import total
 from syncline_design.verdict.measured import claim_words
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.baseline import Earlier
     from syncline_design.verdict.named import BillLine, NamedDesign
+    from syncline_design.verdict.since import Earlier
     from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
 

@@ -23,9 +23,9 @@ from syncline_design.report.words import (
 from syncline_design.verdict.obstacle import obstacle_sentence
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.baseline import Baseline
     from syncline_design.verdict.named import NamedRole
-    from syncline_design.verdict.optimise import Optimisation
+    from syncline_design.verdict.optimisation import Optimisation
+    from syncline_design.verdict.since import Baseline
     from syncline_design.verdict.tree import (
         Caution,
         Checked,

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
+from syncline_design.effects.record import Array
 from syncline_design.model.budget import budget
 from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.system import SimulationError, System
 from syncline_design.simulation import distribution
 from syncline_design.simulation.comparison import DEFAULT_GRID_S, comparison
-from syncline_design.simulation.distribution import Binned, Values
+from syncline_design.simulation.distribution import KEPT_VALUES, Binned, Values
 from syncline_design.simulation.ensemble import ensemble_of
 from syncline_design.simulation.excursions import excursions, follows_a_file
 from syncline_design.simulation.intervals import proportion_interval, quantile_ranks
+from syncline_design.simulation.kernel import norm
 from syncline_design.simulation.results import (
     SCHEMA,
     Ensemble,
@@ -29,12 +32,13 @@ from syncline_design.simulation.results import (
     histogram,
     versions,
 )
-from syncline_design.simulation.sampling import JOB, error_distribution
+from syncline_design.simulation.sampling import JOB, run_jobs
 from syncline_design.simulation.settings import (
     DEFAULT_MANOEUVRE,
     SimulationSettings,
     demand_simulable,
 )
+from syncline_design.simulation.worker import tally
 from syncline_design.simulation.worst_case import worst_cases
 
 DEFAULT_SETTINGS = SimulationSettings()
@@ -217,8 +221,6 @@ def _decide(
     first: CrossCheck | None,
 ) -> Decision:
     """The same at one distance a stage."""
-    from syncline_design.simulation.worker import tally
-
     sizes = look_sizes(settings.samples, cap_samples)
     look_confidence = 1.0 - (1.0 - settings.confidence) / len(sizes)
     counts, within, drawn = _counted(first, settings, limit_m)
@@ -272,3 +274,19 @@ def look_sizes(samples: int, cap_samples: int) -> list[int]:
     while sizes[-1] < cap_samples:
         sizes.append(min(sizes[-1] * LOOK_GROWTH, cap_samples))
     return sizes
+
+
+def error_distribution(system: System, settings: SimulationSettings) -> Values | Binned:
+    """Distribution of |error| over `settings.samples` samples; memory does not grow beyond
+    `KEPT_VALUES` of them."""
+    demand_simulable(system)
+    if settings.samples <= KEPT_VALUES:
+        kept = np.empty(settings.samples)
+
+        def keep(start: int, errors: Array) -> None:
+            kept[start : start + errors.shape[1]] = norm(errors)
+
+        run_jobs(system, settings, 0, settings.samples, keep)
+        return Values(kept)
+    counts, _ = tally(system, settings, 0, settings.samples, math.inf)
+    return Binned(counts)

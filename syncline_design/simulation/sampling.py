@@ -7,7 +7,6 @@ samples of a shorter one.
 
 from __future__ import annotations
 
-import math
 import os
 import threading
 from collections.abc import Callable
@@ -19,9 +18,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.model.system import System
 from syncline_design.simulation import known_effects
-from syncline_design.simulation.distribution import KEPT_VALUES, Binned, Values
 from syncline_design.simulation.draws import RandomSource, generator, stage_draw, timing_draws
-from syncline_design.simulation.kernel import norm
 from syncline_design.simulation.settings import SimulationSettings, demand_simulable
 from syncline_design.simulation.surroundings import moment_draw, tilt_draw
 from syncline_design.simulation.trajectory import trajectory_errors
@@ -94,24 +91,6 @@ def sample_errors(system: System, settings: SimulationSettings) -> Array:
 
     run_jobs(system, settings, 0, settings.samples, keep)
     return out
-
-
-def error_distribution(system: System, settings: SimulationSettings) -> Values | Binned:
-    """Distribution of |error| over `settings.samples` samples; memory does not grow beyond
-    `KEPT_VALUES` of them."""
-    demand_simulable(system)
-    if settings.samples <= KEPT_VALUES:
-        kept = np.empty(settings.samples)
-
-        def keep(start: int, errors: Array) -> None:
-            kept[start : start + errors.shape[1]] = norm(errors)
-
-        run_jobs(system, settings, 0, settings.samples, keep)
-        return Values(kept)
-    from syncline_design.simulation.worker import tally
-
-    counts, _ = tally(system, settings, 0, settings.samples, math.inf)
-    return Binned(counts)
 
 
 def run_jobs(

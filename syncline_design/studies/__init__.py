@@ -1,7 +1,8 @@
 """Trade studies: one spec or several, checked over grids and samples of their keys."""
 
+from syncline_design.studies.finished import CaseResult
 from syncline_design.studies.loading import Study, load_study
-from syncline_design.studies.result import CaseResult, Progress, StudyResult
+from syncline_design.studies.result import Progress, StudyResult
 from syncline_design.studies.run import StudyError, StudySettings, StudyStoppedError, run_study
 
 __all__ = [

@@ -143,7 +143,8 @@ def _judged(
 
 def _checked(study: Study, base: Base, case: Case, settings: CaseSettings) -> CaseRecord:
     # only where a case is computed: a study whose cases are all there starts at once
-    from syncline_design.verdict.verify import CheckSettings, check_loaded
+    from syncline_design.verdict.settings import CheckSettings
+    from syncline_design.verdict.verify import check_loaded
 
     simulated = simulates(study, base)
     left_out = () if simulated else base.simulated

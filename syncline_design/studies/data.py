@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from syncline_design import __version__
 from syncline_design.machine.records import Named, Record
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import MeetsWhen
+from syncline_design.studies.finished import Finished
 from syncline_design.studies.loading import Study
 from syncline_design.studies.record import CaseWord, StudyWord
 from syncline_design.studies.summary import (
@@ -23,9 +24,6 @@ from syncline_design.studies.summary import (
     winners,
 )
 from syncline_design.studies.table import Value, rows, si_unit
-
-if TYPE_CHECKING:
-    from syncline_design.studies.result import StudyResult
 
 SCHEMA = "syncline-design/study/v1"
 
@@ -79,7 +77,7 @@ class StudyData(Record):
     provenance: StudyProvenance
 
 
-def study_data(result: StudyResult) -> StudyData:
+def study_data(result: Finished) -> StudyData:
     """The study as data."""
     study, summary = result.study, summarise(result)
     return StudyData(
@@ -96,7 +94,7 @@ def _factors(study: Study) -> tuple[VariedKey, ...]:
     )
 
 
-def _provenance(result: StudyResult) -> StudyProvenance:
+def _provenance(result: Finished) -> StudyProvenance:
     bases = tuple(
         BaseHashes(str(base.path), base.document.sha256, base.catalogs.sha256())
         for base in result.study.bases

@@ -1,126 +1,23 @@
-"""How far a study is, and what it came to: cases, read back from their files when asked for."""
+"""How far a study is, and its result as it is handed out."""
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, get_args
+from collections.abc import Callable
+from dataclasses import dataclass
 
 from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.records import Json
-from syncline_design.spec.keys import label
 from syncline_design.studies.data import study_data
-from syncline_design.studies.definition import MeetsWhen
-from syncline_design.studies.loading import Study
-from syncline_design.studies.record import CaseRecord, CaseWord, StudyWord
-from syncline_design.studies.store import Store, StoreError
-
-VERDICTS: tuple[CaseWord, ...] = get_args(CaseWord)
-EXIT_CODES: dict[StudyWord, int] = {"meets": 0, "fails": 1, "indeterminate": 3}
-
-
-@dataclass(frozen=True, slots=True)
-class CaseResult:
-    """One case: where it stands, what was set, and the record of its check."""
-
-    number: int  # from 1
-    base: int
-    file: str
-    name: str  # of the base spec
-    currency: str
-    settings: tuple[tuple[str, Any], ...]
-    record: CaseRecord
-
-    @property
-    def verdict(self) -> CaseWord:
-        """meets, fails, infeasible, refused or indeterminate."""
-        return self.record.verdict
-
-    @property
-    def labels(self) -> dict[str, str]:
-        """Key path to value as the tables show it."""
-        return {key: label(value) for key, value in self.settings}
+from syncline_design.studies.finished import Finished
 
 
 @dataclass(frozen=True)
-class StudyResult(Shown):
+class StudyResult(Finished, Shown):
     """A finished study; iterate `cases()` for its results, in the order of the study."""
-
-    study: Study
-    seed: int
-    keys: tuple[str, ...] = field(repr=False)
-    store: Store = field(repr=False)
-    unsettled: dict[str, CaseRecord] = field(repr=False)  # by key: no verdict this time
-    reused: int
-    computed: int
-    retried: int
-    elapsed_s: float
-
-    def __len__(self) -> int:
-        return len(self.keys)
-
-    def case(self, index: int) -> CaseResult:
-        """One case by its index, from 0."""
-        place, settings = self.study.case(index)
-        base, record = self.study.bases[place], self._record(index)
-        currency = base.currency if record.design is None else record.design.currency
-        return CaseResult(index + 1, place, str(base.path), base.name, currency, settings, record)
-
-    def _record(self, index: int) -> CaseRecord:
-        key = self.keys[index]
-        record = self.unsettled.get(key) or self.store.read(key)
-        if record is None:
-            file = self.store.path(key)
-            raise StoreError(f"{file}: this case's file is gone or damaged; run the study again")
-        return record
-
-    def cases(self) -> Iterator[CaseResult]:
-        """Every case in order; only one of them is in memory at a time."""
-        return (self.case(index) for index in range(len(self.keys)))
-
-    @cached_property
-    def counts(self) -> dict[CaseWord, int]:
-        """How many cases ended how."""
-        found = Counter(case.verdict for case in self.cases())
-        return {word: found.get(word, 0) for word in VERDICTS}
-
-    @cached_property
-    def not_simulated(self) -> tuple[str, ...]:
-        """Requirements that no case decided because the study leaves Monte Carlo out."""
-        return tuple(sorted({i for case in self.cases() for i in case.record.not_simulated}))
-
-    @property
-    def verdict(self) -> StudyWord:
-        """meets, fails or indeterminate, by the study's `meets_when`.
-
-        all: every case meets; any: at least one does; decided: every case got an answer.
-        """
-        return study_verdict(self.counts, self.study.meets_when)
-
-    @property
-    def exit_code(self) -> int:
-        """0 meets, 1 does not, 3 no verdict."""
-        return EXIT_CODES[self.verdict]
 
     def to_json(self) -> Json:
         """The study as data, with a row for every case: what `study --output json:-` prints."""
         return study_data(self).to_json()
-
-
-def study_verdict(counts: Mapping[CaseWord, int], meets_when: MeetsWhen) -> StudyWord:
-    """The verdict of a study from how its cases ended."""
-    failed = counts["fails"] + counts["infeasible"] + counts["refused"]
-    if meets_when == "any":
-        if counts["meets"]:
-            return "meets"
-        return "indeterminate" if counts["indeterminate"] else "fails"
-    if meets_when == "decided":
-        return "indeterminate" if counts["indeterminate"] else "meets"
-    if failed:
-        return "fails"
-    return "indeterminate" if counts["indeterminate"] else "meets"
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import Factor, figure_of
+from syncline_design.studies.finished import CaseResult, Finished
 from syncline_design.studies.record import CasePoint, CaseWord, RolePick
-
-if TYPE_CHECKING:
-    from syncline_design.studies.result import CaseResult, StudyResult
 
 MOST_FRONTS = 500
 MOST_CELLS = 40  # values per axis of the heat map; beyond that there is none
@@ -51,7 +49,7 @@ class Front(Record):
 class StudySummary:
     """Every case in a line, and the fronts that differ."""
 
-    result: StudyResult
+    result: Finished
     briefs: tuple[Brief, ...]
     fronts: tuple[Front, ...]
 
@@ -105,7 +103,7 @@ class Boundary(Record):
     why: CaseWord
 
 
-def summarise(result: StudyResult) -> StudySummary:
+def summarise(result: Finished) -> StudySummary:
     """One pass over all cases."""
     briefs: list[Brief] = []
     fronts: dict[tuple[tuple[CasePoint, ...], str], list[int]] = {}

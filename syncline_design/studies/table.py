@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from syncline_design.model.unit_table import SI_UNITS
 from syncline_design.studies.definition import Factor, figure_of
+from syncline_design.studies.finished import CaseResult, Finished
 from syncline_design.studies.record import CaseRecord
 from syncline_design.verdict.obstacle import obstacle_sentence
-
-if TYPE_CHECKING:
-    from syncline_design.studies.result import CaseResult, StudyResult
 
 FIGURES = (
     "cost", "mass_kg", "power_w", "error_m", "sensor_error_m", "sync_error_m", "tau_s",
@@ -31,7 +28,7 @@ def si_unit(factor: Factor) -> str | None:
     return next((unit for d, unit in SI_UNITS.items() if d.value == kind), kind)
 
 
-def columns(result: StudyResult) -> list[str]:
+def columns(result: Finished) -> list[str]:
     """The columns of the table: case, factors, verdict, figures, payload, reasons."""
     names = ["case", "base"]
     for factor in result.study.factors:
@@ -43,13 +40,13 @@ def columns(result: StudyResult) -> list[str]:
     return [*names, "failing", "not_simulated", "reason"]
 
 
-def text_columns(result: StudyResult) -> set[str]:
+def text_columns(result: Finished) -> set[str]:
     """Columns that hold text; the others hold figures."""
     numeric = {f"{f.key} [{si_unit(f)}]" for f in result.study.factors}
     return {c for c in columns(result) if c not in FIGURES and c not in numeric} - {"case"}
 
 
-def _roles(result: StudyResult) -> list[str]:
+def _roles(result: Finished) -> list[str]:
     roles: dict[str, None] = {}
     for base in result.study.bases:
         for index, stage in enumerate(base.document.data["stages"]):
@@ -60,7 +57,7 @@ def _roles(result: StudyResult) -> list[str]:
     return list(roles)
 
 
-def rows(result: StudyResult) -> Iterator[Row]:
+def rows(result: Finished) -> Iterator[Row]:
     """A row per case, in the order of the study."""
     units = {factor.key: si_unit(factor) for factor in result.study.factors}
     for case in result.cases():

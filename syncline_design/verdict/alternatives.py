@@ -11,7 +11,7 @@ from syncline_design.choice.holding import outcome_of, without
 from syncline_design.choice.outcome import FrontPoint, Infeasible
 from syncline_design.choice.table import Design, Problem
 from syncline_design.spec.case import Case
-from syncline_design.verdict.choice_data import full_design
+from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.named import Alternative, Bargain, NamedDesign
 
 LEAST_GAIN = 0.05  # share of the error, or of the price, that a bargain takes off at least

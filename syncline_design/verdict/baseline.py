@@ -8,53 +8,15 @@ the verdict as a whole fell from `meets` to `indeterminate`, `fails`, `infeasibl
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final, Literal
+from dataclasses import replace
+from typing import Final
 
-from syncline_design.machine.records import Record
+from syncline_design.verdict.since import Baseline, Earlier, RequirementSince, Since
+from syncline_design.verdict.tree import RequirementResult, Verdict
 
-if TYPE_CHECKING:
-    from syncline_design.verdict.tree import RequirementResult, Verdict
-
-Since = Literal["worse", "better", "same", "new", "gone"]
 _OUTCOMES: Final = ("meets", "indeterminate", "fails", "infeasible")  # each worse than the last
 _STATUSES: Final = ("pass", "indeterminate", "fail")
 _ROUNDING = 1e-9  # relative; figures that differ by less are the same
-
-
-@dataclass(frozen=True, slots=True)
-class Earlier(Record):
-    """How a requirement stood in the baseline."""
-
-    status: Literal["pass", "fail", "indeterminate"]
-    value: float | None
-    limit: float
-    unit: str
-
-
-@dataclass(frozen=True, slots=True)
-class RequirementSince(Record):
-    """What became of a requirement; was: None of a new one."""
-
-    id: str
-    change: Since
-    was: Earlier | None
-
-
-@dataclass(frozen=True, slots=True)
-class Baseline(Record):
-    """What became of a spec's verdict; verdict: the earlier one, None where the file has none."""
-
-    file: str
-    verdict: Literal["meets", "fails", "infeasible", "indeterminate"] | None
-    worse: bool  # the exit code is 0 where nothing is
-    requirements: tuple[RequirementSince, ...]
-
-    def forgives(self, requirement: str) -> bool:
-        """Whether a requirement that does not pass did no better before."""
-        return any(
-            row.id == requirement and row.change in ("same", "better") for row in self.requirements
-        )
 
 
 def against(verdict: Verdict, earlier: Sequence[Verdict], file: str) -> Verdict:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING
 
+from syncline_design.choice.outcome import Proof
 from syncline_design.effects import registry
 from syncline_design.model.budget import differs
 from syncline_design.model.quantity import Dimension, format_quantity
@@ -15,8 +17,16 @@ from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
 from syncline_design.verdict.cautions_of_facts import fact_cautions
 from syncline_design.verdict.cautions_of_owned import owned_cautions
-from syncline_design.verdict.tree import Assumption, Caution, ErrorFigures, RequirementResult
+from syncline_design.verdict.tree import (
+    Assumption,
+    Caution,
+    ErrorFigures,
+    RequirementResult,
+)
 from syncline_design.verdict.verified import Verified
+
+if TYPE_CHECKING:
+    pass
 
 LEAST_COVERAGE = 2.0  # below, more than 4.6 % of normal timestamp errors exceed their bound
 
@@ -243,3 +253,11 @@ def _incomplete(case: Case) -> Iterator[Caution]:
                     entry=", ".join(entries),
                     key=figure,
                 )
+
+
+def unproven(proof: Proof) -> Iterator[Caution]:
+    """What the time limit left open about a design that meets."""
+    if not proof.optimal:
+        gap = "" if proof.gap is None else f" (by {100 * proof.gap:.3g} % at most)"
+        message = f"the time limit ended the search: a better design than this may exist{gap}"
+        yield Caution("not-proven-optimal", message)

@@ -15,13 +15,12 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Case
 from syncline_design.spec.references import parts_in_use
-from syncline_design.verdict.design_data import named_design
+from syncline_design.verdict.design_data import full_design, named_design
 from syncline_design.verdict.named import (
     ChoiceResult,
     Exclusion,
     Figure,
     FrontDesign,
-    NamedDesign,
     RankedDesign,
     StampingRange,
 )
@@ -42,6 +41,7 @@ def choice_of(
     points: Sequence[FrontPoint] | None = None,
 ) -> ChoiceResult:
     """What was chosen among what; points: the front of cost, where it is known."""
+    # late: 20 ms that a pinned spec need not wait
     from syncline_design.choice.decide import best
     from syncline_design.choice.front import front, staircase
     from syncline_design.verdict.alternatives import alternatives, bargains
@@ -96,11 +96,6 @@ def front_designs(
         )
         for point in points
     )
-
-
-def full_design(case: Case, problem: Problem, design: Design) -> NamedDesign:
-    """A design in names, with its own errors."""
-    return named_design(case, problem, design, design_budget(case, problem, design))
 
 
 def ranked_designs(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
+from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_options, evaluate
 from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
@@ -216,3 +217,8 @@ def told_source(entry: Entry) -> str:
         by_source.setdefault(place, []).append(key)
     told = (f"{', '.join(keys)}: {place}" for place, keys in by_source.items())
     return "; ".join([*([entry.source] if entry.source else []), *told])
+
+
+def full_design(case: Case, problem: Problem, design: Design) -> NamedDesign:
+    """A design in names, with its own errors."""
+    return named_design(case, problem, design, design_budget(case, problem, design))

@@ -11,9 +11,10 @@ from syncline_design.verdict.family import ALL, Build, Work, choose_family, work
 from syncline_design.verdict.family_choice import cannot_share
 from syncline_design.verdict.family_named import ruled_out_of
 from syncline_design.verdict.named import ChoiceResult
+from syncline_design.verdict.no_design import infeasible_verdict, unmet
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Verdict
 from syncline_design.verdict.verified import frame
-from syncline_design.verdict.verify import CheckSettings, infeasible_verdict, unmet
 
 
 def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], Build]) -> Verdict:

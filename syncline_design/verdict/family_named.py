@@ -9,7 +9,8 @@ from typing import Any
 from syncline_design.choice.family_best import FamilyPoint
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
-from syncline_design.verdict.choice_data import MOST_EXCLUDED, full_design, ruled_out
+from syncline_design.verdict.choice_data import MOST_EXCLUDED, ruled_out
+from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.family import Chosen, Work
 from syncline_design.verdict.named import Exclusion, FrontDesign, RankedDesign, StampingRange
 from syncline_design.verdict.recheck_sums import BUDGETS, Budget

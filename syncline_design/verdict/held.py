@@ -12,9 +12,7 @@ from syncline_design.model.system import System
 from syncline_design.simulation import CrossCheck, Decision, SimulationError, decide
 from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import STATED_KINDS, Requirement
-from syncline_design.verdict.acceptance import (
-    simulation_settings,
-)
+from syncline_design.verdict.acceptance import simulation_settings
 from syncline_design.verdict.recheck import Recheck
 from syncline_design.verdict.stated import stated, wanted_of
 from syncline_design.verdict.tree import (
@@ -26,7 +24,7 @@ from syncline_design.verdict.tree import (
 )
 
 if TYPE_CHECKING:
-    from syncline_design.verdict.verify import CheckSettings
+    from syncline_design.verdict.settings import CheckSettings
 
 
 def results(

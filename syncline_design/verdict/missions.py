@@ -18,6 +18,7 @@ from syncline_design.machine.deadline import Pieces, in_force
 from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import Selection
+from syncline_design.verdict.cautions import unproven
 from syncline_design.verdict.family import (
     Build,
     Chosen,
@@ -35,8 +36,11 @@ from syncline_design.verdict.named import (
     ChoiceResult,
     RankedDesign,
 )
+from syncline_design.verdict.no_design import unfinished_verdict
+from syncline_design.verdict.one_design import verdict_on, verify
 from syncline_design.verdict.recheck_family import family_sums
 from syncline_design.verdict.recheck_sums import BUDGETS
+from syncline_design.verdict.settings import CheckSettings, build_of
 from syncline_design.verdict.tree import (
     Caution,
     MissionVerdict,
@@ -49,14 +53,6 @@ from syncline_design.verdict.tree import (
     word_of,
 )
 from syncline_design.verdict.verified import frame
-from syncline_design.verdict.verify import (
-    CheckSettings,
-    build_of,
-    unfinished_verdict,
-    unproven,
-    verdict_on,
-    verify,
-)
 
 _WORST_FIRST: dict[str, int] = {"fails": 0, "infeasible": 0, "indeterminate": 1, "meets": 2}
 SHARE = "CHOOSE_FOR"  # the implied requirement of a choice for a probability

@@ -17,7 +17,7 @@ from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.case import Case
-from syncline_design.verdict.choice_data import full_design
+from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.named import MissedLimit, Nearest, PricedError
 
 LIMITS = frozenset({*UNITS_OF, "cost"})  # kinds of fix that move a limit and nothing else

@@ -3,41 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from dataclasses import replace
+from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.decide import best
 from syncline_design.choice.explain import explain
 from syncline_design.choice.front import front, staircase
 from syncline_design.choice.judged import refusals
-from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import (
-    Explanation,
     FrontPoint,
-    PriceStep,
     Proof,
-    Road,
     Unfinished,
 )
-from syncline_design.choice.problem import build_problem, selection_of, sole_design
-from syncline_design.choice.slack import Slack, slack_ledger
-from syncline_design.choice.table import Design, Limits, Problem
+from syncline_design.choice.problem import sole_design
+from syncline_design.choice.slack import slack_ledger
+from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.tolerance import (
-    Measurement,
     ToleranceVerdict,
     measure_next,
     tolerance_verdict,
 )
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import OutOfTime, Pieces, in_force
-from syncline_design.machine.input_files import FileRead
-from syncline_design.machine.records import Named, Record, optional
 from syncline_design.simulation.results import SpecName
-from syncline_design.spec.case import Case, StageCase
-from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
+from syncline_design.spec.case import Case
 from syncline_design.spec.references import names_candidates
-from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.alternatives import alternatives, bargains
 from syncline_design.verdict.cautions import design_cautions
@@ -49,140 +40,28 @@ from syncline_design.verdict.choice_data import (
 )
 from syncline_design.verdict.family import is_family, refuse_missions
 from syncline_design.verdict.figure_front import (
-    FIGURES as FIGURES,
-)
-from syncline_design.verdict.figure_front import (
-    FigureKind,
     drawn_requirement,
     figure_front,
     figure_words,
 )
-from syncline_design.verdict.named import (
-    Alternative,
-    Bargain,
-    Exclusion,
-    FrontDesign,
-    Nearest,
-    RankedDesign,
-)
 from syncline_design.verdict.nearest import nearest
+from syncline_design.verdict.no_design import unfinished_verdict
+from syncline_design.verdict.one_design import verify
 from syncline_design.verdict.open_choice import Picked, pick
-from syncline_design.verdict.tree import EXIT_CODES, Caution, Verdict, Word
-from syncline_design.verdict.verified import Verified, error_figures
-from syncline_design.verdict.verify import (
-    CheckSettings,
-    open_verdict,
-    picked_design,
-    unfinished_verdict,
-    verify,
+from syncline_design.verdict.optimisation import (
+    NO_TABLES,
+    Hinged,
+    MadeFrom,
+    Optimisation,
+    Optimised,
+    OptimizeSettings,
 )
-from syncline_design.verdict.why_not import Answer, Asked, questions_of, refuse_scenarios, why_not
-
-SCHEMA = "syncline-design/optimization/v1"
-# What stands for the tables where time ended before they were made.
-NO_TABLES = Problem((), (), (), (), 0.0, 0.0, Limits(None, 1.0), "syncline", "cost")
-
-
-@dataclass(frozen=True, slots=True)
-class OptimizeSettings:
-    """count: how many designs; pareto: the front too, of `resource` against error, or a figure.
-
-    every: rank every design, not only those that differ in a sensor.
-    """
-
-    count: int = 1
-    pareto: bool = False
-    resource: ResourceName = "cost"
-    figure: FigureKind | None = None  # of the error, in place of the Syncline's
-    method: Road = "auto"
-    seed: int = 0
-    every: bool = False
-    report: bool = False  # the whole verdict too, for a page
-    why_not: tuple[
-        str, ...
-    ] = ()  # entries to answer for; NoSuchEntry for one that is in no catalog
-
-
-@dataclass(frozen=True, slots=True)
-class MadeFrom(Record):
-    """What the choice depends on."""
-
-    version: str
-    spec_sha256: str
-    catalogs_sha256: str
-    files: tuple[FileRead, ...]
-    seed: int
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Optimisation(Record):
-    """What `optimize` says: the best designs, or why there is none.
-
-    warnings: of the first design, as `check` gives them; cut_short: what the time limit left out
-    or incomplete; gave_up: what lacks designs because too many were simulated; message: what ended
-    a search that found no design; front: with `--pareto`, `front_left_out` what has no place on
-    it, `front_figure` over which figure of the error it is drawn, in words; slack, tolerances,
-    measure_next: of a design that meets, null where that was not worked out; why_not: of the
-    entries that were asked about; alternatives, bargains: as in a verdict.
-    """
-
-    schema: Annotated[str, Named(SCHEMA)] = SCHEMA
-    verdict: Word
-    spec: SpecName
-    proof: Proof
-    combinations: str | None
-    designs: tuple[RankedDesign, ...] = ()
-    warnings: tuple[Caution, ...] = ()
-    excluded: tuple[Exclusion, ...]
-    excluded_count: int
-    cut_short: tuple[str, ...] = ()
-    gave_up: tuple[str, ...] = ()
-    provenance: MadeFrom
-    message: str | None = optional()
-    front: tuple[FrontDesign, ...] | None = optional()
-    front_figure: str | None = optional()
-    front_left_out: tuple[str, ...] | None = optional()
-    staircase: tuple[PriceStep, ...] | None = optional()
-    slack: tuple[Slack, ...] | None = optional()
-    tolerances: ToleranceVerdict | None = optional()
-    measure_next: tuple[Measurement, ...] | None = optional()
-    infeasibility: Explanation | None = optional()
-    nearest: Nearest | None = optional()
-    why_not: tuple[Answer, ...] | None = optional()
-    alternatives: tuple[Alternative, ...] | None = optional()
-    bargains: tuple[Bargain, ...] | None = optional()
-
-    @property
-    def exit_code(self) -> int:
-        """0: a design; 1: none; 3: the search for one was cut short."""
-        return EXIT_CODES[self.verdict]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Hinged(Optimisation):
-    """Of a design that meets: with what it hinges on, None where that was not worked out."""
-
-    slack: tuple[Slack, ...] | None
-    tolerances: ToleranceVerdict | None
-    measure_next: tuple[Measurement, ...] | None
-
-
-@dataclass(frozen=True, slots=True)
-class Optimised:
-    """An optimisation with what it was made from.
-
-    designs, points: of the result, by their places in the problem's tables; verdict: the whole one
-    on the same design, where a page is wanted.
-    """
-
-    case: Case
-    problem: Problem
-    settings: OptimizeSettings
-    designs: tuple[Design, ...]
-    points: tuple[FrontPoint, ...]
-    result: Optimisation
-    verdict: Verdict | None = None
-    text: str | None = None  # of a family: the spec with its design pinned
+from syncline_design.verdict.optimise_family import optimize_family
+from syncline_design.verdict.settings import CheckSettings
+from syncline_design.verdict.tree import Caution, Word
+from syncline_design.verdict.verified import Verified, error_figures
+from syncline_design.verdict.verify import open_verdict
+from syncline_design.verdict.why_not import Asked, questions_of, refuse_scenarios, why_not
 
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
@@ -191,8 +70,6 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
         refuse_missions(case)
     if is_family(case):
         refuse_scenarios(case, settings.why_not)
-        from syncline_design.verdict.optimise_family import optimize_family
-
         return optimize_family(case, settings)
     questions = questions_of(case, settings.why_not)
     build = Simulations(settings.seed).problem_of
@@ -387,46 +264,3 @@ def _tolerances(
         return tolerance_verdict(case, problem, design, build)
     except Unfinished:
         return None
-
-
-def pinned_text(case: Case, problem: Problem, design: Design) -> str:
-    """The spec with a design pinned, for `--write-design`."""
-    return pinned_spec_text(case, *_pins(case, problem, design))
-
-
-def as_measured(case: Case, seed: int = 0) -> Case:
-    """The spec of the system that made a log: with choices open, its best design pinned."""
-    refuse_missions(case)
-    if sole_design(build_problem(case)) is not None:
-        return case
-    problem, design = picked_design(case, seed)
-    if problem.combinations == 1:
-        return case
-    return pinned_case(case, problem, design)
-
-
-def pinned_case(case: Case, problem: Problem, design: Design) -> Case:
-    """The case with a design pinned."""
-    return pinned(case, *_pins(case, problem, design))
-
-
-def _pins(case: Case, problem: Problem, design: Design) -> tuple[list[PinnedRole], dict[int, str]]:
-    """Roles and, by stage, clocks of a design."""
-    selected = selection_of(problem, design)
-    index = {stage.choice.name: stage for stage in case.stages}
-    roles = [pinned_role(index[one.stage], one) for one in selected.roles]
-    clocks = {
-        stage.index: identity
-        for stage in case.stages
-        if stage.clocks and (identity := selected.clock(stage.choice.vehicle_name)) is not None
-    }
-    return roles, clocks
-
-
-def pinned_role(stage: StageCase, one: RoleSelection) -> PinnedRole:
-    """What to write for one role; an error given in place stays, with its primitive if it has."""
-    role = stage.role(one.role)
-    assert role is not None
-    if role.inline is not None:
-        return PinnedRole(stage.index, one.role, one.sensor)
-    return PinnedRole(stage.index, one.role, one.sensor, one.primitive, one.method)

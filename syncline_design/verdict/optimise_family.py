@@ -20,16 +20,16 @@ from syncline_design.verdict.family_named import as_point, front_design, ranked,
 from syncline_design.verdict.family_others import next_best, with_stampings
 from syncline_design.verdict.missions import judged_family
 from syncline_design.verdict.named import RankedDesign
-from syncline_design.verdict.optimise import (
+from syncline_design.verdict.optimisation import (
     NO_TABLES,
     MadeFrom,
     Optimisation,
     Optimised,
     OptimizeSettings,
-    pinned_role,
 )
+from syncline_design.verdict.pinned import pinned_role
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Verdict
-from syncline_design.verdict.verify import CheckSettings
 
 LEFT_OUT = Caution(
     "missions",

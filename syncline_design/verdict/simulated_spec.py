@@ -11,7 +11,7 @@ from syncline_design.simulation import Simulation, SimulationError, simulate
 from syncline_design.simulation.results import SpecContent, SpecName
 from syncline_design.spec.case import Case
 from syncline_design.verdict.acceptance import refuse_trajectory, simulation_settings
-from syncline_design.verdict.verify import picked_design
+from syncline_design.verdict.pinned import picked_design
 
 
 @dataclass(frozen=True, slots=True)

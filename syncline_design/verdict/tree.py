@@ -17,7 +17,6 @@ from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo
 from syncline_design.simulation.figures import MissionFigures, WorstSituation
 from syncline_design.spec.requirement import JUDGED_KINDS
-from syncline_design.verdict.baseline import Baseline
 from syncline_design.verdict.likely import Estimate
 from syncline_design.verdict.named import (
     BillLine,
@@ -27,6 +26,7 @@ from syncline_design.verdict.named import (
     Nearest,
     RankedDesign,
 )
+from syncline_design.verdict.since import Baseline
 
 SCHEMA = "syncline-design/verdict/v1"
 SEVERAL_SCHEMA = "syncline-design/verdicts/v1"

@@ -18,7 +18,8 @@ from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.admitted import Kinds, admissions, homes, kinds_of, with_whole_catalog
-from syncline_design.verdict.choice_data import full_design, ruled_out_rows
+from syncline_design.verdict.choice_data import ruled_out_rows
+from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.named import Exclusion, Figure, NamedDesign
 
 # Of several ways to use an entry in one place the one that comes nearest speaks for it: what only

@@ -1,0 +1,109 @@
+"""One design to its verdict: budget, exact recheck, Monte Carlo, everything told of it."""
+
+from __future__ import annotations
+
+from syncline_design.choice.chosen_system import system_of
+from syncline_design.choice.problem import selection_of
+from syncline_design.choice.table import Design, Problem
+from syncline_design.effects.acting import known_of
+from syncline_design.machine.deadline import OutOfTime, in_force
+from syncline_design.model.budget import budget
+from syncline_design.model.system import System
+from syncline_design.simulation import CrossCheck, SimulationError, cross_check
+from syncline_design.spec.case import Case
+from syncline_design.verdict.acceptance import (
+    refuse_trajectory,
+    simulation_settings,
+)
+from syncline_design.verdict.bill import bill_of_materials
+from syncline_design.verdict.cautions import cautions
+from syncline_design.verdict.cautions_of_facts import lifecycle_cautions
+from syncline_design.verdict.design_data import (
+    assumptions,
+    named_design,
+    sources,
+    transcripts,
+    used_entries,
+)
+from syncline_design.verdict.explain import Worked, explained
+from syncline_design.verdict.held import results as held_results
+from syncline_design.verdict.measured import claim_cautions, measured
+from syncline_design.verdict.named import ChoiceResult
+from syncline_design.verdict.recheck import recheck
+from syncline_design.verdict.settings import CheckSettings
+from syncline_design.verdict.tree import Verdict
+from syncline_design.verdict.verified import (
+    Verified,
+    error_figures,
+    frame,
+    known_effects,
+    syncline_figures,
+)
+
+
+def verify(case: Case, problem: Problem, design: Design, settings: CheckSettings) -> Verified:
+    """Budget, exact recheck, Monte Carlo and every requirement of one design."""
+    system = system_of(case, problem, design)
+    known = known_of(system)
+    figures = budget(system, known)
+    exact = recheck(case, selection_of(problem, design), known)
+    found, trouble = _monte_carlo(case, system, settings)
+    results = tuple(held_results(case, system, exact, found, settings))
+    simulated = None if found is None else found.monte_carlo
+    return Verified(design, system, figures, exact, simulated, results, trouble)
+
+
+def _monte_carlo(
+    case: Case, system: System, settings: CheckSettings
+) -> tuple[CrossCheck | None, str]:
+    """The cross-check, or why there is none; a trajectory that cannot be used is bad input."""
+    if not settings.monte_carlo:
+        return None, "left out on request"
+    try:
+        in_force().doing("simulating")
+        return cross_check(system, simulation_settings(case, settings.seed)), ""
+    except OutOfTime:
+        return None, "the time limit ended it"
+    except SimulationError as error:
+        if case.spec.monte_carlo.trajectory is not None:
+            refuse_trajectory(case, str(error))
+        return None, str(error)
+
+
+def verdict_on(
+    case: Case,
+    problem: Problem,
+    verified: Verified,
+    settings: CheckSettings,
+    choice: ChoiceResult,
+) -> Verdict:
+    """The whole verdict on a verified design."""
+    entries = used_entries(case, problem, verified.design)
+    assumed = assumptions(entries)
+    figures = error_figures(verified, settings.seed, settings.monte_carlo)
+    told = sources(entries)
+    bill = bill_of_materials(case, problem, verified.design)
+    shown = named_design(case, problem, verified.design, verified.figures)
+    worked = Worked(verified.system, case.spec.sync_model, shown, figures, told)
+    asked = [row for row in verified.requirements if row.id in settings.explain]
+    return Verdict(
+        verdict=verified.word,
+        **frame(case, problem, settings.seed),
+        requirements=verified.requirements,
+        design=shown,
+        syncline=syncline_figures(verified, case.spec.sync_model),
+        monte_carlo=verified.monte_carlo,
+        warnings=(
+            *cautions(case, verified, figures, assumed, transcripts(entries)),
+            *claim_cautions(case, entries),
+            *lifecycle_cautions(entries),
+        ),
+        figures=figures,
+        assumptions=assumed,
+        sources=told,
+        effects=known_effects(verified.system),
+        choice=choice or None,
+        measured=measured(case, entries),
+        explained=explained(worked, asked) if asked else None,
+        bill_of_materials=bill,
+    )

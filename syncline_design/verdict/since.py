@@ -1,0 +1,48 @@
+"""What became of a verdict since an earlier one of the same spec, as data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from syncline_design.machine.records import Record
+
+if TYPE_CHECKING:
+    pass
+
+Since = Literal["worse", "better", "same", "new", "gone"]
+
+
+@dataclass(frozen=True, slots=True)
+class Earlier(Record):
+    """How a requirement stood in the baseline."""
+
+    status: Literal["pass", "fail", "indeterminate"]
+    value: float | None
+    limit: float
+    unit: str
+
+
+@dataclass(frozen=True, slots=True)
+class RequirementSince(Record):
+    """What became of a requirement; was: None of a new one."""
+
+    id: str
+    change: Since
+    was: Earlier | None
+
+
+@dataclass(frozen=True, slots=True)
+class Baseline(Record):
+    """What became of a spec's verdict; verdict: the earlier one, None where the file has none."""
+
+    file: str
+    verdict: Literal["meets", "fails", "infeasible", "indeterminate"] | None
+    worse: bool  # the exit code is 0 where nothing is
+    requirements: tuple[RequirementSince, ...]
+
+    def forgives(self, requirement: str) -> bool:
+        """Whether a requirement that does not pass did no better before."""
+        return any(
+            row.id == requirement and row.change in ("same", "better") for row in self.requirements
+        )
