@@ -53,10 +53,13 @@ def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-class Opened:
-    """A page with everything it said and asked for."""
+UNFOLD = "() => document.querySelectorAll('details.part').forEach(d => { d.open = true; })"
 
-    def __init__(self, browser: Any, path: Path, **options: Any) -> None:
+
+class Opened:
+    """A page with everything it said and asked for; its parts unfolded."""
+
+    def __init__(self, browser: Any, path: Path, *, unfolded: bool = True, **options: Any) -> None:
         self.context = browser.new_context(**options)
         self.page = self.context.new_page()
         self.console: list[str] = []
@@ -69,6 +72,8 @@ class Opened:
         self.page.on("requestfailed", lambda r: self.failed.update({r.url: r.failure or ""}))
         self.page.on("dialog", lambda dialog: (self.dialogs.append("x"), dialog.dismiss()))
         self.page.goto(path.as_uri())
+        if unfolded and options.get("java_script_enabled", True):
+            self.page.evaluate(UNFOLD)
 
     def __enter__(self) -> Opened:
         return self
@@ -195,7 +200,7 @@ def test_sorting_text(browser: Any, report: Path) -> None:
         page = opened.page
         page.locator("#requirements thead button").first.click()
         ids = page.eval_on_selector_all(
-            "#requirements tbody th", "all => all.map(e => e.textContent.trim())"
+            "#requirements > .scroll tbody th", "all => all.map(e => e.textContent.trim())"
         )
         assert ids == sorted(ids)
 
@@ -245,6 +250,9 @@ def test_all_is_there_without_javascript(browser: Any, report: Path) -> None:
     with Opened(browser, report, java_script_enabled=False) as opened:
         assert opened.page.is_hidden("#explorer")
         assert opened.page.locator("section:visible").count() == 13
+        assert opened.page.locator("figure svg:visible").count() == 3
+        opened.page.click("#syncline summary >> nth=0")
+        opened.page.click("#choice summary >> nth=0")
         assert opened.page.locator("figure svg:visible").count() == 5
         assert opened.page.locator("thead button").count() == 0
 

@@ -41,6 +41,218 @@
     });
   });
 
+  // Tables that stand as cards on a phone stay tables for who listens to them.
+  document.querySelectorAll(".cards table").forEach(function (table) {
+    [["thead, tbody", "rowgroup"], ["tr", "row"], ["thead th", "columnheader"], ["tbody th", "rowheader"], ["td", "cell"]]
+      .forEach(function (pair) {
+        table.querySelectorAll(pair[0]).forEach(function (part) { part.setAttribute("role", pair[1]); });
+      });
+    table.setAttribute("role", "table");
+  });
+
+  // A table that goes on beyond its frame says so.
+  function hint(frame) { frame.classList.toggle("more", frame.scrollWidth > frame.clientWidth + 1); }
+  var frames = Array.prototype.slice.call(document.querySelectorAll(".scroll, .inner"));
+  if (window.ResizeObserver) {
+    var watch = new ResizeObserver(function (seen) { seen.forEach(function (one) { hint(one.target); }); });
+    frames.forEach(function (frame) { watch.observe(frame); });
+  } else { frames.forEach(hint); }
+
+  // A part that a link leads to is opened.
+  function open() {
+    var place = location.hash.length > 1 ? document.getElementById(decodeURIComponent(location.hash.slice(1))) : null;
+    if (!place) { return; }
+    place.querySelectorAll("details.part").forEach(function (part) { part.open = true; });
+    for (var at = place.parentElement; at; at = at.parentElement) { if (at.tagName === "DETAILS") { at.open = true; } }
+    place.scrollIntoView();
+  }
+  window.addEventListener("hashchange", open);
+  document.querySelectorAll("nav a, .banner a").forEach(function (link) {
+    link.addEventListener("click", function () { window.setTimeout(open, 0); });
+  });
+  open();
+
+  // Figures: what a point or a bar says shows under the pointer, and by arrow keys.
+  var SVG = "http://www.w3.org/2000/svg";
+
+  function span(text, bold) {
+    var piece = document.createElement(bold ? "b" : "span");
+    piece.textContent = text;
+    return piece;
+  }
+
+  function tips(drawing) {
+    var data = JSON.parse(drawing.dataset.points), svg = drawing.querySelector("svg");
+    drawing.removeAttribute("data-points");
+    var rows = data.rows, size = svg.viewBox.baseVal, shown = -1, tip = null, ring = null;
+    var order = rows.map(function (_, k) { return k; }).sort(function (a, b) {
+      return rows[a][0] - rows[b][0] || rows[a][1] - rows[b][1];
+    });
+
+    function hide() {
+      if (tip) { tip.remove(); ring.remove(); tip = ring = null; }
+      shown = -1;
+    }
+
+    function show(index) {
+      if (index === shown) { return; }
+      hide();
+      shown = index;
+      var row = rows[index], scale = svg.clientWidth / size.width || drawing.clientWidth / size.width;
+      ring = document.createElementNS(SVG, "rect");
+      var room = row[2] || row[3] ? 1.5 : 5.5;
+      [["x", row[0] - room], ["y", row[1] - room], ["width", row[2] + 2 * room], ["height", row[3] + 2 * room],
+        ["rx", row[2] || row[3] ? 1 : room], ["class", "here"]].forEach(function (pair) { ring.setAttribute(pair[0], pair[1]); });
+      svg.appendChild(ring);
+      tip = document.createElement("div");
+      tip.className = "tip";
+      tip.setAttribute("role", "status");
+      drawing.appendChild(tip);
+      data.labels.forEach(function (label, k) {
+        var value = row[4 + k];
+        if (value === "") { return; }
+        var line = document.createElement("div");
+        line.append(span(label + " ", false), span(value, true));
+        tip.appendChild(line);
+      });
+      var x = (row[0] + Math.min(row[2], size.width / 2)) * scale, y = row[1] * scale;
+      var left = Math.max(0, Math.min(x + 10, drawing.clientWidth - tip.offsetWidth));
+      var top = y - tip.offsetHeight - 10;
+      tip.style.left = left + "px";
+      tip.style.top = (top < -40 ? (row[1] + row[3]) * scale + 12 : top) + "px";
+    }
+
+    function nearest(event) {
+      var frame = svg.getBoundingClientRect(), scale = frame.width / size.width;
+      var x = (event.clientX - frame.left) / scale, y = (event.clientY - frame.top) / scale;
+      var best = -1, least = 16 / scale;
+      rows.forEach(function (row, k) {
+        var dx = Math.max(row[0] - x, 0, x - row[0] - row[2]), dy = Math.max(row[1] - y, 0, y - row[1] - row[3]);
+        var away = Math.hypot(dx, dy) + 0.001 * Math.hypot(row[2], row[3]);
+        if (away < least) { least = away; best = k; }
+      });
+      return best;
+    }
+
+    function follow(event) {
+      var index = nearest(event);
+      if (index < 0) { hide(); } else { show(index); }
+    }
+
+    function step(event) {
+      var at = order.indexOf(shown), last = order.length - 1, next;
+      switch (event.key) {
+        case "ArrowRight": case "ArrowDown": next = Math.min(at + 1, last); break;
+        case "ArrowLeft": case "ArrowUp": next = at < 0 ? last : Math.max(at - 1, 0); break;
+        case "Home": next = 0; break;
+        case "End": next = last; break;
+        case "Escape": hide(); return;
+        default: return;
+      }
+      event.preventDefault();
+      show(order[next]);
+    }
+
+    drawing.tabIndex = 0;
+    drawing.setAttribute("role", "group");
+    drawing.setAttribute("aria-label", (svg.querySelector("title") || svg).textContent + ": arrow keys go through its " + rows.length + " points");
+    drawing.addEventListener("pointermove", follow);
+    drawing.addEventListener("pointerdown", follow);
+    drawing.addEventListener("pointerleave", hide);
+    drawing.addEventListener("keydown", step);
+    drawing.addEventListener("blur", hide);
+  }
+
+  document.querySelectorAll(".drawing[data-points]").forEach(tips);
+
+  // To take away: figures as SVG and PNG, tables as CSV, made here from what the page holds.
+  function stem() { return document.title.toLowerCase().replace(/[^a-z0-9]+/g, "-").replace(/^-|-$/g, "").slice(0, 60) || "report"; }
+
+  function save(blob, name) {
+    var link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = name;
+    link.click();
+    window.setTimeout(function () { URL.revokeObjectURL(link.href); }, 1000);
+  }
+
+  // A copy that stands alone: colours of the theme that is shown, sizes and a ground of its own.
+  function alone(svg) {
+    var copy = svg.cloneNode(true), theme = getComputedStyle(document.documentElement), box = svg.viewBox.baseVal;
+    copy.querySelectorAll(".here").forEach(function (ring) { ring.remove(); });
+    copy.querySelectorAll("[style]").forEach(function (part) {
+      part.setAttribute("style", part.getAttribute("style")
+        .replace(/calc\((\d+(?:\.\d+)?px)[^)]*\)\)/g, "$1")
+        .replace(/var\((--[a-z0-9-]+)\)/g, function (_, name) { return theme.getPropertyValue(name).trim(); }));
+    });
+    var ground = document.createElementNS(SVG, "rect");
+    [["width", box.width], ["height", box.height], ["fill", theme.getPropertyValue("--surface").trim()]].forEach(function (pair) {
+      ground.setAttribute(pair[0], pair[1]);
+    });
+    copy.insertBefore(ground, copy.querySelector("g"));
+    copy.setAttribute("width", box.width);
+    copy.setAttribute("height", box.height);
+    return new XMLSerializer().serializeToString(copy);
+  }
+
+  function picture(svg, done) {
+    var box = svg.viewBox.baseVal, image = new Image(), scale = 3;
+    image.onload = function () {
+      var canvas = document.createElement("canvas");
+      canvas.width = Math.round(box.width * scale);
+      canvas.height = Math.round(box.height * scale);
+      canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height);
+      canvas.toBlob(done, "image/png");
+    };
+    image.src = "data:image/svg+xml;charset=utf-8," + encodeURIComponent(alone(svg));
+  }
+
+  function field(cell) {
+    var copy = cell.querySelector(".cell") || cell;
+    var text = copy.textContent.replace(/[\u00a0\s]+/g, " ").trim();
+    if (/^[=+@\t-]/.test(text) && isNaN(Number(text.split(" ")[0]))) { text = "'" + text; }
+    return /[",\n]/.test(text) ? '"' + text.replace(/"/g, '""') + '"' : text;
+  }
+
+  function csv(table) {
+    return Array.prototype.map.call(table.rows, function (row) {
+      return Array.prototype.map.call(row.cells, field).join(",");
+    }).join("\r\n") + "\r\n";
+  }
+
+  function offer(choices) {
+    var row = document.createElement("p");
+    row.className = "take";
+    choices.forEach(function (choice) {
+      var button = document.createElement("button");
+      button.type = "button";
+      button.textContent = choice[0];
+      button.setAttribute("aria-label", "Save " + choice[1] + " as " + choice[0]);
+      button.addEventListener("click", choice[2]);
+      row.appendChild(button);
+    });
+    return row;
+  }
+
+  document.querySelectorAll("figure").forEach(function (figure) {
+    var svg = figure.querySelector("svg"), name = (svg.getAttribute("aria-labelledby") || "figure").split(" ")[0].replace(/-title$/, "");
+    var title = svg.querySelector("title").textContent;
+    figure.querySelector(".beneath").prepend(offer([
+      ["SVG", title, function () { save(new Blob([alone(svg)], { type: "image/svg+xml" }), stem() + "-" + name + ".svg"); }],
+      ["PNG", title, function () { picture(svg, function (blob) { save(blob, stem() + "-" + name + ".png"); }); }]
+    ]));
+  });
+  frames.forEach(function (frame) {
+    var table = frame.querySelector("table"), title = frame.getAttribute("aria-label");
+    var row = offer([["CSV", title, function () {
+      var name = title.toLowerCase().replace(/[^a-z0-9]+/g, "-").slice(0, 50);
+      save(new Blob([csv(table)], { type: "text/csv" }), stem() + "-" + name + ".csv");
+    }]]), before = frame.previousElementSibling;
+    var over = before && /^H[23]$/.test(before.tagName) && table.querySelector("caption .unseen");
+    row.classList.toggle("over", Boolean(over));
+    frame.insertAdjacentElement(over ? "beforebegin" : "afterend", row);
+  });
+
   // Sliders: tau and the target move the operating point and recolour the verdict.
   var form = document.getElementById("explorer");
   if (!form) { return; }

@@ -12,6 +12,7 @@ from syncline_design.report.palette import GRID, MUTED
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+LETTER, GAP = 5.8, 7.0  # width of a letter of a label, and between two labels [SVG units]
 _SUPERSCRIPT = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
@@ -51,15 +52,25 @@ def log_ticks(low: float, high: float, most: int = 7) -> list[float]:
 
 
 def set_ticks(
-    axes: Axes, which: Literal["x", "y"], ticks: Iterable[float], label: Callable[[float], str]
-) -> None:
-    """Fixed major ticks with the given labels; no minor ones."""
+    axes: Axes, which: Literal["x", "y"], ticks: Iterable[float], label: Callable[[float], str],
+    room: float = 270.0,
+) -> None:  # fmt: skip
+    """Fixed major ticks with the given labels; no minor ones.
+
+    Along x, of labels that would run into one another only every second, third ... stays.
+    room: width of the axes [SVG units].
+    """
     from matplotlib.ticker import FixedFormatter, FixedLocator, NullLocator
 
     places = list(ticks)
     axis = axes.xaxis if which == "x" else axes.yaxis
+    labels = [label(place) for place in places]
+    if which == "x" and len(labels) > 1:
+        widest = LETTER * max(len(text) for text in labels) + GAP
+        step = max(1, math.ceil(widest * (len(labels) - 1) / room))
+        labels = [text if i % step == 0 else "" for i, text in enumerate(labels)]
     axis.set_major_locator(FixedLocator(places))
-    axis.set_major_formatter(FixedFormatter([label(place) for place in places]))
+    axis.set_major_formatter(FixedFormatter(labels))
     axis.set_minor_locator(NullLocator())
 
 

@@ -74,13 +74,13 @@ def _priced(
         rows.append((
             _money(entry.cost, currency),
             Cell(numbers.length(entry.error_m), entry.error_m),
-            Cell(_sensors(entry.design), tone=shown[1], mark=shown[0]), *ways,
+            Cell(sensors(entry.design), tone=shown[1], mark=shown[0]), *ways,
         ))  # fmt: skip
     heads = ("Cost #", "Error #", "Design", "Ways of stamping it")[: len(rows[0]) if rows else 0]
     return table(caption, heads, rows) if rows else None
 
 
-def _sensors(design: NamedDesign) -> str:
+def sensors(design: NamedDesign) -> str:
     """A design as its sensors: `u-blox F9P (gpio), SBG Apogee (gpio)`."""
     return ", ".join(f"{entry.name} ({entry.timestamping})" for _, _, entry in design.roles)
 

@@ -127,11 +127,15 @@ class Explorer:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Nodes that belong together: an article, a column, side by side (`split`, `pair`), folded."""
+    """Nodes that belong together: an article, a column, side by side, folded.
+
+    split: three parts to two; pair: two in a row; trio: three in a row where there is room; alone:
+    a figure with its words and values beside it.
+    """
 
     kind: ClassVar = "group"
     nodes: tuple[Node, ...]
-    look: Literal["article", "column", "split", "pair", "fold"] = "column"
+    look: Literal["article", "column", "split", "pair", "trio", "alone", "fold"] = "column"
     key: str = ""
     summary: str = ""  # of a fold
     reach: Reach = "everywhere"
@@ -142,13 +146,17 @@ Node: TypeAlias = "Heading | Text | Facts | Items | TableNode | Chart | Explorer
 
 @dataclass(frozen=True, slots=True)
 class Section:
-    """A titled part; key: its anchor, label: its word in the contents list."""
+    """A titled part; key: its anchor, label: its word in the contents list.
+
+    folded: a page shows its title, and the rest when it is asked for.
+    """
 
     key: str
     title: str
     label: str
     nodes: tuple[Node, ...]
     reach: Reach = "everywhere"
+    folded: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.palette import BAD, GOOD, INK, LINE, MUTED, SERIES, SHADE, SURFACE, WARN
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH = 440.0  # SVG units; shown near their size on a desk, still readable on a phone
+WIDTH = 344.0  # SVG units: on a phone, 390 px wide, text of 10 units is 11 px high
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +169,9 @@ def _target_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
         clip_on=False,
     )[0]
     point.set_gid("operating-point")
+    tell(axes, 1.0 / max(curve.tau_s, low), 1.0 / curve.total_m,
+         [("Design at \u03c4", numbers.time(curve.tau_s)),
+          ("Error", numbers.length(curve.total_m))])  # fmt: skip
 
 
 def _syncline_labels(axes: Axes) -> None:
@@ -241,21 +244,15 @@ def _tau_row(axes: Axes, row: int, bar: TauBar, low: float, high: float) -> None
     colour = GOOD if bar.within else BAD
     end = max(bar.tau_s, low)
     crit = bar.tau_crit_s or high
-    axes.plot([low, high], [row, row], color=SHADE, linewidth=13, solid_capstyle="butt", zorder=1)
-    axes.plot([low, end], [row, row], color=colour, linewidth=13, solid_capstyle="butt", zorder=2)
+    axes.barh(row, high - low, left=low, height=0.5, color=SHADE, zorder=1)
+    axes.barh(row, end - low, left=low, height=0.5, color=colour, zorder=2)
+    used = [("Used", numbers.percent(bar.tau_s / bar.tau_crit_s))] if bar.tau_crit_s else []
+    tell(axes, (low, end), (row - 0.25, row + 0.25),
+         [("Sensor", bar.label), ("\u03c4", numbers.time(bar.tau_s)),
+          ("\u03c4_crit", numbers.time_limit(bar.tau_crit_s)), *used])  # fmt: skip
     if bar.tau_crit_s:
         axes.plot([crit, crit], [row - 0.4, row + 0.4], color=INK, linewidth=2.2, zorder=4)
-    word = "\u2713" if bar.within else "\u2717"
-    axes.annotate(
-        word,
-        (min(end, high / 1.5), row),
-        xytext=(6, 0),
-        textcoords="offset points",
-        va="center",
-        color=colour,
-        fontweight="bold",
-        zorder=5,
-    )
+    beside(axes, row, "\u2713" if bar.within else "\u2717")
 
 
 @dataclass(frozen=True, slots=True)
@@ -271,16 +268,22 @@ _HATCH = {"sensor": "", "sync": "///", "systematic": "xxx", "underway": "..."}
 
 
 def ledger(
-    terms: Sequence[LedgerBar], target_m: float | None, name: str = "fig-ledger"
+    terms: Sequence[LedgerBar],
+    target_m: float | None,
+    name: str = "fig-ledger",
+    total_m: float | None = None,
 ) -> InlineFigure:
-    """The terms as a waterfall that adds up to the total, with the target."""
-    total = math.fsum(t.value_m for t in terms)
+    """The terms as a waterfall that adds up to the total, with the target.
+
+    total_m: with terms that are too small to be shown; by default the sum of those that are.
+    """
+    total = math.fsum(t.value_m for t in terms) if total_m is None else total_m
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        _waterfall(axes, terms)
-        axes.set_ylim(len(terms) + 0.6, -0.9)
-        axes.set_xlim(0, 1.22 * max(total, target_m or 0.0) or 1.0)
+        _waterfall(axes, terms, total)
+        axes.set_ylim(len(terms) + 0.6, -0.6)
+        axes.set_xlim(0, 1.04 * max(total, target_m or 0.0) or 1.0)
         if target_m:
             _mark_target(axes, target_m)
         labels = [*(t.label for t in terms), "total"]
@@ -293,12 +296,12 @@ def ledger(
     spoken += f"; total {numbers.length(total)}"
     if target_m:
         spoken += f"; target {numbers.length(target_m)}"
-    size = (WIDTH, 66.0 + 22.0 * (len(terms) + 1))
+    size = (WIDTH, 54.0 + 20.0 * (len(terms) + 1))
     return draw(name, "Terms that add up to the total error", spoken, size, build)
 
 
-def _waterfall(axes: Axes, terms: Sequence[LedgerBar]) -> None:
-    """Each term's bar starts where the one before ends; the last bar is their sum."""
+def _waterfall(axes: Axes, terms: Sequence[LedgerBar], total: float) -> None:
+    """Each term's bar starts where the one before ends; the last bar is the total."""
     start = 0.0
     for row, term in enumerate(terms):
         colour = {"sensor": SERIES[0], "sync": SERIES[1]}.get(term.kind, SERIES[3])
@@ -307,15 +310,25 @@ def _waterfall(axes: Axes, terms: Sequence[LedgerBar]) -> None:
             linewidth=0.8, hatch=_HATCH.get(term.kind, ""), zorder=3,
         )  # fmt: skip
         start += term.value_m
-        _beside(axes, start, row, numbers.length(term.value_m, 3))
-    axes.barh(len(terms), start, height=0.62, color=INK, zorder=3)
-    _beside(axes, start, len(terms), numbers.length(start, 4))
+        beside(axes, row, numbers.length(term.value_m, 3))
+        share = numbers.percent(term.value_m / total) if total else numbers.MISSING
+        tell(
+            axes,
+            (start - term.value_m, start),
+            (row - 0.31, row + 0.31),
+            [("Term", term.label), ("Error", numbers.length(term.value_m)), ("Share", share)],
+        )
+    axes.barh(len(terms), total, height=0.62, color=INK, zorder=3)
+    beside(axes, len(terms), numbers.length(total, 4))
+    tell(axes, (0.0, total), (len(terms) - 0.31, len(terms) + 0.31),
+         [("Term", "total"), ("Error", numbers.length(total))])  # fmt: skip
 
 
-def _beside(axes: Axes, x: float, row: float, text: str) -> None:
+def beside(axes: Axes, row: float, text: str) -> None:
+    """A bar's value in the column right of the axes, where no line runs."""
     axes.annotate(
-        text, (x, row), xytext=(5, 0), textcoords="offset points", va="center", color=INK,
-        zorder=5, bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.5},
+        text, (1.0, row), xycoords=("axes fraction", "data"), xytext=(5, 0),
+        textcoords="offset points", va="center", color=INK, annotation_clip=False,
     )  # fmt: skip
 
 
@@ -325,11 +338,12 @@ def _mark_target(axes: Axes, target_m: float) -> None:
         f"target {numbers.length(target_m, 4)}",
         (target_m, 1.0),
         xycoords=("data", "axes fraction"),
-        xytext=(-4, -2),
+        xytext=(0, 2),
         textcoords="offset points",
         ha="right",
-        va="top",
+        va="bottom",
         color=WARN,
+        annotation_clip=False,
     )
 
 
@@ -344,4 +358,5 @@ def _length_ticks(axes: Axes) -> None:
         "x",
         [t for t in ticks if 0 <= t <= high],
         lambda value: "0" if value == 0 else scales.short_length(value),
+        room=150.0,
     )

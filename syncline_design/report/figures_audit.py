@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Final
 from syncline_design.auditing.result import StampFault, StreamAudit
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
+from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, MUTED, SERIES, SHADE, WARN
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH: Final = 440.0
 ROW: Final = 76.0
 MOST_MARKS: Final = 30
 MOST_LETTERS: Final = 34
@@ -55,6 +55,10 @@ def _faults(axes: Axes, row: StreamAudit) -> None:
     """Episodes as a shade, moments as a line; what concerns the whole stream is in its name."""
     for fault in [f for f in row.faults if f.from_s is not None][:MOST_MARKS]:
         begin = fault.from_s or 0.0
+        tell(axes, (begin, fault.to_s or begin), axes.get_ylim(), [
+            ("Stream", row.name), ("Fault", fault.fault), ("From", f"{begin:.3f} s"),
+            ("To", "" if fault.to_s is None else f"{fault.to_s:.3f} s"),
+        ])  # fmt: skip
         colour = BAD if fault.counts else MUTED
         axes.axvline(begin, color=colour, linewidth=1.1, linestyle=(0, (4, 2)))
         if fault.to_s is not None and fault.to_s > begin and _is_episode(fault):
@@ -66,7 +70,7 @@ def _faults(axes: Axes, row: StreamAudit) -> None:
         axes.annotate(
             name, (first.from_s or 0.0, 0.97 - 0.17 * (k % 5)),
             xycoords=("data", "axes fraction"), xytext=(3, 0), textcoords="offset points",
-            color=BAD if first.counts else MUTED, va="top", fontsize=8, zorder=6,
+            color=BAD if first.counts else MUTED, va="top", zorder=6,
         )  # fmt: skip
 
 
@@ -83,12 +87,11 @@ def _labels(axes: Axes, row: StreamAudit, *, last: bool) -> None:
     name = row.name if len(row.name) <= MOST_LETTERS else "\u2026" + row.name[-MOST_LETTERS:]
     mark = "\u2713" if row.sound else "\u2717"
     title = f"{mark} {name}" + (f": {', '.join(dict.fromkeys(whole))}" if whole else "")
-    axes.set_title(title, loc="left", fontsize=9, color=WARN if not row.sound else MUTED)
+    axes.set_title(title, loc="left", color=WARN if not row.sound else MUTED)
     low, high = axes.get_ylim()
     ticks = [float(t) for t in MaxNLocator(3).tick_values(low, high) if low <= t <= high]
     scales.set_ticks(axes, "y", ticks, lambda v: "0" if v == 0 else numbers.time(v, 3))
     scales.grid(axes, "y")
-    axes.tick_params(labelsize=8)
     if last:
         axes.set_xlabel("seconds of receipt since the first message")
     else:

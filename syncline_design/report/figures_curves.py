@@ -10,7 +10,7 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import INK, MUTED, SERIES, SURFACE
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def synclines(
         axes.set_xlim(1.0 / max(taus), 1.0 / min(taus))
         axes.set_ylim(0.8 / max(errors), 2.2 / min(errors))
         _ticks(axes)
-        axes.legend(loc="lower right", fontsize=9, handlelength=3.2)
+        axes.legend(loc="lower right", handlelength=3.2)
         return axes
 
     return draw(name, title, _spoken(curves, simulated), (WIDTH, 300.0), build)
@@ -82,6 +82,10 @@ def _curve(axes: Axes, curve: LabelledCurve, index: int, legend: str) -> None:
     )  # fmt: skip
     if curve.tau_crit_s:
         place = (1.0 / curve.tau_crit_s, 1.0 / (2.0 * curve.roof_m))
+        tell(axes, *place, [
+            ("System", curve.label), ("\u03c4_crit", numbers.time(curve.tau_crit_s)),
+            ("Roof", numbers.length(curve.roof_m)),
+        ])  # fmt: skip
         axes.plot(*place, marker="|", markersize=13, markeredgewidth=2, color=colour, zorder=4)
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
-from syncline_design.report.palette import INK, MUTED, SERIES, SURFACE
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.figures import WIDTH, beside
+from syncline_design.report.palette import MUTED, SERIES
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
@@ -91,16 +91,22 @@ def gap_staircase(
         axes = add_axes(figure)
         for row, step in enumerate(steps):
             axes.barh(row, step.rms_m, height=0.6, color=SERIES[0] if row else MUTED, zorder=3)
-            _beside(axes, step.rms_m, row)
-        axes.set_xlim(0, 1.25 * max([floor_m or 0.0, *(step.rms_m for step in steps)]) or 1.0)
+            beside(axes, row, numbers.length(step.rms_m, 3))
+            tell(
+                axes,
+                (0.0, step.rms_m),
+                (row - 0.3, row + 0.3),
+                [("After", step.label), ("RMS held out", numbers.length(step.rms_m))],
+            )
+        axes.set_xlim(0, 1.05 * max([floor_m or 0.0, *(step.rms_m for step in steps)]) or 1.0)
         if floor_m:
             _mark_floor(axes, floor_m)
-        axes.set_ylim(len(steps) - 0.4, -0.9)
+        axes.set_ylim(len(steps) - 0.4, -0.6)
         labels = [shortened(step.label, 30) for step in steps]
         scales.set_ticks(axes, "y", range(len(labels)), lambda row: labels[int(row)])
         scales.hide_ticks(axes, "y")
         scales.set_ticks(axes, "x", _linear(axes.get_xlim()[1]),
-                         lambda v: "0" if v == 0 else scales.short_length(v))  # fmt: skip
+                         lambda v: "0" if v == 0 else scales.short_length(v), 150.0)  # fmt: skip
         scales.grid(axes, "x")
         axes.set_xlabel("RMS of the residual on held-out data")
 
@@ -111,19 +117,12 @@ def gap_staircase(
     return draw(name, "Gap on held-out data, step by step", spoken, size, build)
 
 
-def _beside(axes: Axes, rms_m: float, row: int) -> None:
-    axes.annotate(
-        numbers.length(rms_m, 3), (rms_m, row), xytext=(5, 0), textcoords="offset points",
-        va="center", color=INK, zorder=5,
-        bbox={"facecolor": SURFACE, "edgecolor": "none", "pad": 0.5},
-    )  # fmt: skip
-
-
 def _mark_floor(axes: Axes, floor_m: float) -> None:
     axes.axvline(floor_m, color=SERIES[2], linewidth=1.6, linestyle=(0, (5, 3)), zorder=4)
     axes.annotate(
         f"floor {numbers.length(floor_m, 3)}", (floor_m, 1.0), xycoords=("data", "axes fraction"),
-        xytext=(4, -2), textcoords="offset points", va="top", color=SERIES[2],
+        xytext=(0, 2), textcoords="offset points", va="bottom", ha="center", color=SERIES[2],
+        annotation_clip=False,
     )  # fmt: skip
 
 
@@ -154,6 +153,11 @@ def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigu
             scores = [score for *_, score in entry.cells]
             axes.stairs(scores, edges, fill=True, color=SERIES[0], alpha=0.5)
             axes.stairs(scores, edges, color=SERIES[0], linewidth=1.2)
+            for low, high, score in entry.cells:
+                tell(axes, (low, high), (0.0, score), [
+                    (entry.covariate.replace("_", " "), f"{low:.3g} to {high:.3g} {entry.unit}"),
+                    ("Standard errors", f"{score:.3g}"),
+                ])  # fmt: skip
             axes.axhline(3.0, color=MUTED, linewidth=1, linestyle=(0, (3, 2)))
             axes.set_ylim(0, 1.08 * max(top, 4.0))
             unit = f" [{entry.unit}]" if entry.unit else ""
@@ -186,6 +190,17 @@ def coverage(
                   linewidth=1.2, label="before")  # fmt: skip
         axes.plot(nominal, [row[2] for row in rows], color=SERIES[0], marker="o", markersize=4.5,
                   linewidth=1.8, label="after")  # fmt: skip
+        for share, before, after in rows:
+            tell(
+                axes,
+                share,
+                after,
+                [
+                    ("Nominal", numbers.percent(share)),
+                    ("Before", numbers.percent(before)),
+                    ("After", numbers.percent(after)),
+                ],
+            )
         axes.set_xlim(0, 1.02)
         axes.set_ylim(0, 1.02)
         quarters = (0.0, 0.25, 0.5, 0.75, 1.0)

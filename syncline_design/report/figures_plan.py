@@ -13,7 +13,7 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import MUTED, SERIES
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -34,7 +34,11 @@ def path(run: PlanRun) -> InlineFigure:
             if own.size:
                 rows = np.unique(np.r_[own[::step], own[-1], min(own[-1] + 1, len(leg) - 1)])
                 axes.plot(east[rows], north[rows], color=SERIES[k % len(SERIES)], linewidth=1.4)
-                axes.text(east[own[0]], north[own[0]], f" {k + 1}", fontsize=9)
+                tell(axes, float(east[own[0]]), float(north[own[0]]), [
+                    ("Leg", str(k + 1)), ("Begins at", f"{east[own[0]]:.1f} m east, "
+                                          f"{north[own[0]]:.1f} m north"),
+                ])  # fmt: skip
+                axes.text(east[own[0]], north[own[0]], f" {k + 1}")
         axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
                   "x", color=MUTED, markersize=4)  # fmt: skip
         axes.plot(east[:1], north[:1], "o", color=SERIES[0], markersize=4.5)
@@ -62,6 +66,9 @@ def after(found: Plan) -> InlineFigure:
         for k, key in enumerate(keys):
             axes.plot(legs, _ratios(found, key), marker="o", markersize=3.5,
                       color=SERIES[k % len(SERIES)], label=key)  # fmt: skip
+            for leg, ratio in zip(legs, _ratios(found, key), strict=True):
+                tell(axes, leg, min(ratio, FAR), [("Leg", str(leg)), ("Effect", key),
+                     ("Sigma over asked", f"{ratio:.3g}")])  # fmt: skip
         axes.axhline(1.0, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
         low, high = 0.8 * min(*ratios, 1.0), 1.25 * max(*ratios, 1.0)
@@ -70,7 +77,7 @@ def after(found: Plan) -> InlineFigure:
         axes.set_xticks(legs)
         axes.set_xlabel("leg")
         axes.set_ylabel("sigma / asked")
-        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.24), ncols=2, fontsize=8)
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.24), ncols=2)
         scales.grid(axes, "y")
 
     last = "; ".join(f"{key} {_ratios(found, key)[-1]:.2g}" for key in keys)

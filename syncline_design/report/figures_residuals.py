@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from syncline_design.report import figures_diagnosis as drawings
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import INK, MUTED, SERIES
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,6 +67,15 @@ def track_map(track: Track, name: str = "fig-track") -> InlineFigure:
                 angles="xy", scale_units="xy", scale=1.0, color=colour, width=0.005,
                 label=label, zorder=3,
             )  # fmt: skip
+        for arrow in track.arrows:
+            sizes = (
+                math.hypot(arrow.before_east_m, arrow.before_north_m),
+                math.hypot(arrow.after_east_m, arrow.after_north_m),
+            )
+            tell(axes, arrow.east_m, arrow.north_m, [
+                ("Mean residual before", numbers.length(sizes[0], 3)),
+                ("after", numbers.length(sizes[1], 3)),
+            ])  # fmt: skip
         axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.1)
         axes.set_xlabel("east [m]")
@@ -124,6 +134,10 @@ def _against(
     axes.plot(*zip(*before, strict=True), color=MUTED, marker="s", markersize=3, label="before")
     axes.plot(*zip(*after, strict=True), color=SERIES[0], marker="o", markersize=3, label="after")
     unit = "s" if covariate == "time" else UNITS[covariate]
+    for word, found in (("before", before), ("after", after)):
+        for middle, size in found:
+            tell(axes, middle, size, [(covariate.replace("_", " "), f"{middle:.3g} {unit}"),
+                 ("Residuals", word), ("RMS", numbers.length(size, 3))])  # fmt: skip
     axes.set_xlabel(f"{covariate.replace('_', ' ')} [{unit}]")
     axes.set_ylabel("RMS")
     top = 1.08 * max(size for _, size in (*before, *after)) or 1.0
@@ -147,6 +161,9 @@ def spectrum(found: Spectrum, name: str = "fig-spectrum") -> InlineFigure:
         axes.plot(found.frequency_hz, found.power, color=SERIES[0], marker="o", markersize=3,
                   linewidth=1.4, label="what is left")  # fmt: skip
         axes.axhline(1.0, color=INK, linewidth=0.8)
+        for hertz, power, most in zip(found.frequency_hz, found.power, found.most, strict=True):
+            tell(axes, hertz, power, [("Frequency", f"{hertz:.3g} Hz"), ("Power", f"{power:.3g}"),
+                 ("White noise seldom exceeds", f"{most:.3g}")])  # fmt: skip
         axes.set_xscale("log")
         low, high = found.frequency_hz[0], found.frequency_hz[-1]
         scales.set_ticks(axes, "x", scales.one_two_five(low, high)[::2], lambda v: f"{v:g}")
@@ -173,6 +190,9 @@ def normal(found: NormalPlot, name: str = "fig-normal") -> InlineFigure:
         axes.plot(ends, ends, color=MUTED, linewidth=1, linestyle=(0, (3, 2)), label="normal")
         axes.plot(found.normal, found.remainder, color=SERIES[0], marker="o", markersize=3.5,
                   linewidth=1.2, label="what is left")  # fmt: skip
+        for normal_at, at in zip(found.normal, found.remainder, strict=True):
+            tell(axes, normal_at, at, [("Standard normal", f"{normal_at:.2f}"),
+                 ("What is left", f"{at:.2f}")])  # fmt: skip
         axes.set_xlabel("quantile of the standard normal")
         axes.set_ylabel("quantile, in its own sigma")
         axes.legend(loc="upper left")

@@ -10,11 +10,16 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, GOOD, INK, LINE, MUTED, SERIES, SURFACE, WARN
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+
+FAR = 30.0  # times the largest error of a front: beyond it no other design is drawn
+LEVEL = 0.075  # of the height of a distribution: what a line of text takes
+LETTER = 0.0185  # of its width: what a letter takes
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,9 +39,13 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineFigure:
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         top = max(data.density, default=1.0) or 1.0
+        for density, low, high in zip(data.density, data.edges_m, data.edges_m[1:], strict=False):
+            tell(axes, (low, high), (0.0, density), [
+                ("Error", f"{numbers.length(low, 3)} to {numbers.length(high, 3)}"),
+                ("Share of samples", numbers.percent(density * (high - low), 3)),
+            ])  # fmt: skip
         axes.stairs(data.density, data.edges_m, fill=True, color=SERIES[0], alpha=0.35, zorder=2)
         axes.stairs(data.density, data.edges_m, color=SERIES[0], linewidth=1.4, zorder=3)
-        axes.set_ylim(0, 1.42 * top)
         vertical = [*data.marks]
         colours = [INK] * len(vertical)
         for word, value, colour in (
@@ -46,9 +55,9 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineFigure:
             if value is not None:
                 vertical.append((word, value))
                 colours.append(colour)
-        right = max([data.edges_m[-1], *(value for _, value in vertical)]) * 1.05
-        axes.set_xlim(min(data.edges_m[0], 0.0), right)
-        _vertical_marks(axes, vertical, colours, right)
+        axes.set_ylim(0, top / (0.96 - LEVEL * len(vertical)))
+        axes.set_xlim(min(data.edges_m[0], 0.0), _room_for(vertical, data.edges_m[-1]))
+        _vertical_marks(axes, vertical, colours)
         _plain_length_axis(axes)
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
@@ -58,33 +67,38 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineFigure:
     for word, value in (("target", data.target_m), ("Syncline", data.syncline_m)):
         if value is not None:
             spoken += f"; {word} at {numbers.length(value)}"
-    return draw(name, "Distribution of the simulated error", spoken, (WIDTH, 250.0), build)
+    return draw(name, "Distribution of the simulated error", spoken, (WIDTH, 205.0), build)
+
+
+def _room_for(marks: Sequence[tuple[str, float]], last: float) -> float:
+    """Right end of an axis from 0 on which every mark's label has room to its right."""
+    ends = [
+        value / (1.0 - LETTER * (len(_label(*mark)) + 1)) for mark in marks for value in mark[1:]
+    ]
+    return max([1.02 * last, *ends])
+
+
+def _label(word: str, value_m: float) -> str:
+    return f"{word} {numbers.length(value_m, 3)}"
 
 
 def _vertical_marks(
-    axes: Axes, marks: Sequence[tuple[str, float]], colours: Sequence[str], right: float
-) -> None:
-    """Labelled vertical lines, labels on four levels so that near ones do not cover each other."""
+    axes: Axes, marks: Sequence[tuple[str, float]], colours: Sequence[str]
+) -> None:  # fmt: skip
+    """Labelled vertical lines; each label right of its own, above every line further right."""
     top = axes.get_ylim()[1]
     ordered = sorted(zip(marks, colours, strict=True), key=lambda item: item[0][1])
     for index, ((word, value), colour) in enumerate(ordered):
-        level = 0.985 - 0.07 * (index % 4)
+        level = 0.985 - LEVEL * index
         solid = colour != INK
         axes.plot(
             [value, value], [0, level * top], color=colour, linewidth=1.6 if solid else 1.0,
             linestyle="-" if solid else (0, (3, 2)), zorder=4,
         )  # fmt: skip
-        on_right = value < 0.72 * right
         axes.annotate(
-            f"{word} {numbers.length(value, 3)}",
-            (value, level * top),
-            xytext=(4 if on_right else -4, 0),
-            textcoords="offset points",
-            ha="left" if on_right else "right",
-            va="top",
-            color=colour,
-            zorder=6,
-        )
+            _label(word, value), (value, level * top), xytext=(4, 1), textcoords="offset points",
+            ha="left", va="top", color=colour, zorder=6,
+        )  # fmt: skip
 
 
 def _plain_length_axis(axes: Axes) -> None:
@@ -120,6 +134,12 @@ def simulated_against_syncline(
         _accuracies(upper, shown)
         inverse = [1.0 / p.tau_s for p in shown]
         lower.axhline(1.0, color=MUTED, linewidth=1)
+        for point, ratio in zip(shown, ratios, strict=True):
+            says = [("\u03c4", numbers.time(point.tau_s)),
+                    ("Simulated worst case", numbers.length(point.worst_m)),
+                    ("Syncline", numbers.length(point.syncline_m)),
+                    ("Ratio", numbers.percent(ratio))]  # fmt: skip
+            tell(upper, 1.0 / point.tau_s, 1.0 / point.worst_m, says)
         lower.plot(inverse, ratios, color=SERIES[1], marker="o", markersize=3.5, linewidth=1)
         lower.set_ylabel("ratio")
         lower.set_xlabel("synchronisation accuracy 1/\u03c4 [1/s]")
@@ -157,11 +177,12 @@ def _accuracies(axes: Axes, shown: Sequence[GridPoint]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FrontMark:
-    """One Pareto-optimal design."""
+    """One design; words: its sensors and how each is stamped, where known."""
 
     cost: float
     error_m: float
     chosen: bool
+    words: str = ""
 
 
 def pareto_front(
@@ -171,15 +192,19 @@ def pareto_front(
     cost_limit: float | None,
     name: str = "fig-front",
     beside: tuple[float, float] | None = None,
+    cloud: Sequence[FrontMark] = (),
 ) -> InlineFigure:
     """The exact front of cost against error as a staircase, the chosen design on it.
 
-    beside: cost and error of the design that is nearest to what is asked.
+    beside: cost and error of the design that is nearest to what is asked; cloud: other designs.
     """
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
+        _cloud(axes, cloud, points, currency)
         _staircase(axes, points, cost_limit)
+        for point in points:
+            tell(axes, point.cost, point.error_m, _says(point, currency))
         errors = [*(p.error_m for p in points), *([target_m] if target_m else [])]
         if beside is not None:
             errors.append(beside[1])
@@ -195,6 +220,24 @@ def pareto_front(
 
     title = "Pareto front of cost against error"
     return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
+
+
+def _cloud(
+    axes: Axes, cloud: Sequence[FrontMark], front: Sequence[FrontMark], currency: str
+) -> None:  # fmt: skip
+    """Other designs, as far as they lie near the front: a quiet dot each."""
+    most = FAR * max(p.error_m for p in front)
+    shown = [p for p in cloud if p.error_m <= most]
+    axes.plot([p.cost for p in shown], [p.error_m for p in shown], "o", color=MUTED, alpha=0.35,
+              markersize=3, markeredgewidth=0, zorder=1)  # fmt: skip
+    for point in shown:
+        tell(axes, point.cost, point.error_m, _says(point, currency))
+
+
+def _says(point: FrontMark, currency: str) -> list[tuple[str, str]]:
+    named = [("Design", point.words)] if point.words else []
+    return [*named, ("Price", numbers.money(point.cost, currency)),
+            ("Error", numbers.length(point.error_m))]  # fmt: skip
 
 
 def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None) -> None:

@@ -14,16 +14,17 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 from syncline_design.report.text import shortened
 from syncline_design.studies.record import CasePoint
-from syncline_design.studies.scatter import Scatter, ScatterAxis
+from syncline_design.studies.scatter import Scatter, ScatterAxis, ScatterPoint
 from syncline_design.studies.summary import HeatMap
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+Says = Sequence[Sequence[tuple[str, str]]]  # of every point: labels and values
 _FAINT, _STRONG = 0.08, 0.5  # opacity of the cheapest and the dearest cell: text stays readable
 MOST_TEXT = 8  # cells across in which the cost itself still fits
 
@@ -37,6 +38,12 @@ def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineFigure:
         for y, row in enumerate(heat.least_cost):
             for x, cost in enumerate(row):
                 _cell(axes, (x, y), cost, costs, len(row))
+                tell(axes, (x - 0.5, x + 0.5), (y - 0.5, y + 0.5), [
+                    (heat.x, heat.x_values[x]), (heat.y, heat.y_values[y]),
+                    ("Least cost", "no case is known to meet" if cost is None
+                     else numbers.money(cost, heat.currency)),
+                    ("Payload", heat.payload[y][x]),
+                ])  # fmt: skip
         axes.set_xlim(-0.5, len(heat.x_values) - 0.5)
         axes.set_ylim(-0.5, len(heat.y_values) - 0.5)
         _label_axis(axes, "x", heat.x_values)
@@ -74,7 +81,8 @@ def _cell(
     )  # fmt: skip
     axes.add_patch(Rectangle(corner, 1, 1, facecolor="none", edgecolor=SURFACE, linewidth=1.2))
     if across <= MOST_TEXT:
-        axes.text(x, y, _thousands(cost), ha="center", va="center", color=INK, fontsize=9)
+        axes.text(x, y, _thousands(cost), ha="center", va="center", color=INK,
+                  gid=f"cell-{x}-{y}")  # fmt: skip
 
 
 def _thousands(cost: float) -> str:
@@ -117,6 +125,11 @@ def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts")
             axes.step(x, y, where="post", color=colour, linestyle=style, linewidth=1.8,
                       label=shortened(front.label, 44))  # fmt: skip
             axes.plot(x[:-1], y[:-1], "o", color=colour, markersize=3.5)
+            for point in front.points:
+                tell(axes, point.cost, point.error_m, [
+                    ("Front", front.label), ("Price", numbers.money(point.cost, currency)),
+                    ("Error", numbers.length(point.error_m)),
+                ])  # fmt: skip
         axes.set_xlim(max(0.0, min(costs) - 0.08 * span), right)
         axes.margins(y=0.12)
         low, high = axes.get_ylim()
@@ -125,7 +138,7 @@ def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts")
         _count_axis(axes)
         axes.set_xlabel(f"cost [{currency}]")
         axes.set_ylabel("Syncline error")
-        figure.legend(loc="outside lower left", ncols=1, fontsize=9)
+        figure.legend(loc="outside lower left", ncols=1)
 
     errors = [point.error_m for front in shown for point in front.points]
     spoken = (
@@ -144,6 +157,8 @@ def _count_axis(axes: Axes) -> None:
     scales.set_ticks(axes, "x", places, numbers.count)
 
 
+SHAPES = "osD^vP"
+STEP = 0.06  # of opacity: finer nobody sees
 _VERDICTS = (  # verdicts, marker, colour, word
     (("fails", "infeasible"), "x", BAD, "does not meet"),
     (("indeterminate",), "^", WARN, "no verdict"),
@@ -151,8 +166,10 @@ _VERDICTS = (  # verdicts, marker, colour, word
 )
 
 
-def sampled_cases(data: Scatter, currency: str, name: str = "fig-sampled") -> InlineFigure:
-    """Computed cases over two factors: discs meet, the stronger the dearer; crosses do not."""
+def sampled_cases(
+    data: Scatter, currency: str, says: Says = (), name: str = "fig-sampled"
+) -> InlineFigure:
+    """Cases over two factors: filled ones meet, the stronger the dearer; crosses do not."""
     meeting = [point for point in data.points if point.verdict == "meets"]
     costs = [point.cost for point in meeting if point.cost is not None]
 
@@ -163,21 +180,40 @@ def sampled_cases(data: Scatter, currency: str, name: str = "fig-sampled") -> In
             if chosen:
                 axes.plot(*zip(*chosen, strict=True), marker, color=colour, markersize=5,
                           label=f"{word} ({len(chosen)})")  # fmt: skip
-        for index, point in enumerate(meeting):
-            label = f"meets ({len(meeting)})" if index == 0 else None
-            axes.plot(point.x, point.y, "o", markersize=7, markerfacecolor=SERIES[0],
-                      markeredgecolor="none", alpha=_strength(point.cost, costs))  # fmt: skip
-            axes.plot(point.x, point.y, "o", markersize=7, markerfacecolor="none",
-                      markeredgecolor=SERIES[0], markeredgewidth=0.8, label=label)  # fmt: skip
+        _meeting(axes, data, meeting, costs)
+        for point, words in zip(data.points, says, strict=False):
+            tell(axes, point.x, point.y, words)
         _scatter_axis(axes, "x", data.x)
         _scatter_axis(axes, "y", data.y)
         scales.grid(axes)
         _cost_scale(figure, costs, currency)
-        figure.legend(loc="outside lower left", ncols=4, fontsize=9)
+        figure.legend(loc="outside lower left", ncols=2)
 
     spoken = f"{len(meeting)} of {len(data.points)} sampled cases meet their requirements."
     height = 360.0 if not data.y.words else 190.0 + 40.0 * len(data.y.words)
     return draw(name, "Sampled cases over two factors", spoken, (WIDTH, height), build)
+
+
+def _meeting(
+    axes: Axes, data: Scatter, meeting: Sequence[ScatterPoint], costs: Sequence[float]
+) -> None:  # fmt: skip
+    """Cases that meet: a shape for each value of what else varies, all of one strength at once."""
+    groups: dict[tuple[int, float], list[ScatterPoint]] = {}
+    for point in meeting:
+        strength = round(_strength(point.cost, costs) / STEP) * STEP
+        groups.setdefault((point.kind, strength), []).append(point)
+    for (kind, strength), points in groups.items():
+        places = [p.x for p in points], [p.y for p in points]
+        shape = SHAPES[kind % len(SHAPES)]
+        axes.plot(*places, shape, markersize=7, markerfacecolor=SERIES[0],
+                  markeredgecolor="none", alpha=strength)  # fmt: skip
+        axes.plot(*places, shape, markersize=7, markerfacecolor="none",
+                  markeredgecolor=SERIES[0], markeredgewidth=0.8)  # fmt: skip
+    for kind in sorted({kind for kind, _ in groups}):
+        count = sum(p.kind == kind for p in meeting)
+        which = f": {shortened(data.kinds[kind], 26)}" if data.kinds else ""
+        axes.plot([], [], SHAPES[kind % len(SHAPES)], markersize=7, markerfacecolor="none",
+                  markeredgecolor=SERIES[0], label=f"meets{which} ({count})")  # fmt: skip
 
 
 def _scatter_axis(axes: Axes, which: Literal["x", "y"], axis: ScatterAxis) -> None:
@@ -221,5 +257,5 @@ def _cost_scale(figure: Figure, costs: Sequence[float], currency: str) -> None:
     ]
     words = [f"{_thousands(cost)}" for cost in steps]
     words[-1] += f" {currency}"
-    figure.legend(patches, words, loc="outside upper left", ncols=5, fontsize=9,
-                  handlelength=1.6, columnspacing=1.0)  # fmt: skip
+    figure.legend(patches, words, loc="outside upper left", ncols=5,
+                  handlelength=1.2, columnspacing=0.8, handletextpad=0.4)  # fmt: skip

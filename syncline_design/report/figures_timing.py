@@ -10,7 +10,7 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import MUTED, SERIES, SHADE
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -82,14 +82,17 @@ def sessions(
     rows: sessions with their numbers.
     """
     numbered = [number for number, _ in rows]
+    label = f"{numbers.percent(coverage)} of a session"
     values = [row.quantile_s or 0.0 for _, row in rows]
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         axes.plot(numbered, values, linestyle="none", marker="o", markersize=4.5,
-                  color=SERIES[0], label=f"{numbers.percent(coverage)} of a session")  # fmt: skip
-        for k, (label, value) in enumerate(bounds):
-            axes.axhline(value, color=SERIES[1 + k], linewidth=1.3, label=label,
+                  color=SERIES[0], label=label)  # fmt: skip
+        for number, value in zip(numbered, values, strict=True):
+            tell(axes, number, value, [("Session", str(number)), (label, numbers.time(value))])
+        for k, (name, value) in enumerate(bounds):
+            axes.axhline(value, color=SERIES[1 + k], linewidth=1.3, label=name,
                          linestyle=((0, (5, 3)), (0, (2, 2)))[k % 2])  # fmt: skip
         _log_times(axes, "y", [v for v in (*values, *(b for _, b in bounds)) if v > 0.0])
         axes.set_xlabel("session")
@@ -130,6 +133,9 @@ def stability(points: Sequence[StabilityPoint]) -> InlineFigure:
             axes.plot([t for t, _ in values], [v for _, v in values], color=SERIES[k],
                       marker="os"[k], markersize=3.5, linewidth=1.6, label=label)  # fmt: skip
             drawn += [v for _, v in values]
+            for over, value in values:
+                tell(axes, over, value, [("Curve", label), ("Over", numbers.time(over)),
+                     ("Value", numbers.time(value))])  # fmt: skip
         _log_times(axes, "x", [p.tau_s for p in points])
         _log_times(axes, "y", drawn)
         axes.set_xlabel("averaging time, or length of the window")

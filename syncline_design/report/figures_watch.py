@@ -11,14 +11,15 @@ from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, MUTED, SERIES
-from syncline_design.report.svg import InlineFigure, add_axes, draw
+from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 Key = tuple[str, str, str, str]  # effect, sensor, stage, parameter
-ACROSS: Final = 3
+ACROSS: Final = 2
 HEIGHT: Final = 118.0  # of a row of panels
 MOST: Final = 1e12
 
@@ -31,6 +32,8 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineFigure:
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
         axes.plot(numbers_of, values, marker="o", markersize=3.5, color=SERIES[0])
+        for run, value in zip(numbers_of, values, strict=True):
+            tell(axes, run, value, [("Run", str(run)), ("e-value", f"{value:.3g}")])
         axes.axhline(threshold, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
         low, high = 0.7 * min(values), 2.0 * max(*values, threshold)
@@ -69,6 +72,11 @@ def _panel(axes: Axes, runs: Sequence[WatchedRun], key: Key, since: int | None) 
     colour = BAD if since is not None else SERIES[0]
     for run, v in shown:
         low, high = v.interval95 or (0.0, 0.0)
+        tell(axes, run, v.value / scale, [
+            ("Run", str(run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
+            ("Value", f"{v.value / scale:.4g} {unit}"),
+            ("95 % interval", f"{low / scale:.4g} to {high / scale:.4g} {unit}"),
+        ])  # fmt: skip
         axes.plot([run, run], [low / scale, high / scale], color=colour, linewidth=1.2)
     axes.plot([run for run, _ in shown], [v.value / scale for _, v in shown], "o", color=colour,
               markersize=2.8)  # fmt: skip
@@ -76,11 +84,10 @@ def _panel(axes: Axes, runs: Sequence[WatchedRun], key: Key, since: int | None) 
     if since is not None:
         axes.axvline(since - 0.5, color=BAD, linewidth=1.0, linestyle=(0, (4, 3)))
     effect, sensor, _, parameter = key
-    title = f"{effect.replace('_', ' ')} ({sensor})"
-    axes.set_title(title, fontsize=7.5, loc="left", pad=3)
-    axes.set_ylabel(f"{parameter.rpartition('_')[0] or parameter}{f', {unit}' if unit else ''}",
-                    fontsize=7)  # fmt: skip
-    axes.tick_params(labelsize=7)
+    title = shortened(f"{effect.replace('_', ' ')} ({sensor})", 26)
+    axes.set_title(title, loc="left", pad=3)
+    figure, _, _ = parameter.rpartition("_")
+    axes.set_ylabel(f"{figure or parameter}{f', {unit}' if unit else ''}")
     _whole_ticks(axes, [r.run for r in runs])
     axes.margins(x=0.06)
 

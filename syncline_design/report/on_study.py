@@ -96,8 +96,21 @@ def _sampled(summary: StudySummary) -> list[Node]:
     found = scatter(summary)
     if found is None:
         return []
-    draw = partial(figures_study.sampled_cases, found, currency)
+    several = varied(summary)
+    says = [_says(summary.briefs[point.number - 1], several) for point in found.points]
+    draw = partial(figures_study.sampled_cases, found, currency, says)
     return [Chart("sampled", draw, _sampled_caption(found))]
+
+
+def _says(brief: Brief, several: list[tuple[int, Factor]]) -> list[tuple[str, str]]:
+    """A case in words: number, setting, answer, price, error, payload."""
+    setting = [(factor.key, brief.labels[i]) for i, factor in several]
+    found = [("Case", str(brief.number)), *setting, ("Verdict", brief.verdict)]
+    if brief.cost is not None:
+        found.append(("Price", numbers.money(brief.cost, brief.currency)))
+    if brief.error_m is not None:
+        found.append(("Error", numbers.length(brief.error_m)))
+    return [*found, ("Payload", ", ".join(pick.name for pick in brief.picks))]
 
 
 def _ends(summary: StudySummary) -> list[Node]:

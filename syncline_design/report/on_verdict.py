@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncline_design.choice.outcome import ROADS
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from syncline_design.choice.outcome import Conflict, Fix, Members
     from syncline_design.verdict.tree import Checked, Refused, Verdict
 
+OPEN = ("infeasibility", "requirements", "missions", "baseline", "explained", "warnings")
 MOST_OPEN = 12  # rows of a table of the choice that is not folded away
 _PROVEN = muted(" (solved again to prove it)")
 
@@ -65,7 +67,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
     """
     if verdict.verdict == "refused":
         return _on_refused(verdict)
-    return Document(
+    return folded(Document(
         family="Design report",
         outcome=verdict_words.outcome(verdict),
         name=verdict.name,
@@ -75,7 +77,7 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
             *section("infeasibility", "Why no design meets the requirements", _why_not(verdict),
                      "Why not"),
             *section("requirements", "Requirements",
-                     show(verdict_tables.requirements(verdict), silent=True)),
+                     _at_a_glance(verdict)),
             *section("missions", "Missions", missions(verdict), "Missions"),
             *section("robustness", "What robustness costs", robustness(verdict), "Robustness"),
             *section("baseline", "Against the baseline", _since(verdict), "Baseline"),
@@ -96,7 +98,24 @@ def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
             *_provenance(verdict),
         ),
         source=verdict.file,
+    ))  # fmt: skip
+
+
+def folded(document: Document) -> Document:
+    """What answers stays open on a page; what it rests on opens when asked for."""
+    parts = (replace(part, folded=part.key not in OPEN) for part in document.sections)
+    return replace(document, sections=tuple(parts))
+
+
+def _at_a_glance(verdict: Verdict) -> list[Node]:
+    """Requirements, and in three figures where the error comes from, its timing, its spread."""
+    total = None if verdict.syncline is None else verdict.syncline.total_m
+    spread = [] if verdict.monte_carlo is None else histogram_chart(verdict.monte_carlo, total)
+    figures = (
+        *verdict_figures.ledger_chart(verdict), *verdict_figures.timing_chart(verdict), *spread,
     )  # fmt: skip
+    table = show(verdict_tables.requirements(verdict), silent=True)
+    return [*table, *([Group(figures, "trio", reach="page")] if figures else [])]
 
 
 def _since(verdict: Verdict) -> list[Node]:
@@ -242,7 +261,7 @@ def _timing(verdict: Verdict) -> list[Node]:
     lead = ("A sensor whose \u03c4 stays below its \u03c4_crit is limited by its own noise, not by "
             "its timestamps.")  # fmt: skip
     return [
-        Text(lead), *verdict_figures.timing_chart(verdict), *show(table, silent=True),
+        Text(lead), *show(table, silent=True),
         *show(verdict_tables.measured(verdict)),
     ]  # fmt: skip
 
@@ -275,7 +294,7 @@ def _ledger(verdict: Verdict) -> list[Node]:
     if verdict.syncline is None:
         return []
     table = verdict_tables.ledger(verdict.syncline)
-    return [*verdict_figures.ledger_chart(verdict), *show(table, silent=True)]
+    return show(table, silent=True)
 
 
 def _simulation(verdict: Verdict) -> list[Node]:
@@ -283,11 +302,9 @@ def _simulation(verdict: Verdict) -> list[Node]:
     if monte_carlo is None:
         return []
     told = (certificate(monte_carlo), ensemble(monte_carlo), BEYOND)
-    total = None if verdict.syncline is None else verdict.syncline.total_m
     return [
         Facts(tuple(simulation_facts(monte_carlo))),
         *(Text(text, quiet=True) for text in told),
-        Group(tuple(histogram_chart(monte_carlo, total)), "pair"),
         *show(quantiles(monte_carlo)),
     ]
 

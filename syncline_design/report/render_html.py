@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import re
+from dataclasses import replace
 from functools import lru_cache
 from importlib.resources import files
 from typing import TYPE_CHECKING, Any, Final
 
 from syncline_design.report.document import Document, charts, for_output, spans
+from syncline_design.report.layout import laid_out
+from syncline_design.report.table import Table, table
 from syncline_design.report.text import visible
 
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+    from syncline_design.report.svg import InlineFigure
+
 _TEMPLATES: Final = "syncline_design.templates"
+MOST_VALUES: Final = 200  # rows of the table below a figure; more are shown one by one
 _STEP: Final = re.compile(r"(?<=[\w\]])(?=[.\[])")
 
 
@@ -38,6 +45,8 @@ def _filled(document: Document, template: str, style: str, **more: str) -> str:
     from markupsafe import Markup
 
     shown = for_output(document, "page")
+    parts = tuple(replace(part, nodes=laid_out(part.nodes)) for part in shown.sections)
+    shown = replace(shown, sections=parts)
     drawn = {c.name: c.draw() for part in shown.sections for c in charts(part.nodes)}
     page = _environment().get_template(f"{template}.html.j2")
     return page.render(d=shown, drawn=drawn, style=Markup(_asset(style)), **more).lstrip()
@@ -49,11 +58,14 @@ def _asset(name: str) -> str:
 
 
 def content_security_policy(script: str) -> str:
-    """A policy that allows inline styles, exactly this script, and no network at all."""
+    """A policy that allows inline styles, exactly this script, and no network at all.
+
+    Pictures may come from the page itself: a figure becomes one on its way into a file.
+    """
     digest = base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
     return (
         f"default-src 'none'; style-src 'unsafe-inline'; script-src 'sha256-{digest}'; "
-        "img-src 'none'; connect-src 'none'; base-uri 'none'; form-action 'none'"
+        "img-src data:; connect-src 'none'; base-uri 'none'; form-action 'none'"
     )
 
 
@@ -76,8 +88,33 @@ def _environment() -> Environment:
     )
     environment.filters["spans"] = spans
     environment.filters["breakable"] = _breakable
+    environment.filters["points"] = _points
+    environment.filters["values"] = _values
     environment.filters["drawing"] = Markup  # matplotlib has escaped the texts in it
     return environment
+
+
+def _points(figure: InlineFigure) -> str:
+    """What the places of a figure say, for the page's script: labels, then a row a place."""
+    labels = _labels(figure)
+    rows = [
+        [t.left, t.top, t.wide, t.high, *(t.says.get(label, "") for label in labels)]
+        for t in figure.told
+    ]
+    return json.dumps({"labels": labels, "rows": rows}, ensure_ascii=False, separators=(",", ":"))
+
+
+def _values(figure: InlineFigure, caption: str) -> Table | None:
+    """The same as a table; None of a figure that says nothing, or more than anyone reads."""
+    if not 0 < len(figure.told) <= MOST_VALUES:
+        return None
+    labels = _labels(figure)
+    rows = ([t.says.get(label, "") for label in labels] for t in figure.told)
+    return table(caption, labels, rows)
+
+
+def _labels(figure: InlineFigure) -> list[str]:
+    return list(dict.fromkeys(label for t in figure.told for label in t.says))
 
 
 def _breakable(text: str) -> Any:

@@ -1,4 +1,8 @@
-"""A matplotlib figure as inline SVG: themed, labelled for screen readers, the same every time."""
+"""A matplotlib figure as inline SVG: themed, labelled for screen readers, the same every time.
+
+What a point or a bar is can be told with it (`tell`): pages show it under the pointer, by arrow
+keys and as a table below the figure.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +10,16 @@ import io
 import math
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Literal
 from xml.etree import ElementTree
 
 from syncline_design.report.matplotlib_import import load_matplotlib
-from syncline_design.report.palette import INK, MUTED, VARIABLES
+from syncline_design.report.palette import INK, MUTED, SURFACE, VARIABLES
+from syncline_design.report.text import visible
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,13 +30,16 @@ _XLINK: Final = "http://www.w3.org/1999/xlink"
 _HREF: Final = f"{{{_XLINK}}}href"
 _COLOUR: Final = re.compile(r"#[0-9a-f]{6}")
 _REFERENCE: Final = re.compile(r"url\(#([^)]+)\)")
+_SIZE: Final = re.compile(r"(\d+(?:\.\d+)?)px")
 _DPI: Final = 72.0  # one figure pixel is one SVG unit
+_SHARP: Final = 216.0  # dots per inch of a picture in pixels: three a unit
 _STYLE: Final[dict[str, Any]] = {
     "svg.fonttype": "none",
     "svg.hashsalt": "syncline-design",
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
     "font.size": 10,
+    "axes.titlesize": "medium",
     "axes.edgecolor": MUTED,
     "axes.labelcolor": INK,
     "axes.linewidth": 0.8,
@@ -61,20 +71,53 @@ class LogBox:
     log_top: float
 
 
+Pairs = Mapping[str, str]  # what a place in a figure says: label, value
+Ends = tuple[float, float]
+Build = Callable[["Figure"], "Axes | None"]
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A place in a figure, in SVG units from its left upper corner, and what it says.
+
+    wide, high: of a bar, whose corner the place then is.
+    """
+
+    left: float
+    top: float
+    wide: float
+    high: float
+    says: Pairs
+
+
 @dataclass(frozen=True, slots=True)
 class InlineFigure:
-    """An `<svg>` element as text, and the box of its main axes where that is log-log."""
+    """An `<svg>` element as text, and the box of its main axes where that is log-log.
+
+    exported: the figure as a file of its own, on a ground and in colours of its own.
+    """
 
     svg: str
     box: LogBox | None = None
+    told: tuple[Told, ...] = ()
+    exported: Callable[[Literal["svg", "png"]], bytes] | None = None
+
+
+_Note = tuple["Axes", Ends, Ends, Pairs]
+_NOTES: ContextVar[list[_Note]] = ContextVar("notes")
+
+
+def tell(
+    axes: Axes, x: float | Ends, y: float | Ends, says: Sequence[tuple[str, str]]
+) -> None:  # fmt: skip
+    """Say what stands at a point of the axes, or over a span of them where x, y have two ends."""
+    ends_x = x if isinstance(x, tuple) else (x, x)
+    ends_y = y if isinstance(y, tuple) else (y, y)
+    _NOTES.get().append((axes, ends_x, ends_y, dict(says)))
 
 
 def draw(
-    name: str,
-    title: str,
-    description: str,
-    size: tuple[float, float],
-    build: Callable[[Figure], Axes | None],
+    name: str, title: str, description: str, size: tuple[float, float], build: Build
 ) -> InlineFigure:
     """Draw one figure with the house style and return it as an `<svg>` element.
 
@@ -82,11 +125,25 @@ def draw(
     size: width and height in SVG units.  build: draws into the figure; returns the axes whose
     box the page's script needs, or None.
     """
+
+    def exported(kind: Literal["svg", "png"]) -> bytes:
+        with _drawn(size, build) as (figure, _):
+            return _saved(figure, kind, _DPI if kind == "svg" else _SHARP, SURFACE)
+
+    with _drawn(size, build) as (figure, axes):
+        text = _saved(figure, "svg", _DPI, "none").decode("utf-8")
+        box = None if axes is None else _log_box(figure, axes)
+        told = tuple(_places(size[1], _NOTES.get()))
+    return InlineFigure(_themed(text, name, title, description), box, told, exported)
+
+
+@contextmanager
+def _drawn(size: tuple[float, float], build: Build) -> Iterator[tuple[Figure, Axes | None]]:
+    """A figure in the house style, and the axes that its maker returned."""
     load_matplotlib()
     from matplotlib import rc_context, rcdefaults, rcParams
     from matplotlib.figure import Figure
 
-    stream = io.StringIO()
     style: Any = _STYLE
     with rc_context(), warnings.catch_warnings():
         rcdefaults()  # whatever the user's own settings are
@@ -94,10 +151,30 @@ def draw(
         # A name may hold characters the metrics font lacks; the browser's font draws them.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         figure = Figure(figsize=(size[0] / _DPI, size[1] / _DPI), dpi=_DPI, layout="constrained")
-        axes = build(figure)
-        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
-        box = None if axes is None else _log_box(figure, axes)
-    return InlineFigure(_themed(stream.getvalue(), name, title, description), box)
+        kept = _NOTES.set([])
+        try:
+            yield figure, build(figure)
+        finally:
+            _NOTES.reset(kept)
+
+
+def _saved(figure: Figure, kind: Literal["svg", "png"], dpi: float, ground: str) -> bytes:
+    """The figure as a file, without its date and maker: the same every time."""
+    stream = io.BytesIO()
+    unsaid = {"Date": None, "Creator": None} if kind == "svg" else {"Software": None}
+    figure.savefig(stream, format=kind, metadata=unsaid, dpi=dpi, facecolor=ground)
+    return stream.getvalue()
+
+
+def _places(height: float, notes: Sequence[_Note]) -> Iterator[Told]:
+    """Where in the drawn figure the noted places lie."""
+    for axes, (x0, x1), (y0, y1), says in notes:
+        a, b = axes.transData.transform([(x0, y0), (x1, y1)])
+        left, right = sorted((float(a[0]), float(b[0])))
+        low, top = sorted((float(a[1]), float(b[1])))
+        shown = {label: visible(value) for label, value in says.items()}
+        yield Told(round(left, 1), round(height - top, 1), round(right - left, 1),
+                   round(top - low, 1), shown)  # fmt: skip
 
 
 def add_axes(figure: Figure, *position: int) -> Axes:
@@ -167,6 +244,8 @@ def _theme(root: ElementTree.Element) -> None:
         if style is None:
             continue
         themed = _COLOUR.sub(lambda found: _variable(found.group()), style)
+        if element.tag == f"{{{_SVG}}}text":  # smaller where the page draws the figure larger
+            themed = _SIZE.sub(r"calc(\1px * var(--fig-text, 1))", themed)
         element.set("style", themed)
 
 

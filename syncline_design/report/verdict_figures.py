@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from syncline_design.report import choice_tables, verdict_tables, verdict_words
@@ -110,11 +111,12 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
         from syncline_design.report import figures
 
         terms = []
-        for entry in entries:
+        for entry in verdict_words.larger(entries):
             stage = f"{shortened(entry.stage, 14)}: " if many and entry.stage else ""
             label = stage + shortened(verdict_words.term_text(entry))
             terms.append(figures.LedgerBar(label, entry.value_m, entry.kind))
-        return figures.ledger(terms, lowest_limit(verdict, "accuracy"))
+        total = math.fsum(entry.value_m for entry in entries)
+        return figures.ledger(terms, lowest_limit(verdict, "accuracy"), total_m=total)
 
     caption = (
         "Terms add up to the total. Plain: sensor noise. Hatched: synchronisation. Crossed: known "
@@ -127,10 +129,11 @@ def choice_chart(verdict: Verdict) -> list[Node]:
     """The exact front of cost against error, the chosen design on it."""
     front = () if verdict.choice is None else verdict.choice.front or ()
     points = [
-        (entry.cost, entry.error_m, choice_tables.is_chosen(verdict, entry))
+        (entry.cost, entry.error_m, choice_tables.is_chosen(verdict, entry),
+         choice_tables.sensors(entry.design))
         for entry in front
         if entry.cost is not None and entry.error_m
-    ]
+    ]  # fmt: skip
 
     def draw() -> InlineFigure:
         from syncline_design.report.figures_results import FrontMark, pareto_front

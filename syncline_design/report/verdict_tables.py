@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import (
     kind_text,
+    larger,
     margin_text,
     relative_margin,
     selection_reason,
@@ -193,9 +195,21 @@ def ledger(syncline: SynclineFigures) -> Table:
             Cell(numbers.length(entry.value_m), entry.value_m),
             Cell(numbers.percent(entry.share), entry.share),
         )
-        for entry in syncline.ledger
+        for entry in larger(syncline.ledger)
     ]
-    return table("Terms of the total error", ("Term", "Stage", "Kind", "Value #", "Share #"), rows)
+    heads = ("Term", "Stage", "Kind", "Value #", "Share #")
+    return table("Terms of the total error", heads, rows, _too_small(syncline))
+
+
+def _too_small(syncline: SynclineFigures) -> str:
+    """What the terms without a row come to."""
+    shown = larger(syncline.ledger)
+    rest = math.fsum(e.value_m for e in syncline.ledger) - math.fsum(e.value_m for e in shown)
+    count = len(syncline.ledger) - len(shown)
+    if not count:
+        return ""
+    words = "1 term is" if count == 1 else f"{count} terms are"
+    return f"{words} below 0.1 % of the total and have no row; together {numbers.length(rest)}."
 
 
 def models(syncline: SynclineFigures) -> Table:

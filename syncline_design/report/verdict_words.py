@@ -36,6 +36,14 @@ if TYPE_CHECKING:
     )
 
 
+SEEN_SHARE = 0.001  # of the total: smaller terms have no row
+
+
+def larger(entries: Sequence[LedgerRow]) -> list[LedgerRow]:
+    """The terms that are not too small to be seen; all of them where nothing is."""
+    return [e for e in entries if abs(e.share) >= SEEN_SHARE] or list(entries)
+
+
 def outcome(verdict: Checked) -> Outcome:
     """The verdict's outcome.
 

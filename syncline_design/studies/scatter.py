@@ -8,6 +8,7 @@ from syncline_design.spec.yaml_text import plain_scalar
 from syncline_design.studies.definition import Factor, figure_of
 from syncline_design.studies.summary import StudySummary, axis_values, varied
 
+MOST_KINDS = 4  # values of a further factor that shapes can tell apart
 LOG_SPAN = 30.0  # an axis whose ends differ by more than this factor is logarithmic
 
 
@@ -23,22 +24,31 @@ class ScatterAxis:
 
 @dataclass(frozen=True, slots=True)
 class ScatterPoint:
-    """One case: where it lies, how it ended, what its design costs."""
+    """One case: where it lies, how it ended, what its design costs, its number.
+
+    kind: the place of its value of what else varies, 0 where that is not one factor of a few.
+    """
 
     x: float
     y: float
     verdict: str
     cost: float | None
+    number: int = 0
+    kind: int = 0
 
 
 @dataclass(frozen=True, slots=True)
 class Scatter:
-    """Every case of a study in the plane of two factors; others: what varies besides."""
+    """Every case of a study in the plane of two factors; others: what varies besides.
+
+    kinds: the values of that, where it is one factor with a few.
+    """
 
     x: ScatterAxis
     y: ScatterAxis
     points: tuple[ScatterPoint, ...]
     others: tuple[str, ...]
+    kinds: tuple[str, ...] = ()
 
 
 def scatter(summary: StudySummary) -> Scatter | None:
@@ -51,17 +61,28 @@ def scatter(summary: StudySummary) -> Scatter | None:
         return None
     (across, first), (up, second) = chosen
     x, y = _axis(first), _axis(second)
+    others = [(i, f) for i, f in varied(summary) if i not in (across, up)]
+    kinds = _kinds(others)
     points = tuple(
         ScatterPoint(
             _place(x, brief.labels[across]),
             _place(y, brief.labels[up]),
             brief.verdict,
             brief.cost if brief.meets else None,
+            brief.number,
+            kinds.index(brief.labels[others[0][0]]) if kinds else 0,
         )
         for brief in summary.briefs
     )
-    others = tuple(f.key for i, f in varied(summary) if i not in (across, up))
-    return Scatter(x, y, points, others)
+    return Scatter(x, y, points, tuple(f.key for _, f in others), kinds)
+
+
+def _kinds(others: list[tuple[int, Factor]]) -> tuple[str, ...]:
+    """The values of the one other factor, where they are few enough to be told apart."""
+    if len(others) != 1:
+        return ()
+    values = axis_values(others[0][1])
+    return values if len(values) <= MOST_KINDS else ()
 
 
 def _axes(summary: StudySummary) -> tuple[tuple[int, Factor], tuple[int, Factor]] | None:

@@ -1,0 +1,64 @@
+"""How the nodes of a page stand beside one another: figures two in a row, or beside their table.
+
+Done once for every page, so that no subject has to lay itself out.  On a narrow page all of it
+stands one below the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import groupby
+from typing import Final
+
+from syncline_design.report.document import Chart, Group, Node, TableNode
+
+BESIDE: Final = 4  # columns of a table that fits into half a page
+ROWS: Final = 14  # of a table that is not much longer than a figure is high
+
+
+def laid_out(nodes: Sequence[Node]) -> tuple[Node, ...]:
+    """The same nodes: figures in a grid, a single one beside its table or its values."""
+    return tuple(_beside(list(_grids(_inner(nodes)))))
+
+
+def _inner(nodes: Iterable[Node]) -> Iterator[Node]:
+    for node in nodes:
+        if isinstance(node, Group) and node.look in ("article", "column", "fold"):
+            yield replace(node, nodes=laid_out(node.nodes))
+        elif isinstance(node, Group) and node.look == "pair" and len(node.nodes) == 1:
+            yield node.nodes[0]
+        else:
+            yield node
+
+
+def _grids(nodes: Iterable[Node]) -> Iterator[Node]:
+    """Charts that follow one another as one group."""
+    for is_chart, run in groupby(nodes, lambda node: isinstance(node, Chart)):
+        together = tuple(run)
+        if is_chart and len(together) > 1:
+            yield Group(together, "pair", reach="page")
+        else:
+            yield from together
+
+
+def _beside(nodes: Sequence[Node]) -> Iterator[Node]:
+    """A single chart with the small table that follows it."""
+    place = 0
+    while place < len(nodes):
+        node, after = nodes[place], nodes[place + 1 : place + 2]
+        if isinstance(node, Chart) and after and _small(after[0]):
+            yield Group((node, *after), "pair", reach="page")
+            place += 2
+        elif isinstance(node, Chart):
+            yield Group((node,), "alone", reach="page")
+            place += 1
+        else:
+            yield node
+            place += 1
+
+
+def _small(node: Node) -> bool:
+    if not isinstance(node, TableNode):
+        return False
+    return len(node.table.heads) <= BESIDE and len(node.table.rows) <= ROWS
