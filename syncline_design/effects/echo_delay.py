@@ -14,15 +14,11 @@ from syncline_design.effects.record import (
     StageRows,
     Target,
     Values,
+    by_sound,
 )
 from syncline_design.model.system import Stage
 
 SOUND_SPEED_MPS = 1500.0
-ACOUSTIC = ("usbl", "mbes", "sbes", "sonar")
-
-
-def _applies(stage: Stage, sensor: Target) -> bool:
-    return stage.ranging is not None and stage.ranging.type.lower() in ACOUSTIC
 
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
@@ -53,6 +49,6 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
-    applies=_applies,
+    applies=by_sound,
     breaks="latency",
 )

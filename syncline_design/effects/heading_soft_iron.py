@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
-from syncline_design.effects.kinematics import down_axis_sweep
+from syncline_design.effects.kinematics import heading_departure, heading_slope
 from syncline_design.effects.record import (
     Array,
     Basis,
@@ -24,18 +22,12 @@ from syncline_design.model.system import Stage
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """measured yaw = true + D sin(2 yaw) + E cos(2 yaw) [rad]."""
-    yaw = rows.euler_rad[:, 2]
-    added = np.zeros((len(rows), 3))
-    added[:, 2] = values["sin_rad"] * np.sin(2.0 * yaw) + values["cos_rad"] * np.cos(2.0 * yaw)
-    return Departures(attitude_euler_rad=added)
+    return heading_departure(rows, values, 2)
 
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     """d error / d (D, E) = (z x R q) (sin 2 yaw, cos 2 yaw) [m/rad]; (n, 3, 2)."""
-    yaw = rows.euler_rad[:, 2]
-    wave = np.stack([np.sin(2.0 * yaw), np.cos(2.0 * yaw)], axis=-1)
-    slope: Array = down_axis_sweep(rows)[:, :, None] * wave[:, None, :]
-    return slope
+    return heading_slope(rows, 2)
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:

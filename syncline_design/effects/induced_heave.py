@@ -17,20 +17,9 @@ from syncline_design.effects.record import (
     StageRows,
     Target,
     Values,
+    on_vessels,
 )
 from syncline_design.model.system import Stage
-
-VESSEL_WORDS = ("vessel", "ship", "boat", "usv", "ferry")
-ACOUSTIC = ("usbl", "mbes", "sbes", "sonar")
-
-
-def _applies(stage: Stage, sensor: Target) -> bool:
-    """Vessels: by the stage's or vehicle's name, or by an acoustic ranging sensor."""
-    if stage.position is None:
-        return False
-    words = f"{stage.name} {stage.vehicle}".lower()
-    kind = "" if stage.ranging is None else stage.ranging.type.lower()
-    return kind in ACOUSTIC or any(word in words for word in VESSEL_WORDS)
 
 
 def _heave(rows: StageRows) -> Array:
@@ -74,6 +63,6 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
-    applies=_applies,
+    applies=on_vessels,
     tilted=True,
 )

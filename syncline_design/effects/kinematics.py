@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.record import Array, Departures, StageRows, Target
+from syncline_design.effects.record import Array, Departures, StageRows, Target, Values
 
 
 def bearing(azimuth_rad: Array, elevation_rad: Array) -> Array:
@@ -145,3 +145,19 @@ def wander(rows: StageRows, time_constant_s: float, draws: Array) -> Array:
     Rows that are samples of missions of their own have its stationary distribution each.
     """
     return draws if rows.independent else gauss_markov(rows.time_s, time_constant_s, draws)
+
+
+def heading_departure(rows: StageRows, values: Values, turns: int) -> Departures:
+    """Yaw read too large by sin_rad sin(turns yaw) + cos_rad cos(turns yaw) [rad]."""
+    angle = turns * rows.euler_rad[:, 2]
+    added = np.zeros((len(rows), 3))
+    added[:, 2] = values["sin_rad"] * np.sin(angle) + values["cos_rad"] * np.cos(angle)
+    return Departures(attitude_euler_rad=added)
+
+
+def heading_slope(rows: StageRows, turns: int) -> Array:
+    """d error / d (sin_rad, cos_rad) = (z x R q) (sin, cos)(turns yaw) [m/rad]; (n, 3, 2)."""
+    angle = turns * rows.euler_rad[:, 2]
+    wave = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
+    slope: Array = down_axis_sweep(rows)[:, :, None] * wave[:, None, :]
+    return slope

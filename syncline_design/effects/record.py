@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -235,6 +235,22 @@ def always_budgeted(values: Values) -> str:
 def everywhere(stage: Stage, sensor: Target) -> bool:
     """Whether the stage has the sensor at all; the default of `Effect.applies`."""
     return sensor == "target" or getattr(stage, sensor) is not None
+
+
+SOUNDS: Final = ("usbl", "mbes", "sbes", "sonar")
+VESSEL_WORDS: Final = ("vessel", "ship", "boat", "usv", "ferry")
+
+
+def by_sound(stage: Stage, sensor: Target) -> bool:
+    """Whether the stage ranges by sound that goes there and comes back."""
+    return stage.ranging is not None and stage.ranging.type.lower() in SOUNDS
+
+
+def on_vessels(stage: Stage, sensor: Target) -> bool:
+    """Whether a positioned stage floats, by its or its vehicle's name, or as it ranges by sound."""
+    words = f"{stage.name} {stage.vehicle}".lower()
+    named = any(word in words for word in VESSEL_WORDS)
+    return stage.position is not None and (named or by_sound(stage, sensor))
 
 
 Promise = Literal["timing", "latency", "clock", "lever_arm", "mounting", "noise"]
