@@ -14,7 +14,7 @@ from syncline_design.campaign.pool import Pool, Scoped, Term, fitted
 from syncline_design.campaign.store import Entry, Stored
 from syncline_design.diagnosis.candidates import zero_values
 from syncline_design.diagnosis.consequence import Weights, promise_of
-from syncline_design.diagnosis.findings import estimate, finding
+from syncline_design.diagnosis.findings import estimate, evidence_words, finding
 from syncline_design.diagnosis.plotted import (
     Plots,
     Residuals,
@@ -119,8 +119,7 @@ def _finding(told: Told, one: NamedTerm, weights: Weights) -> Finding:
     size_m = _size_m(told, k)
     values = tuple((name, e.value) for name, e in shown.items())
     material = weights.material(size_m, EffectEntry(effect.name, term.sensor, stage, values))
-    chance = "less than 1e-300" if one.log_p < -690.0 else f"{math.exp(one.log_p):.0e}"
-    words = f"saves {one.gain:.1f} nat; noise alone does that with a chance of {chance}"
+    words = evidence_words(one.gain, one.log_p / math.log(10.0))
     aliases = tuple(_rival(told, b) for b in one.rivals)
     total = 1.0 + sum(_odds(b.nats_worse) for b in aliases)
     aliases = tuple(replace(b, probability=_odds(b.nats_worse) / total) for b in aliases)

@@ -13,6 +13,7 @@ from syncline_design.choice.fact_fixes import fact_fixes
 from syncline_design.choice.fixes import method_fixes, requirement_fixes, with_requirements
 from syncline_design.choice.joint import joint_fixes
 from syncline_design.choice.outcome import (
+    NO_SINGLE_CHANGE,
     Conflict,
     ConflictMember,
     Explanation,
@@ -20,6 +21,7 @@ from syncline_design.choice.outcome import (
     Members,
     NoVerdict,
     RoleGap,
+    cut_short_words,
 )
 from syncline_design.choice.parts import Part, is_feasible, lifted, parts_of
 from syncline_design.choice.platform_fixes import platform_fixes
@@ -44,16 +46,12 @@ def _text(found: Explanation, each_suffices: bool) -> Iterator[str]:
         yield "Any one of these changes makes it feasible (each solved again):"
         yield from (f"  - {fix.text}" for fix in found.fixes)
     elif not found.cut_short:
-        yield "No single change of a requirement, platform or method was found to help."
+        yield NO_SINGLE_CHANGE
     if found.joint_fixes:
         yield "Changes that do so together (solved again):"
         yield from ("  - " + " and ".join(f.text for f in fixes) for fixes in found.joint_fixes)
     if found.cut_short:
-        which = "further" if found.fixes or found.joint_fixes else "any"
-        yield (
-            f"The time limit ended the search for reasons and remedies: whether {which} change "
-            "would help was not worked out."
-        )
+        yield cut_short_words(found)
 
 
 def _conflict_text(conflict: Conflict, each_suffices: bool) -> str:

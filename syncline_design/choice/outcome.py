@@ -30,6 +30,7 @@ FixKind = Literal[
     "rmse",
     "quantile",
 ]
+NO_SINGLE_CHANGE = "No single change of a requirement, platform or method was found to help."
 METHODS: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
 # The roads in words, for every text that says how a design was proven best.
 ROADS: dict[str, str] = {
@@ -215,3 +216,12 @@ class Explanation(Record):
     def conflicts(self) -> tuple[Members, ...]:
         """The first conflict and those that remain without it."""
         return (self.conflict.requirements, *self.further_conflicts)
+
+
+def cut_short_words(found: Explanation) -> str:
+    """What the time limit left open, in a sentence."""
+    which = "further" if found.fixes or found.joint_fixes else "any"
+    return (
+        f"The time limit ended the search for reasons and remedies: whether {which} change "
+        "would help was not worked out."
+    )

@@ -12,7 +12,7 @@ from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.model.quantity import format_duration
 from syncline_design.spec.case import Case
-from syncline_design.verdict.measured import COMMONLY, coverage_of
+from syncline_design.verdict.measured import COMMONLY, coverage_of, coverage_words
 
 LONGER: Final = 1.001  # than the sessions: a horizon that they do not show
 
@@ -68,8 +68,7 @@ def _why_not(bound_s: float, found: Timing, resting: Resting) -> str:
         most = format_duration(found.event_bound_s)
         return f", but {most} with the steps, unlocks and holdover in these logs"
     if 1.0 - claim.coverage > COMMONLY * (1.0 - resting.coverage):
-        return (f", but for {100.0 * claim.coverage:.4g} % of the time, where the spec's "
-                f"coverage_factor asks for {100.0 * resting.coverage:.4g} %")  # fmt: skip
+        return f", but {coverage_words(claim.coverage, resting.coverage)}"
     if claim.session_s is not None and resting.horizon_s > LONGER * claim.session_s:
         lasts, asked = format_duration(claim.session_s), format_duration(resting.horizon_s)
         return f", but in sessions of {lasts}, where the spec's horizon is {asked}"

@@ -99,6 +99,16 @@ def finding(
     )
 
 
+def evidence_words(gain: float, log10_p: float | None) -> str:
+    """What an effect saves, and the chance that noise alone saves as much (None: none at all)."""
+    chance = "less than 1e-300"
+    if log10_p is not None and log10_p > -300.0:
+        power = math.floor(log10_p)
+        digit = round(10.0 ** (log10_p - power))
+        chance = f"{digit}e{power:03d}" if digit < 10 else f"1e{power + 1:03d}"
+    return f"saves {gain:.1f} nat; noise alone does that with a chance of {chance}"
+
+
 def is_noise(effect: Effect) -> bool:
     """Whether an effect says how a sensor's own noise differs from the spec's."""
     return effect.kind == "stochastic" and effect.opens != "size"
@@ -242,10 +252,7 @@ def _finding(
     view, evidence = final.data.view, final.evidence[label]
     compared = final.classes.get(label, Comparison())
     log10_p = evidence.log_p / math.log(10.0) if math.isfinite(evidence.log_p) else None
-    chance = "less than 1e-300"
-    if log10_p is not None and log10_p > -300:
-        chance = f"1e{math.floor(log10_p)}"
-    words = f"saves {evidence.gain:.1f} nat; noise alone does that with a chance of {chance}"
+    words = evidence_words(evidence.gain, log10_p)
     lists = (compared.aliases, compared.lookalikes, compared.excluded[:MOST_EXCLUDED])
     aliases, lookalikes, excluded = (tuple(_rival(view, a) for a in own) for own in lists)
     where = view.system.stages[label[2]].name

@@ -26,6 +26,7 @@ from syncline_design.report.document import (
 )
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
+from syncline_design.verdict.measured import coverage_words
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
@@ -182,8 +183,8 @@ def _spec(result: TimingAndSpec) -> list[Node]:
     if means.asked_coverage is not None:
         asked, share = means.asked_coverage, result.claim.coverage
         nodes.append(Text(
-            f"The bound is claimed for {100.0 * share:.4g} % of the time, the spec's "
-            f"coverage_factor asks for {100.0 * asked:.4g} %: measure with --coverage {asked:.4g}.",
+            f"The bound is claimed {coverage_words(share, asked)}: measure with "
+            f"--coverage {asked:.4g}.",
             mark="!", tone="warn",
         ))  # fmt: skip
     if means.after is not None and means.tau_s is not None and means.measured_tau_s is not None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from syncline_design.choice.outcome import ROADS
+from syncline_design.choice.outcome import NO_SINGLE_CHANGE, ROADS, cut_short_words
 from syncline_design.report import (
     choice_tables,
     errata,
@@ -199,12 +199,9 @@ def _why_not(verdict: Verdict) -> list[Node]:
     if alone:
         nodes += [Heading("What would make it feasible, each alone"), Items(alone)]
     elif not why.cut_short and nodes:
-        nodes.append(Text("No single change of a requirement, platform or method was found to "
-                          "help."))  # fmt: skip
+        nodes.append(Text(NO_SINGLE_CHANGE))
     if why.cut_short:
-        which = "further" if alone or together else "any"
-        nodes.append(Text(f"The time limit ended the search for reasons and remedies: whether "
-                          f"{which} change would help was not worked out."))  # fmt: skip
+        nodes.append(Text(cut_short_words(why)))
     limits = (verdict_figures.lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
     currency = verdict_tables.currency_of(verdict)
     return [*nodes, *nearest_nodes(verdict.nearest, currency, *limits)]

@@ -18,6 +18,14 @@ from syncline_design.verdict.tree import Caution, ClaimShown, MeasuredEntry
 COMMONLY = 1.12
 
 
+def coverage_words(claimed: float, asked: float) -> str:
+    """A bound that holds for less of the time than a spec takes it to."""
+    return (
+        f"for {100.0 * claimed:.4g} % of the time, where the spec's coverage_factor asks for "
+        f"{100.0 * asked:.4g} %"
+    )
+
+
 def coverage_of(case: Case) -> float:
     """Share of the time for which a spec takes its bounds to hold: P(|z| <= coverage_factor)."""
     return math.erf(float(case.spec.coverage_factor) / math.sqrt(2.0))
@@ -87,14 +95,13 @@ def _of_entry(case: Case, used: UsedEntry, claim: MeasuredClaim | None) -> Itera
         message = f"{used.id} was measured, but carries no claim about future sessions"
         yield Caution("measured-claim", message, entry=used.id, key=key)
         return
-    k = float(case.spec.coverage_factor)
-    beyond = 1.0 - coverage_of(case)
-    if 1.0 - float(claim.coverage) > COMMONLY * beyond:
+    asked_share = coverage_of(case)
+    if 1.0 - float(claim.coverage) > COMMONLY * (1.0 - asked_share):
         yield Caution(
             "measured-claim",
-            f"{used.id}: its bound was measured to hold for {100.0 * claim.coverage:.4g} % of the "
-            f"time; coverage_factor {k:g} asks for {100.0 * (1.0 - beyond):.4g} %: measure with "
-            f"`timing --coverage {1.0 - beyond:.4g}`",
+            f"{used.id}: its bound was measured to hold "
+            f"{coverage_words(float(claim.coverage), asked_share)}: measure with "
+            f"`timing --coverage {asked_share:.4g}`",
             entry=used.id, key=key,
         )  # fmt: skip
     session_s, asked = claim.session_s, float(case.spec.horizon.duration)
