@@ -87,16 +87,24 @@ def statistical_figures(
     demand_simulable(system)
     situations = Situations(system, one_mission)
     found = _worst_points(situations, wanted, seed)
+    promising = _promising(situations, wanted, found)
+    nodes = situations.nodes(POINTS if situations.linear else MANY_POINTS)
+    seen: dict[tuple[int, int], Worst] = {}  # by figure and point; a point serves several figures
+    for at in sorted({at for kept in promising for at in kept}):
+        in_force().check()
+        moments = situations.moments(found[:, at : at + 1], nodes)
+        for k, one in enumerate(wanted):
+            if at in promising[k]:
+                seen[k, at] = _evaluated(situations, one, found[:, at], moments)
     return tuple(
-        max(
-            (_evaluated(situations, one, point) for point in points.T),
-            key=lambda worst: worst.weighted_m,
-        )
-        for one, points in zip(wanted, _promising(situations, wanted, found), strict=True)
+        max((seen[k, at] for at in kept), key=lambda worst: worst.weighted_m)
+        for k, kept in enumerate(promising)
     )
 
 
-def _promising(situations: Situations, wanted: Sequence[Wanted], found: Array) -> tuple[Array, ...]:
+def _promising(
+    situations: Situations, wanted: Sequence[Wanted], found: Array
+) -> tuple[list[int], ...]:
     """For each figure its own point and the best of the others', so that none contradicts another.
 
     What is largest in space is at least as large as what is largest horizontally.
@@ -105,8 +113,7 @@ def _promising(situations: Situations, wanted: Sequence[Wanted], found: Array) -
     out = []
     for k, one in enumerate(wanted):
         order = np.argsort(-approximate(mean, covariance, one) * one.weight(situations, found))
-        kept = list(dict.fromkeys([k, *order.tolist()]))[:_CANDIDATES]
-        out.append(found[:, kept])
+        out.append(list(dict.fromkeys([k, *order.tolist()]))[:_CANDIDATES])
     return tuple(out)
 
 
@@ -194,10 +201,8 @@ def _ascent(
     return Ascent(situations.blocks, objective)
 
 
-def _evaluated(situations: Situations, wanted: Wanted, point: Array) -> Worst:
-    in_force().check()
-    count = POINTS if situations.linear else MANY_POINTS
-    moments = situations.moments(point[:, None], situations.nodes(count))
+def _evaluated(situations: Situations, wanted: Wanted, point: Array, moments: Moments) -> Worst:
+    """A figure at a point (p,) of these moments."""
     value, at = exact(moments, wanted, situations.dimensions), point[:, None]
     weighted = float(np.max(value * wanted.weight(situations, at)))
     return Worst(wanted, value, point, weighted, float(situations.last_ranges_m(at)[0]))
@@ -215,11 +220,9 @@ def propagated(situations: Situations, point: Array) -> tuple[Array, Array]:
 
 def columns_at(situations: Situations, point: Array) -> tuple[Array, Array]:
     """(mean (n, 3), what one standard deviation of each noise and variable does (n, 3, c))."""
-    steps = situations.steps()
-    about = situations.moments(point, steps[:, :1])
+    about = situations.moments(point, situations.steps())
     mean = about.mean_m[:, 0]
-    stepped = situations.errors_m(point, steps[:, 1:])
-    by_timing = np.swapaxes(stepped - mean[:, None], 1, 2)
+    by_timing = np.swapaxes(about.mean_m[:, 1:] - mean[:, None], 1, 2)
     return mean, np.concatenate([about.slopes_m[:, 0], by_timing], axis=2)
 
 
