@@ -86,7 +86,7 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
     fixes += _proven(lambda: method_fixes(case, build, problem))
     fixes += _proven(lambda: fact_fixes(case, problem, build))
     fixes += _proven(lambda: platform_fixes(case, build))
-    fixes = sorted(map(_measured, fixes), key=_size)
+    fixes = by_size(fixes)
     joint = tuple(sorted((tuple(map(_measured, some)) for some in joint), key=_largest))
     each_suffices = _each_suffices(case, problem, build, conflict)
     found = Explanation(
@@ -105,6 +105,11 @@ def _measured(fix: Fix) -> Fix:
     if fix.from_ is None or fix.to is None or not fix.from_:
         return fix
     return replace(fix, relative=abs(fix.to - fix.from_) / abs(fix.from_))
+
+
+def by_size(fixes: Iterable[Fix]) -> list[Fix]:
+    """Fixes with the share of their figure that they change, the least change first."""
+    return sorted(map(_measured, fixes), key=_size)
 
 
 def _size(fix: Fix) -> float:

@@ -55,10 +55,10 @@ def proven(
         moves = [
             move
             for part, value in values.items()
-            for move in _moves(case, problem, part, _widened(part, value, attempt))
+            for move in moves_to(case, problem, part, _widened(part, value, attempt))
         ]
         if moves and is_feasible(build(with_moves(case, moves))):
-            return tuple(_fix(case, move) for move in moves)
+            return tuple(fix_of(case, move) for move in moves)
         if not any(part.kind == SIMULATED for part in values):
             return None
     return None
@@ -66,7 +66,7 @@ def proven(
 
 def as_written(case: Case, problem: Problem, part: Part, value: Fraction) -> Fraction:
     """The limit that a value becomes once it is written with so many figures."""
-    afters = [after for _, _, after in _moves(case, problem, part, value)]
+    afters = [after for _, _, after in moves_to(case, problem, part, value)]
     if part.kind == "cost":
         return min((case.spec.in_currency(after) for after in afters), default=value)
     return min((after.exact for after in afters), default=value)
@@ -76,7 +76,7 @@ def _widened(part: Part, value: Fraction, attempt: int) -> Fraction:
     return value * (1 + attempt * WIDENING) if part.kind == SIMULATED else value
 
 
-def _moves(case: Case, problem: Problem, part: Part, value: Fraction) -> Iterator[Move]:
+def moves_to(case: Case, problem: Problem, part: Part, value: Fraction) -> Iterator[Move]:
     """Requirements whose limit has to move for the kind's to reach a value, and where to."""
     if part.kind == "sync" and part.id is None:
         yield None, problem.limits.sync, plain(value, up=True)
@@ -128,7 +128,7 @@ def with_requirements(case: Case, requirements: Sequence[Requirement]) -> Case:
     return replace(case, spec=spec)
 
 
-def _fix(case: Case, move: Move) -> Fix:
+def fix_of(case: Case, move: Move) -> Fix:
     requirement, before, after = move
     if requirement is None:
         text = (

@@ -29,6 +29,7 @@ FixKind = Literal[
     "tvu",
     "rmse",
     "quantile",
+    "missions",
 ]
 NO_SINGLE_CHANGE = "No single change of a requirement, platform or method was found to help."
 METHODS: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
@@ -138,7 +139,8 @@ class Fix(Record):
     """One change that was solved again and does make the spec feasible.
 
     requirement: id of the requirement it changes, None where it changes something else; figure and
-    stage: of the platform figure that it changes.  from_, to: the figure in SI or the spec's
+    stage: of the platform figure that it changes; mission: of several, the one that it is about.
+    from_, to: the figure in SI or the spec's
     currency (None: not a figure), unit: theirs; relative: its change as a share of itself.
     """
 
@@ -152,6 +154,7 @@ class Fix(Record):
     text: str
     proven: bool = True
     relative: float | None = None
+    mission: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,18 +170,24 @@ class RoleGap(Record):
 
 @dataclass(frozen=True, slots=True)
 class ConflictMember(Record):
-    """A requirement of the conflict; id None and no line: the implied sync limit."""
+    """A requirement of the conflict; id None and no line: the implied sync limit.
+
+    mission: the one whose limit it is, of several.
+    """
 
     id: str | None
     kind: str
     line: int | None
+    mission: str | None = optional()
 
     @property
     def words(self) -> str:
         """`ACC-1 (line 4)`."""
+        where = "" if self.mission is None else f" of mission {self.mission}"
         if self.id is None:
-            return "the implied sync requirement"
-        return self.id if self.line is None else f"{self.id} (line {self.line})"
+            return f"the implied sync requirement{where}"
+        line = "" if self.line is None else f" (line {self.line})"
+        return f"{self.id}{where}{line}"
 
 
 Members = tuple[ConflictMember, ...]

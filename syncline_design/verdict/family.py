@@ -115,11 +115,24 @@ def work_of(
         for one in missions
         for end, own in _ends(one.case, nominal)
     ]
+    return Work(case, missions, tuple(scenarios), _family(missions, scenarios), likely)
+
+
+def _family(missions: Sequence[Mission], scenarios: Sequence[Scenario]) -> Family:
     names = [one.mission for one in scenarios]
     order = list(dict.fromkeys(names))
     problems = [one.problem for one in scenarios]
-    family = family_of(names, problems, _differing(missions), [order.index(n) for n in names])
-    return Work(case, missions, tuple(scenarios), family, likely)
+    return family_of(names, problems, _differing(missions), [order.index(n) for n in names])
+
+
+def with_problems(work: Work, problems: Sequence[Problem]) -> Work:
+    """The family with other tables of its scenarios."""
+    scenarios = tuple(
+        replace(one, problem=problem) for one, problem in zip(work.scenarios, problems, strict=True)
+    )
+    likely = None if work.likelihood is None else replace(work.likelihood, known={})
+    family = _family(work.missions, scenarios)
+    return replace(work, scenarios=scenarios, family=family, likelihood=likely)
 
 
 def intervals(case: Case) -> tuple[SheetFigure, ...]:

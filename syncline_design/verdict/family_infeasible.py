@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
-from syncline_design.choice.outcome import Conflict, Explanation
+from syncline_design.choice.explain import listed
+from syncline_design.choice.outcome import Explanation, Fix
+from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Mission
 from syncline_design.verdict.family import ALL, Build, Work, choose_family, work_of
 from syncline_design.verdict.family_choice import cannot_share
+from syncline_design.verdict.family_fixes import (
+    Asked,
+    conflict,
+    conflict_of,
+    limit_fixes,
+    sharing_fixes,
+)
 from syncline_design.verdict.family_named import ruled_out_of
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.no_design import infeasible_verdict, unmet
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Verdict
+from syncline_design.verdict.tree import Caution, MissionVerdict, RequirementResult, Verdict
 from syncline_design.verdict.verified import frame
 
 
@@ -26,36 +35,97 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
             found = infeasible_verdict(mission.case, problem, settings, build())
             why = found.infeasibility
             if mission.name != ALL and why is not None:
-                told = (f"Mission {mission.name} alone:", *why.text)
-                why = replace(why, text=told, missions=(mission.name,))
+                why = _of_one(work, mission, why, settings, build)
             return replace(
                 found, **frame(work.case, problem, settings.seed), infeasibility=why,
                 requirements=_rows_without_design(mission, found),
                 missions=_without_design(work, mission.name),
             )  # fmt: skip
-    names = cannot_share(work, build)
-    text: tuple[str, ...] = (
-        f"Each mission can be met alone, but {', '.join(names)} not with one payload.",
-        "What would help: per_mission: yes for a role, a looser limit, or fewer missions.",
-    )
-    if work.case.spec.choose_for != "nominal":
-        text = ("No payload holds at both ends of every datasheet interval.",)
-    if not isinstance(work.case.spec.choose_for, str):
-        text = (f"No payload holds with probability {work.case.spec.choose_for}.",)
-    why = Explanation((), Conflict((), False), (), (), (), False, text, names or None)
+    why = _explained(work, settings, build)
     first = work.missions[0].case
+    ids = {member.id for member in why.conflict.requirements}
     excluded, count = ruled_out_of(work)
+    late = Caution("time-limit", "the time limit ended the search for reasons and remedies")
     return Verdict(
         verdict="infeasible",
         **frame(work.case, work.scenarios[0].problem, settings.seed),
         requirements=tuple(
-            replace(unmet(first, one, in_conflict=False), line=None, column=None)
+            replace(unmet(first, one, one.id in ids, why.conflict.minimal), line=None, column=None)
             for one in first.spec.requirements
         ),
+        warnings=(late,) if why.cut_short else (),
         infeasibility=why,
         choice=ChoiceResult(excluded=excluded, excluded_count=count),
         missions=_without_design(work, None),
     )
+
+
+def _of_one(
+    work: Work, mission: Mission, why: Explanation, settings: CheckSettings,
+    build: Callable[[], Build],
+) -> Explanation:  # fmt: skip
+    """The reasons of a mission that nothing meets; fixes are those that let the family be met.
+
+    Where none does (another mission may not be met either), those of the mission by itself.
+    """
+    pieces, name = Pieces(), mission.name
+    fixes = pieces.listed("fixes", lambda: limit_fixes(work, build, settings.seed))
+    if fixes:
+        fixes += pieces.listed("fixes", lambda: sharing_fixes(work, build, settings.seed))
+    else:
+        fixes = [
+            replace(fix, mission=name, text=f"for mission {name} by itself, {fix.text}")
+            for fix in why.fixes
+        ]
+    cut = why.cut_short or bool(pieces.cut_short)
+    reasons = [line for line in why.text if not line.startswith("  - ")]
+    reasons = [line for line in reasons if not line.startswith("Any one of these")]
+    text = (f"Mission {name} alone:", *reasons, *_fix_lines(fixes))
+    return replace(why, text=text, missions=(name,), fixes=tuple(fixes), cut_short=cut)
+
+
+def _fix_lines(fixes: Sequence[Fix]) -> Iterator[str]:
+    if fixes:
+        yield "Any one of these changes makes it feasible (each solved again):"
+    yield from (f"  - {fix.text}" for fix in fixes)
+
+
+def _explained(work: Work, settings: CheckSettings, build: Callable[[], Build]) -> Explanation:
+    """Which missions and limits cannot go together, and which changes help, as far as time goes."""
+    pieces = Pieces()
+    nothing: tuple[tuple[Asked, ...], bool] = ((), False)
+    names: tuple[str, ...] = ()
+    if work.case.missions:
+        names = pieces.made("missions that cannot share", lambda: cannot_share(work, build), ())
+    found = pieces.made("the conflict", lambda: conflict_of(work), nothing)
+    fixes = pieces.listed("fixes", lambda: limit_fixes(work, build, settings.seed))
+    fixes += pieces.listed("fixes", lambda: sharing_fixes(work, build, settings.seed))
+    why = Explanation(
+        (), conflict(work, found), (), tuple(fixes), (), bool(pieces.cut_short), (), names or None
+    )
+    return replace(why, text=tuple(_text(work, why)))
+
+
+def _text(work: Work, why: Explanation) -> Iterator[str]:
+    """In words, line by line."""
+    wanted = work.case.spec.choose_for
+    if why.missions:
+        yield f"Each mission can be met alone, but {listed(why.missions)} not with one payload."
+    elif wanted != "nominal":
+        how = "at both ends of every datasheet interval"
+        how = how if isinstance(wanted, str) else f"with probability {wanted}"
+        yield f"No payload holds {how}."
+    else:
+        yield "No payload meets every mission."
+    if why.conflict.requirements:
+        names = listed([one.words for one in why.conflict.requirements])
+        ending = "" if why.conflict.minimal else " (a smaller set was not ruled out)"
+        yield f"  {names} cannot all hold{ending}."
+    yield from _fix_lines(why.fixes)
+    if not why.fixes and not why.cut_short:
+        yield "No single change of a limit was found to help."
+    if why.cut_short:
+        yield "The time limit ended the search for reasons and remedies."
 
 
 def _rows_without_design(mission: Mission, found: Verdict) -> tuple[RequirementResult, ...]:

@@ -50,7 +50,7 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     verdict, work = judged.verdict, judged.work
     if work is None:
         return _unfinished(case, settings, verdict)
-    more: dict[str, Any] = {"infeasibility": verdict.infeasibility}
+    more: dict[str, Any] = {"infeasibility": verdict.infeasibility, "nearest": verdict.nearest}
     designs: list[RankedDesign] = []
     pieces = Pieces()
     if judged.chosen is not None and judged.chosen.found is not None:
