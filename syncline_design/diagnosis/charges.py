@@ -72,6 +72,11 @@ def _figures(data: Data, model: Model, label: Label) -> float:
     return cheapest
 
 
+def told_nats(model: Model, label: Label) -> float:
+    """What setting all figures of an effect to zero costs, by their covariance [nat]."""
+    return 0.5 * _square(*_fitted(model, label))
+
+
 def _fitted(model: Model, label: Label) -> tuple[Array, Array]:
     """Values and covariance of the figures of one effect that move the mean."""
     at = 0

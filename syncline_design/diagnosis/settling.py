@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from syncline_design.diagnosis.borrowed import doubt_nats
 from syncline_design.diagnosis.candidates import Signature
+from syncline_design.diagnosis.charges import told_nats
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.identify import Comparison, competed
 from syncline_design.diagnosis.identity import Label, effect_of, without
@@ -19,6 +21,8 @@ from syncline_design.diagnosis.trials import freedom_of, log_chance, seen_in_mot
 from syncline_design.effects.record import Effect
 
 APART = 2.0  # standard uncertainties between the values by two noise models
+NEEDLESS = 0.2  # chance of as good a fit by noise alone, from which an effect is of no use
+SURELY_TOLD_NATS = 12.0  # of an effect's figures, by their covariance, from which no refit is asked
 ROUNDS = 3  # in which exchanging one effect may make another one of its class the better one
 
 
@@ -151,6 +155,10 @@ def _decided(
         model = fit(data, model.acting, model.opened, start=model.level)  # as its rivals will be
         before, classes = set(model.labels), {}
         for label in [a.label for a in model.acting]:
+            less = _needless(data, model, label)
+            if less is not None:
+                model = less
+                continue
             known = set(model.labels)
             model, compared = competed(data, model, label, others)
             own = (set(model.labels) - known) or {label}
@@ -158,6 +166,14 @@ def _decided(
         if set(model.labels) == before:
             break
     return model, classes
+
+
+def _needless(data: Data, model: Model, label: Label) -> Model | None:
+    """The model without an effect that others have made needless, before its class competes."""
+    if len(model.labels) < 2 or told_nats(model, label) > SURELY_TOLD_NATS:
+        return None
+    less = refitted_without(data, model, label)
+    return less if _evidence(data, model, label, less).log_p > math.log(NEEDLESS) else None
 
 
 def refitted_without(data: Data, model: Model, label: Label) -> Model:
