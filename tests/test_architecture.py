@@ -15,7 +15,7 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "syncline_design"
 HOUSE = (ROOT / "docs" / "architecture.md").read_text("utf-8")
-STATIONS = sorted(set(re.findall(r"`(\w+/\w+\.py): (\w+)`", HOUSE)))
+STATIONS = sorted(set(re.findall(r"`([\w/]+/\w+\.py): (\w+)`", HOUSE)))
 
 
 def _drawer() -> ModuleType:
@@ -47,7 +47,7 @@ def test_every_station_exists(file: str, name: str) -> None:
 
 
 def test_every_file_that_is_named_exists() -> None:
-    files = set(re.findall(r"`(\w+/\w+\.py)`", HOUSE))
+    files = set(re.findall(r"`([\w/]+/\w+\.py)`", HOUSE))
     assert len(STATIONS) > 30
     assert [file for file in files if not (PACKAGE / file).is_file()] == []
 

@@ -1,7 +1,7 @@
 """Frames, units and time offsets that a log may be written in, searched all at once.
 
 The error of a log of one stage is e = a + R m - t: antenna a and target (or reference) t in the
-world, R body to world, m the arms and the measured vector in the body.  Every repair of the list
+world, R body to world, m the arms and the measured vector in the body.  Every one of the list
 below is tried on some rows: signed permutations of the axes of a, of t, of both, of R on either
 side (24 proper ones each, mirrors where a column is), signs and zeros of angles, degrees for
 radians, powers of ten, and shifts of the positions' or the attitudes' stamps.  The caller tries
@@ -29,9 +29,9 @@ from syncline_design.effects.record import Array, Target
 from syncline_design.logs.log import Log, LogTrack, StageLog
 from syncline_design.model.system import System
 
-ROWS = 200  # on which all repairs are tried
+ROWS = 200  # on which all are tried
 BEST = 8  # of them are handed on
-SIMPLER = 1.1  # times the least error: a simpler repair is as good
+SIMPLER = 1.1  # times the least error: a simpler one is as good
 WORLD = (("north", "south"), ("east", "west"), ("down", "up"))
 BODY = (("forward", "back"), ("right", "left"), ("down", "up"))
 UNITS = {1e-3: "in km", 1e2: "in cm", 1e3: "in mm", 1.0 / 0.3048: "in feet"}  # held over true
@@ -47,7 +47,7 @@ Mend = Callable[[Log], Log]
 
 
 @dataclass(frozen=True, slots=True)
-class Repair:
+class Convention:
     """One way in which columns may be written: what they hold, and the log mended.
 
     work: how much it changes, for ties; upright: whether the vehicle keeps its belly down.
@@ -76,8 +76,8 @@ class _Parts:
         return _vector(self.arms, self.polar, len(self.euler))
 
 
-def best_repairs(system: System, log: Log) -> list[Repair]:
-    """The repairs that bring the usual error down most, best first."""
+def best_conventions(system: System, log: Log) -> list[Convention]:
+    """The conventions that bring the usual error down most, best first."""
     if len(system.stages) != 1 or log.stages[0].antenna_m is None:
         return []
     few = log.rows(np.linspace(0, len(log) - 1, min(ROWS, len(log))).astype(int))
@@ -137,7 +137,7 @@ def _changes(matrix: Array) -> int:
     return int(np.sum(np.diag(matrix) != 1.0))
 
 
-def _worlds(parts: _Parts, log: Log) -> Iterator[Repair]:
+def _worlds(parts: _Parts, log: Log) -> Iterator[Convention]:
     """Axes and units of the antenna's place, of the targets, and of all that is in the world."""
     carried = rotate(euler_to_rotation(parts.euler), parts.vector)
     held = "target" if log.kind == "georeference" else "reference"
@@ -155,11 +155,11 @@ def _worlds(parts: _Parts, log: Log) -> Iterator[Repair]:
                 _size(place + carried - target),
             )
             proper = np.linalg.det(matrix) > 0.0
-            yield Repair("position", words, _antenna(back), work, sizes[0])
-            yield Repair("target", words, _truth(back), work, sizes[1])
+            yield Convention("position", words, _antenna(back), work, sizes[0])
+            yield Convention("target", words, _truth(back), work, sizes[1])
             if factor == 1.0 or (proper and log.kind == "georeference"):
                 words = f"{words} (position, velocity and {held} alike)"
-                yield Repair("position", words, _everything(back), work + 1, sizes[2])
+                yield Convention("position", words, _everything(back), work + 1, sizes[2])
 
 
 def _held_words(matrix: Array, unit: str) -> str:
@@ -174,7 +174,7 @@ def _turned(values: Array, matrix: Array) -> Array:
     return np.where(known @ np.abs(matrix.T) > 0.0, turned, np.nan)
 
 
-def _attitudes(parts: _Parts) -> Iterator[Repair]:
+def _attitudes(parts: _Parts) -> Iterator[Convention]:
     """Axes of the attitude on both sides, its signs, zeros and units, and its transpose."""
     if not np.any(parts.vector):
         return
@@ -190,13 +190,13 @@ def _attitudes(parts: _Parts) -> Iterator[Repair]:
         size = _size(off + rotate(rotation, parts.vector))
         mend = _rotation(partial(_between, world.T, body))
         upright = _belly_down(rotation) or not before
-        yield Repair("attitude", words, mend, _changes(world) + _changes(body), size, upright)
+        yield Convention("attitude", words, mend, _changes(world) + _changes(body), size, upright)
     yield _transposed(parts, plain, off)
     for euler, words, mend, work in _eulers(parts.euler):
         rotation = euler_to_rotation(euler)
         size = _size(off + rotate(rotation, parts.vector))
         upright = _belly_down(rotation) or not before
-        yield Repair("attitude", words, mend, work, size, upright)
+        yield Convention("attitude", words, mend, work, size, upright)
 
 
 def _between(left: Array, right: Array, held: Array) -> Array:
@@ -204,10 +204,12 @@ def _between(left: Array, right: Array, held: Array) -> Array:
     return found
 
 
-def _transposed(parts: _Parts, plain: Array, off: Array) -> Repair:
+def _transposed(parts: _Parts, plain: Array, off: Array) -> Convention:
     back = np.swapaxes(plain, 1, 2)
     size = _size(off + rotate(back, parts.vector))
-    return Repair("attitude", "world to body", _rotation(lambda r: np.swapaxes(r, 1, 2)), 2, size)
+    return Convention(
+        "attitude", "world to body", _rotation(lambda r: np.swapaxes(r, 1, 2)), 2, size
+    )
 
 
 def _belly_down(rotation: Array) -> bool:
@@ -244,7 +246,7 @@ def _eulers(euler: Array) -> Iterator[tuple[Array, str, Mend, int]]:
                 yield mended(euler), ", ".join(words), _angles(mended), work
 
 
-def _polars(parts: _Parts) -> Iterator[Repair]:
+def _polars(parts: _Parts) -> Iterator[Convention]:
     """Unit of the range; sense, zero and unit of the bearing."""
     if parts.polar is None:
         return
@@ -253,7 +255,7 @@ def _polars(parts: _Parts) -> Iterator[Repair]:
         polar = parts.polar * scale + turn
         vector = _vector(parts.arms, polar, len(polar))
         size = _size(off + rotate(rotation, vector))
-        yield Repair("ranging", words, _polar(scale, turn), work, size)
+        yield Convention("ranging", words, _polar(scale, turn), work, size)
 
 
 def _polar_ways() -> Iterator[tuple[Array, Array, str, int]]:

@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from syncline_design.diagnosis.conventions import best_repairs
+from syncline_design.diagnosis.conventions import best_conventions
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.slips import Shift, attitude_restamped, best_shifts
 from syncline_design.effects import plain_delay, registry
@@ -283,7 +283,7 @@ def _searched(system: System, log: Log, base: Scene, exclude: Sequence[str]) -> 
     """The best of all conventions, to be re-simulated."""
     found = []
     effect = _undone(by_mending=True)
-    for one in best_repairs(system, base.log) if effect.name not in exclude else []:
+    for one in best_conventions(system, base.log) if effect.name not in exclude else []:
         acting = Acting(effect, one.sensor, 0, {"convention": one.convention})  # type: ignore[dict-item]
         found.append(Trial(acting, partial(_error, system, log, base, one.mend), one.mend))
     return found

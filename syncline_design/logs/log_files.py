@@ -18,7 +18,7 @@ from syncline_design.logs.columns import (
     known_names,
     si_columns,
 )
-from syncline_design.logs.readers import open_recording, reader_of
+from syncline_design.logs.readers import open_recording, reader_of, registry
 from syncline_design.logs.readers.reader import head_of
 from syncline_design.logs.roles import Role, offers_of
 from syncline_design.logs.run_parts import one_run
@@ -104,8 +104,6 @@ def _is_trajectory(table: RowSource, mapping: Mapping[str, str], stages: Sequenc
 
 
 def _reader_name(path: Path) -> str | None:
-    from syncline_design.logs.readers import registry
-
     if not path.is_file():
         return None
     try:

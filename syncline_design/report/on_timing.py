@@ -24,6 +24,7 @@ from syncline_design.report.document import (
     section,
     show,
 )
+from syncline_design.report.figures_timing import offsets, sessions, stability
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.verdict.measured import coverage_words
@@ -251,8 +252,6 @@ def _entry(result: Timing) -> list[Node]:
 
 def _offsets(result: Timing) -> list[Node]:
     def draw() -> InlineFigure:
-        from syncline_design.report.figures_timing import offsets
-
         return offsets(result.trace, result.bound_s)
 
     if not result.trace:
@@ -267,8 +266,6 @@ def _sessions(result: Timing) -> list[Node]:
     bounds = [(name, value) for name, value in both if value]
 
     def draw() -> InlineFigure:
-        from syncline_design.report.figures_timing import sessions
-
         return sessions(counted, result.claim.coverage, bounds)
 
     chart: list[Node] = [Chart("sessions", draw, "One dot a session.")] if counted else []
@@ -325,8 +322,6 @@ def _events(result: Timing) -> list[Node]:
 
 def _noise(result: Timing) -> list[Node]:
     def draw() -> InlineFigure:
-        from syncline_design.report.figures_timing import stability
-
         return stability(result.stability)
 
     nodes: list[Node] = []

@@ -15,8 +15,11 @@ from pydantic import BaseModel
 from syncline_design.model.quantity import Dimension
 from syncline_design.report.formats import FileName
 from syncline_design.report.key_glossary import KEYS, STUDY_KEYS
+from syncline_design.spec.catalog import CatalogFile
 from syncline_design.spec.fields import quantity_schema
 from syncline_design.spec.requirement import KEYS_OF, LIMIT_DIMENSIONS, STATED_KINDS
+from syncline_design.spec.spec import Spec
+from syncline_design.studies.definition import StudyFile
 
 _TITLES: Final = {"spec": "system spec", "catalog": "catalog", "study": "trade study"}
 DRAFT = "http://json-schema.org/draft-07/schema#"
@@ -43,10 +46,6 @@ def json_schema(name: FileName) -> dict[str, Any]:
 
 
 def _model(name: FileName) -> type[BaseModel]:
-    from syncline_design.spec.catalog import CatalogFile
-    from syncline_design.spec.spec import Spec
-    from syncline_design.studies.definition import StudyFile
-
     models: dict[str, type[BaseModel]] = {"spec": Spec, "catalog": CatalogFile, "study": StudyFile}
     return models[name]
 

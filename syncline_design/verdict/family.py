@@ -26,7 +26,6 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import SheetFigure, quantity, sigma_figures, with_figure
 from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case, Mission
-from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.likely import Likelihood, likelihood_of
 
 Build = Callable[[Case], Problem]
@@ -76,20 +75,6 @@ class Chosen:
     undecided: bool = False
     passed_open: int = 0  # better designs that are left open
     proof: Proof = MERGED
-
-
-def is_family(case: Case) -> bool:
-    """Whether a spec is judged in more than one scenario."""
-    return bool(case.missions) or case.spec.choose_for != "nominal"
-
-
-def refuse_missions(case: Case) -> None:
-    """BadInput where one system is meant and the spec has several missions."""
-    if case.missions:
-        place = case.position(("missions",))
-        message = "several missions, and this works on one system"
-        hint = "give it a spec of one mission: its overrides put into stages and requirements"
-        raise BadInput((Flaw(str(case.path), *place, "missions", message, hint=hint),))
 
 
 def missions_of(case: Case) -> tuple[Mission, ...]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from datetime import date
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from syncline_design.machine.deadline import OutOfTime
 from syncline_design.model.system import System
@@ -18,9 +18,11 @@ from syncline_design.verdict.stated import stated, wanted_of
 from syncline_design.verdict.tree import (
     UNITS,
     RequirementResult,
+    Status,
     WaiverResult,
     decided,
     finite,
+    settled,
 )
 
 if TYPE_CHECKING:
@@ -71,26 +73,24 @@ def _simulated(
 ) -> RequirementResult:
     """A Monte Carlo requirement: sampled on until its interval leaves the limit."""
     limit, quantile = float(requirement.limit), float(requirement.quantile or 0.0)
-    about: dict[str, Any] = {
-        "id": requirement.id, "kind": "monte_carlo", "limit": limit,
-        "unit": UNITS["monte_carlo"], "quantile": quantile,
-    }  # fmt: skip
+    left_open = decided(
+        id=requirement.id, kind="monte_carlo", limit=limit, status="indeterminate", value=None,
+        unit=UNITS["monte_carlo"], quantile=quantile, note="not simulated",
+    )  # fmt: skip
     if found is None:
-        return decided(status="indeterminate", value=None, note="not simulated", **about)
+        return left_open
     simulation = simulation_settings(case, settings.seed)
     try:
         decision = decide(system, simulation, quantile, limit, first=found)
     except OutOfTime:
         note = "the time limit ended the simulation before it was decided"
-        return decided(status="indeterminate", value=None, note=note, **about)
+        return replace(left_open, note=note)
     estimate = decision.estimate
-    return decided(
-        status=decision.status,
-        value=estimate.value_m,
+    return replace(
+        settled(left_open, decision.status, estimate.value_m),
         low=estimate.low_m,
         high=estimate.high_m,
         note=_samples_note(decision, simulation.samples),
-        **about,
     )
 
 
@@ -99,24 +99,24 @@ def _stated(
 ) -> RequirementResult:
     """A requirement on a figure of the error, at its worst situation."""
     limit = float(requirement.limit)
-    about: dict[str, Any] = {
-        "id": requirement.id, "kind": requirement.kind, "limit": limit,
-        "unit": UNITS[requirement.kind], "quantile": requirement.share,
-        "axis": requirement.axis or requirement.of,
-    }  # fmt: skip
+    left_open = decided(
+        id=requirement.id, kind=requirement.kind, limit=limit, status="indeterminate", value=None,
+        unit=UNITS[requirement.kind], quantile=requirement.share,
+        axis=requirement.axis or requirement.of,
+    )  # fmt: skip
     try:
         found = stated(system, wanted_of(requirement), limit, settings.seed)
     except OutOfTime:
         note = "the time limit ended the search for its worst situation"
-        return decided(status="indeterminate", value=None, note=note, **about)
+        return replace(left_open, note=note)
     except SimulationError as error:
-        return decided(status="indeterminate", value=None, note=str(error), **about)
+        return replace(left_open, note=str(error))
+    status: Status = "pass" if found.weighted_m <= limit else "fail"
     if found.weighted_m > 0.0:  # its limit there, where the limit grows with the distance
-        about["limit"] = limit * (found.value_m / found.weighted_m)
-    return decided(
-        status="pass" if found.weighted_m <= limit else "fail", value=finite(found.value_m),
-        at_distance_m=found.distance_m, **about,
-    )  # fmt: skip
+        left_open = replace(left_open, limit=limit * (found.value_m / found.weighted_m))
+    return replace(
+        settled(left_open, status, finite(found.value_m)), at_distance_m=found.distance_m
+    )
 
 
 def _samples_note(decision: Decision, asked: int) -> str:

@@ -119,9 +119,9 @@ class Optimisation(Record):
 class Hinged(Optimisation):
     """Of a design that meets: with what it hinges on, None where that was not worked out."""
 
-    slack: tuple[Slack, ...] | None
-    tolerances: ToleranceVerdict | None
-    measure_next: tuple[Measurement, ...] | None
+    slack: tuple[Slack, ...] | None = None
+    tolerances: ToleranceVerdict | None = None
+    measure_next: tuple[Measurement, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

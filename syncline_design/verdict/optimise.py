@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.decide import best
@@ -38,7 +37,6 @@ from syncline_design.verdict.choice_data import (
     ranked_designs,
     ruled_out,
 )
-from syncline_design.verdict.family import is_family, refuse_missions
 from syncline_design.verdict.figure_front import (
     drawn_requirement,
     figure_front,
@@ -57,6 +55,7 @@ from syncline_design.verdict.optimisation import (
     OptimizeSettings,
 )
 from syncline_design.verdict.optimise_family import optimize_family
+from syncline_design.verdict.scenarios import is_family, refuse_missions
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Word
 from syncline_design.verdict.verified import Verified, error_figures
@@ -91,28 +90,29 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     pieces = Pieces(lambda: refusals(problem))
     points = _points(case, problem, settings, pieces)
     designs: tuple[Design, ...] = ()
-    kind: type[Optimisation] = Optimisation
-    more: dict[str, Any] = {}
+    word = _word(case, problem, picked)
+    kind = Hinged if word == "meets" and picked.exhausted else Optimisation
+    result = _begun(kind, case, problem, settings, picked.choice.proof)
     if picked.verified is None:
-        more = _reasons(case, problem, build, pieces)
+        result = _with_reasons(result, case, problem, build, pieces)
     elif picked.exhausted:
         designs = _designs(problem, picked.verified.design, settings, pieces)
-        if picked.verified.word == "meets":
-            kind, more = Hinged, _hinges((case, problem, designs[0], build), pieces)
-            more |= _others(case, problem, designs[0], settings, points, pieces)
+        if word == "meets":
+            result = _with_hinges(result, (case, problem, designs[0], build), pieces)
+            result = _with_others(result, case, problem, designs[0], settings, points, pieces)
     if settings.why_not:
         asked = Asked(case, problem, designs[0] if designs else None, build, questions[0])
-        more["why_not"] = tuple(pieces.listed("why not", lambda: why_not(asked, questions[1])))
-    result = kind(
-        verdict=_word(case, problem, picked),
-        **_frame(case, problem, settings, picked.choice.proof),
+        answers = tuple(pieces.listed("why not", lambda: why_not(asked, questions[1])))
+        result = replace(result, why_not=answers)
+    result = replace(
+        result,
+        verdict=word,
         designs=ranked_designs(case, problem, designs, folded=not settings.every),
         warnings=_cautions(case, picked.verified, settings) if designs else (),
         cut_short=tuple(pieces.cut_short),
         gave_up=tuple(pieces.gave_up),
-        **_front(case, problem, settings, points),
-        **more,
     )
+    result = _with_front(result, case, problem, settings, points)
     found = Optimised(case, problem, settings, designs, points, result)
     if not settings.report:
         return found
@@ -140,13 +140,12 @@ def _unfinished(
     """What there is to say when the time limit came before any design."""
     known = None if problem is NO_TABLES else problem
     verdict = unfinished_verdict(case, known, checking, why) if settings.report else None
-    result = Optimisation(
-        verdict="indeterminate",
-        **_frame(case, problem, settings, Proof(settings.method, False, False)),
+    result = replace(
+        _begun(Optimisation, case, problem, settings, Proof(settings.method, False, False)),
         cut_short=("choosing",),
         message=f"No verdict: {why}; no design was found by then.",
-        **_front(case, problem, settings, ()),
     )
+    result = _with_front(result, case, problem, settings, ())
     return Optimised(case, problem, settings, (), (), result, verdict)
 
 
@@ -161,21 +160,26 @@ def _word(case: Case, problem: Problem, picked: Picked) -> Word:
     return "meets" if picked.verified.word == "meets" else "indeterminate"
 
 
-def _frame(
-    case: Case, problem: Problem, settings: OptimizeSettings, proof: Proof
-) -> dict[str, Any]:
-    """The parts that every result has."""
+def _begun(
+    kind: type[Optimisation],
+    case: Case,
+    problem: Problem,
+    settings: OptimizeSettings,
+    proof: Proof,
+) -> Optimisation:
+    """A result with the parts that every one has, nothing decided yet."""
     excluded, count = ruled_out(problem)
-    return {
-        "spec": SpecName(case.spec.name, str(case.path)),
-        "proof": proof,
-        "combinations": None if problem is NO_TABLES else str(problem.combinations),
-        "excluded": excluded,
-        "excluded_count": count,
-        "provenance": MadeFrom(
+    return kind(
+        verdict="indeterminate",
+        spec=SpecName(case.spec.name, str(case.path)),
+        proof=proof,
+        combinations=None if problem is NO_TABLES else str(problem.combinations),
+        excluded=excluded,
+        excluded_count=count,
+        provenance=MadeFrom(
             __version__, case.spec_sha256, case.catalogs_sha256, case.files, settings.seed
         ),
-    }
+    )
 
 
 def _points(
@@ -198,18 +202,23 @@ def _drawn(case: Case, settings: OptimizeSettings) -> str | None:
     return figure_words(drawn_requirement(case, settings.figure))
 
 
-def _front(
-    case: Case, problem: Problem, settings: OptimizeSettings, points: Sequence[FrontPoint]
-) -> dict[str, Any]:
-    """The parts that `--pareto` asks for."""
+def _with_front(
+    result: Optimisation,
+    case: Case,
+    problem: Problem,
+    settings: OptimizeSettings,
+    points: Sequence[FrontPoint],
+) -> Optimisation:
+    """The result with the parts that `--pareto` asks for."""
     if not settings.pareto:
-        return {}
-    return {
-        "front": front_designs(case, problem, points, settings.resource),
-        "front_figure": _drawn(case, settings),
-        "front_left_out": left_out(case, problem, settings.resource),
-        "staircase": staircase([point for point in points if not point.undecided]),
-    }
+        return result
+    return replace(
+        result,
+        front=front_designs(case, problem, points, settings.resource),
+        front_figure=_drawn(case, settings),
+        front_left_out=left_out(case, problem, settings.resource),
+        staircase=staircase([point for point in points if not point.undecided]),
+    )
 
 
 def _designs(
@@ -226,34 +235,39 @@ def _designs(
     return (chosen, *pieces.listed("next best designs", others)[: count - 1])
 
 
-def _reasons(case: Case, problem: Problem, build: Build, pieces: Pieces) -> dict[str, Any]:
-    """Why there is no design."""
+def _with_reasons(
+    result: Optimisation, case: Case, problem: Problem, build: Build, pieces: Pieces
+) -> Optimisation:
+    """The result with why there is no design."""
     found = explain(case, problem, build)
     if found.cut_short:
         pieces.cut_short.append("reasons and remedies")
-    return {"infeasibility": found, "nearest": nearest(case, problem, found, build)}
+    return replace(result, infeasibility=found, nearest=nearest(case, problem, found, build))
 
 
-def _hinges(given: tuple[Case, Problem, Design, Build], pieces: Pieces) -> dict[str, Any]:
-    """What a design hinges on: slack of every figure, tolerances, what to measure."""
-    return {
-        "slack": pieces.made("slack ledger", lambda: slack_ledger(*given), None),
-        "tolerances": pieces.made("tolerances", lambda: _tolerances(*given), None),
-        "measure_next": pieces.made("what to measure next", lambda: measure_next(*given), None),
-    }
+def _with_hinges(
+    result: Optimisation, given: tuple[Case, Problem, Design, Build], pieces: Pieces
+) -> Optimisation:
+    """The result with what it hinges on: slack of every figure, tolerances, what to measure."""
+    return replace(
+        result,
+        slack=pieces.made("slack ledger", lambda: slack_ledger(*given), None),
+        tolerances=pieces.made("tolerances", lambda: _tolerances(*given), None),
+        measure_next=pieces.made("what to measure next", lambda: measure_next(*given), None),
+    )
 
 
-def _others(
-    case: Case, problem: Problem, chosen: Design, settings: OptimizeSettings,
+def _with_others(
+    result: Optimisation, case: Case, problem: Problem, chosen: Design, settings: OptimizeSettings,
     points: tuple[FrontPoint, ...], pieces: Pieces,
-) -> dict[str, Any]:  # fmt: skip
+) -> Optimisation:  # fmt: skip
     """What if a sensor cannot be had, and what a little more money would buy."""
     if not settings.pareto or settings.resource != "cost":
         nothing: tuple[FrontPoint, ...] = ()
         points = pieces.made("bargains", lambda: tuple(front(problem)), nothing)
     without = pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))
     found = tuple(bargains(case, problem, chosen, points))
-    return {"alternatives": tuple(without), "bargains": found}
+    return replace(result, alternatives=tuple(without), bargains=found)
 
 
 def _tolerances(

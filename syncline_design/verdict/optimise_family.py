@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.front import staircase
-from syncline_design.choice.outcome import Proof
+from syncline_design.choice.outcome import PriceStep, Proof
 from syncline_design.choice.problem import selection_of
 from syncline_design.machine.deadline import Pieces
 from syncline_design.simulation.results import SpecName
@@ -19,7 +18,7 @@ from syncline_design.verdict.family import MERGED, Chosen, Work, front_of
 from syncline_design.verdict.family_named import as_point, front_design, ranked, ruled_out_of
 from syncline_design.verdict.family_others import next_best, with_stampings
 from syncline_design.verdict.missions import judged_family
-from syncline_design.verdict.named import RankedDesign
+from syncline_design.verdict.named import FrontDesign, RankedDesign
 from syncline_design.verdict.optimisation import (
     NO_TABLES,
     MadeFrom,
@@ -31,6 +30,7 @@ from syncline_design.verdict.pinned import pinned_role
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Verdict
 
+Front = tuple[tuple[FrontDesign, ...], tuple[PriceStep, ...]]
 LEFT_OUT = Caution(
     "missions",
     "what the design hinges on (slack, tolerances, what to measure next) is worked out for specs "
@@ -50,21 +50,20 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     verdict, work = judged.verdict, judged.work
     if work is None:
         return _unfinished(case, settings, verdict)
-    more: dict[str, Any] = {"infeasibility": verdict.infeasibility, "nearest": verdict.nearest}
     designs: list[RankedDesign] = []
+    front: Front | None = None
     pieces = Pieces()
     if judged.chosen is not None and judged.chosen.found is not None:
         designs = _designs(work, judged.chosen, settings, pieces)
-        more = pieces.made("front", lambda: _front(work, settings), {}) if settings.pareto else {}
-        choice = verdict.choice
-        if choice is not None:
-            more |= {"alternatives": choice.alternatives, "bargains": choice.bargains}
+        if settings.pareto:
+            front = pieces.made("front", lambda: _front(work, settings), front)
     excluded, count = ruled_out_of(work)
-    proof = judged.chosen.proof if judged.chosen is not None else MERGED
+    found, choice = judged.chosen, verdict.choice
+    has_design = found is not None and found.found is not None
     result = Optimisation(
         verdict=verdict.verdict,
         spec=SpecName(case.spec.name, str(case.path)),
-        proof=proof,
+        proof=MERGED if found is None else found.proof,
         combinations=str(work.family.combinations),
         designs=tuple(designs),
         warnings=(*_told(verdict, settings), LEFT_OUT),
@@ -72,7 +71,12 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
         excluded_count=count,
         cut_short=tuple(pieces.cut_short),
         provenance=_provenance(case, settings),
-        **more,
+        infeasibility=None if has_design else verdict.infeasibility,
+        nearest=None if has_design else verdict.nearest,
+        alternatives=choice.alternatives if has_design and choice is not None else None,
+        bargains=choice.bargains if has_design and choice is not None else None,
+        front=front and front[0],
+        staircase=front and front[1],
     )
     text = None
     if designs and judged.chosen is not None:
@@ -136,12 +140,12 @@ def _designs(
     return [first, *following]
 
 
-def _front(work: Work, settings: OptimizeSettings) -> dict[str, Any]:
+def _front(work: Work, settings: OptimizeSettings) -> Front:
     points = front_of(work, settings.resource)
-    return {
-        "front": tuple(front_design(work, point, settings.resource) for point in points),
-        "staircase": staircase([as_point(work, point) for point in points]),
-    }
+    return (
+        tuple(front_design(work, point, settings.resource) for point in points),
+        staircase([as_point(work, point) for point in points]),
+    )
 
 
 def _pinned_text(work: Work, chosen: Chosen) -> str:

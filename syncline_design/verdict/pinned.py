@@ -10,7 +10,7 @@ from syncline_design.spec.edit import PinnedRole, pinned, pinned_spec_text
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.spec.selection import RoleSelection
 from syncline_design.verdict.acceptance import Simulations
-from syncline_design.verdict.family import refuse_missions
+from syncline_design.verdict.scenarios import refuse_missions
 
 
 def pinned_text(case: Case, problem: Problem, design: Design) -> str:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 from syncline_design.choice.outcome import Explanation
@@ -102,6 +102,12 @@ def decided(*, status: Status, value: float | None, limit: float, **rest: Any) -
     """A requirement's result with its margin, limit - value."""
     margin = None if value is None else finite(limit - value)
     return RequirementResult(status=status, value=finite(value), limit=limit, margin=margin, **rest)
+
+
+def settled(left_open: RequirementResult, status: Status, value: float | None) -> RequirementResult:
+    """A result that was left open, with what it came to and its margin."""
+    margin = None if value is None else finite(left_open.limit - value)
+    return replace(left_open, status=status, value=finite(value), margin=margin, note="")
 
 
 def word_of(results: Iterable[RequirementResult]) -> Word:

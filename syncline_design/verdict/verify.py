@@ -18,10 +18,10 @@ from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.cautions import unproven
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
-from syncline_design.verdict.family import is_family
 from syncline_design.verdict.no_design import infeasible_verdict, unfinished_verdict
 from syncline_design.verdict.one_design import verdict_on, verify
 from syncline_design.verdict.open_choice import Picked, pick
+from syncline_design.verdict.scenarios import is_family
 from syncline_design.verdict.settings import CheckSettings, build_of
 from syncline_design.verdict.tree import (
     Caution,
