@@ -27,7 +27,9 @@ from random_families import plain_front, plain_order, random_family
 from syncline_design.choice.evaluate import error_key
 from syncline_design.choice.family import Family, family_of
 from syncline_design.choice.family_best import best_of_family, family_front, iter_family
+from syncline_design.choice.family_roads import choose_by_road, front_by_road
 from syncline_design.choice.options import Option, Resources
+from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
 from syncline_design.verdict.verify import CheckSettings
 from test_missions import written_out
@@ -40,9 +42,10 @@ def agree(first: int, count: int) -> int:
         rng = random.Random(seed)
         family = random_family(rng, 30)
         resource = rng.choice(["cost", "mass", "power"])
-        found = [(p.amount, error_key(p.error_m)) for p in family_front(family, resource)]
-        ranked = [one.rank[:2] for one in itertools.islice(iter_family(family), 2)]
-        if found != plain_front(family, resource) or ranked != plain_order(family)[:2]:
+        found = [(p.amount, error_key(p.error_m)) for p in front_by_road(family, resource)]
+        ranked = _first_two(family)
+        wanted = plain_order(family)[: len(ranked) or 1]
+        if found != plain_front(family, resource) or ranked != wanted:
             wrong += 1
             print(f"family {seed} disagrees", flush=True)
         if time.monotonic() - last > 60.0:
@@ -51,6 +54,15 @@ def agree(first: int, count: int) -> int:
     spent = time.process_time() - started
     print(f"{count} families from {first}: {wrong} disagree, {spent:.0f} s of processor time")
     return wrong
+
+
+def _first_two(family: Family) -> list[tuple[Any, float]]:
+    """The first two designs, the first alone where the search gives up."""
+    try:
+        return [one.rank[:2] for one in itertools.islice(iter_family(family), 2)]
+    except TooLarge:
+        best = choose_by_road(family).found
+        return [] if best is None else [best.rank[:2]]
 
 
 def specs(first: int, count: int) -> int:

@@ -12,13 +12,14 @@ import pytest
 import yaml
 
 from checked import check_file
-from random_families import Tried, all_tried, plain_order, random_family
+from random_families import Tried, all_tried, plain_front, plain_order, random_family
+from syncline_design.choice import family_roads
 from syncline_design.choice.evaluate import error_key
 from syncline_design.choice.family import Family
 from syncline_design.choice.family_best import family_front, iter_differing
 from syncline_design.choice.family_parts import sensor_groups, without_sensor
 from syncline_design.choice.family_roads import choose_by_road, in_hand
-from syncline_design.choice.outcome import OutOfTime
+from syncline_design.choice.outcome import OutOfTime, TooLarge
 from syncline_design.machine.deadline import Deadline, within
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings
@@ -98,6 +99,28 @@ def test_the_best_without_a_sensor_and_the_accurate_front() -> None:
             compared += 1
     assert compared > 10
     assert points > 10
+
+
+def test_where_merging_gives_up_other_roads_take_over(monkeypatch: pytest.MonkeyPatch) -> None:
+    def too_large(*_: object, **__: object) -> None:
+        raise TooLarge("too large")
+
+    for name in ("best_of_family", "family_front"):
+        monkeypatch.setattr(family_roads, name, too_large)
+    points = 0
+    for seed in (*FEASIBLE[:4], *WITHOUT):
+        family = _family(seed)
+        choice = choose_by_road(family)
+        assert choice.proof.method == "milp"
+        best = [] if choice.found is None else [choice.found.rank[:2]]
+        assert best == plain_order(family)[:1]
+        wanted = plain_front(family, "cost")
+        for most in (0, 10**6):  # by integer programs, by enumeration
+            monkeypatch.setattr(family_roads, "MOST_ENUMERATED", most)
+            front = family_roads.front_by_road(family)
+            assert [(p.amount, error_key(p.error_m)) for p in front] == wanted, seed
+        points += len(wanted)
+    assert points > 5
 
 
 def test_a_design_in_hand_meets_and_its_gap_holds() -> None:

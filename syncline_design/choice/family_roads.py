@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from syncline_design.choice.anytime import FEW, SHARE
 from syncline_design.choice.decide import SAME, SMALL
 from syncline_design.choice.enumerate import MOST_COMBINATIONS
-from syncline_design.choice.evaluate import known_or_more
+from syncline_design.choice.evaluate import error_key, known_or_more
 from syncline_design.choice.family import (
     Family,
     FamilyDesign,
@@ -21,18 +22,24 @@ from syncline_design.choice.family import (
     rank_of,
 )
 from syncline_design.choice.family_best import (
+    APART,
     Also,
+    FamilyPoint,
     Found,
     best_of_family,
+    family_front,
     iter_family,
     primary_of,
 )
 from syncline_design.choice.family_bounds import Rest, least_of_clocks
 from syncline_design.choice.family_parts import Whole, narrowed_family
 from syncline_design.choice.family_tables import FamilyTables, tabulate_family
-from syncline_design.choice.options import Floats, Indices
+from syncline_design.choice.options import Floats, Indices, ResourceName
 from syncline_design.choice.outcome import NoVerdict, OutOfTime, Proof, Road, TooLarge
+from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force, within_s
+
+MOST_ENUMERATED = 20_000  # combinations of which a front is worked out one by one
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +116,65 @@ def all_of_family(family: Family) -> Iterator[Found]:
         in_force().check()
         for own in itertools.product(*clocks):
             yield _found(family, FamilyDesign(ways, own))
+
+
+def front_by_road(
+    family: Family, resource: ResourceName = "cost", *, accuracy: bool = False
+) -> tuple[FamilyPoint, ...]:
+    """The exact front: by merging; where that gives up by enumeration or by integer programs.
+
+    accuracy: over designs that keep the accuracy of every mission too.
+    """
+    try:
+        return family_front(family, resource, accuracy=accuracy)
+    except TooLarge:
+        if family.combinations <= MOST_ENUMERATED:
+            return tuple(_front_enumerated(family, resource, accuracy))
+        return tuple(_front_by_milp(family, resource, accuracy))
+
+
+def _front_enumerated(
+    family: Family, resource: ResourceName, accuracy: bool
+) -> Iterator[FamilyPoint]:
+    kept: list[tuple[Fraction, float, FamilyDesign]] = []
+    for one in all_of_family(family):
+        amount = one.sums.amount(resource)
+        if amount is None or broken_by_family(family, one.sums, accuracy=accuracy):
+            continue
+        kept.append((amount, one.sums.error_m, one.design))
+    lowest = math.inf
+    for amount, error, design in sorted(kept, key=lambda row: (row[0], error_key(row[1]))):
+        if error_key(error) < lowest:
+            lowest = error_key(error)
+            yield FamilyPoint(amount, error, design)
+
+
+def _front_by_milp(family: Family, resource: ResourceName, accuracy: bool) -> Iterator[FamilyPoint]:
+    """By rising amount: the least amount below the error of the point before, and its least
+    error."""
+    from syncline_design.choice.family_milp import family_by_milp
+
+    cap = math.inf
+    while True:
+        part = replace(family, problems=tuple(
+            _capped(problem, resource, cap, accuracy) for problem in family.problems
+        ))  # fmt: skip
+        design = family_by_milp(part, in_force())
+        if design is None:
+            return
+        sums = evaluate_family(part, design)
+        amount = sums.amount(resource)
+        assert amount is not None
+        yield FamilyPoint(amount, sums.error_m, design)
+        cap = sums.error_m * (1.0 - APART)
+
+
+def _capped(problem: Problem, resource: ResourceName, cap: float, accuracy: bool) -> Problem:
+    """The problem with an error below a cap; a cap of infinity asks for nothing."""
+    own = problem.limits.accuracy_m if accuracy else None
+    least = min(math.inf if own is None else own, cap)
+    limits = replace(problem.limits, accuracy_m=None if math.isinf(least) else least)
+    return replace(problem, limits=limits, objective=resource)
 
 
 def _found(family: Family, design: FamilyDesign) -> Found:

@@ -281,6 +281,6 @@ class Pieces:
             message = "the time limit ended this before it was complete: "
             out.append(("time-limit", message + ", ".join(self.cut_short)))
         if self.gave_up:
-            message = "designs may be missing here, as no further ones were simulated: "
+            message = "designs may be missing here, as the search for more gave up: "
             out.append(("search-gave-up", message + ", ".join(self.gave_up)))
         return out

@@ -16,7 +16,7 @@ import numpy as np
 from syncline_design.choice.family import Family, FamilyDesign, family_of
 from syncline_design.choice.family_best import FamilyPoint, Found, family_front, iter_family
 from syncline_design.choice.family_parts import Whole, narrowed_family
-from syncline_design.choice.family_roads import choose_by_road, in_hand
+from syncline_design.choice.family_roads import choose_by_road, front_by_road, in_hand
 from syncline_design.choice.judged import judgement
 from syncline_design.choice.options import ResourceName, Resources
 from syncline_design.choice.outcome import OutOfTime, Proof, Road
@@ -237,7 +237,7 @@ def front_of(work: Work, resource: ResourceName = "cost") -> tuple[FamilyPoint, 
     """The exact front of all that meet every requirement but accuracy, simulation included."""
     passes = passing(work)
     if passes is None:
-        return family_front(work.family, resource)
+        return front_by_road(work.family, resource)
     family, whole = promising_family(work.family)
     points = family_front(family, resource, lambda design: passes(whole(design)))
     return tuple(replace(one, design=whole(one.design)) for one in points)

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from typing import TypeVar
 
-from syncline_design.choice.family_best import FamilyPoint
 from syncline_design.choice.front import staircase
+from syncline_design.choice.outcome import TooLarge
 from syncline_design.machine.deadline import Pieces, in_force
 from syncline_design.verdict.family import (
     Build,
@@ -27,6 +28,8 @@ from syncline_design.verdict.family_named import (
 from syncline_design.verdict.family_others import alternatives, bargains, next_best
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.tree import Robustness
+
+T = TypeVar("T")
 
 
 def robustness_of(work: Work, sums: Sums, build: Callable[[], Build]) -> Robustness | None:
@@ -51,8 +54,11 @@ def robustness_of(work: Work, sums: Sums, build: Callable[[], Build]) -> Robustn
 
 def choice_of_family(work: Work, chosen: Chosen, pieces: Pieces) -> ChoiceResult:
     """The proof, the front, what comes next and what else could be bought, what was ruled out."""
-    nothing: tuple[FamilyPoint, ...] = ()
-    points = pieces.made("front", lambda: front_of(work), nothing)
+
+    def listed(name: str, source: Callable[[], Iterable[T]]) -> list[T]:
+        return pieces.listed(name, lambda: _as_far(name, source, pieces))
+
+    points = listed("front", lambda: front_of(work))
     excluded, count = ruled_out_of(work)
     found = ChoiceResult(
         proof=chosen.proof,
@@ -63,15 +69,22 @@ def choice_of_family(work: Work, chosen: Chosen, pieces: Pieces) -> ChoiceResult
     )
     if chosen.found is None:
         return found
+    every = listed("next best of every design", lambda: next_best(work, chosen, every=True))
     return replace(
         found,
-        next_best=tuple(pieces.listed("next best designs", lambda: next_best(work, chosen))),
-        next_best_every=tuple(
-            pieces.listed("next best of every design", lambda: next_best(work, chosen, every=True))
-        ),
-        alternatives=tuple(pieces.listed("alternatives", lambda: alternatives(work, chosen))),
-        bargains=tuple(pieces.listed("bargains", lambda: bargains(work, chosen, points))),
+        next_best=tuple(listed("next best designs", lambda: next_best(work, chosen))),
+        next_best_every=tuple(every),
+        alternatives=tuple(listed("alternatives", lambda: alternatives(work, chosen))),
+        bargains=tuple(listed("bargains", lambda: bargains(work, chosen, points))),
     )
+
+
+def _as_far(name: str, source: Callable[[], Iterable[T]], pieces: Pieces) -> Iterator[T]:
+    """What a source finds until its search gives up; the choice itself stands without it."""
+    try:
+        yield from source()
+    except TooLarge:
+        pieces.gave_up.append(name)
 
 
 def cannot_share(work: Work, build: Callable[[], Build]) -> tuple[str, ...]:

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from fractions import Fraction
 
 from syncline_design.choice.family import Family, FamilyDesign, broken_by_family, evaluate_family
-from syncline_design.choice.family_best import FamilyPoint, Found, family_front, iter_differing
+from syncline_design.choice.family_best import FamilyPoint, Found, iter_differing
 from syncline_design.choice.family_parts import same_sensors, sensor_groups, without_sensor
-from syncline_design.choice.family_roads import all_of_family
+from syncline_design.choice.family_roads import all_of_family, front_by_road
 from syncline_design.choice.problem import selection_of
 from syncline_design.spec.selection import Selection
 from syncline_design.verdict.alternatives import worth_it
@@ -153,7 +153,7 @@ def bargains(work: Work, chosen: Chosen, points: Sequence[FamilyPoint]) -> Itera
     limits = {problem.limits.accuracy_m for problem in problems}
     better = [p for p in points if p.amount > sums.cost]
     if limits != {None} and passing(work) is None:
-        better = [p for p in family_front(work.family, accuracy=True) if p.amount > sums.cost]
+        better = [p for p in front_by_road(work.family, accuracy=True) if p.amount > sums.cost]
     elif limits != {None}:
         better = [p for p in better if not _inaccurate(work.family, p.design)]
     one = next(iter(limits))
