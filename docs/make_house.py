@@ -30,12 +30,13 @@ def floors() -> list[list[str]]:
 def arrows() -> Counter[tuple[str, str]]:
     """(from room, to room) with the number of import statements."""
     found: Counter[tuple[str, str]] = Counter()
-    for path in sorted(PACKAGE.glob("*/*.py")):
+    for path in sorted(PACKAGE.rglob("*/*.py")):
+        room = path.relative_to(PACKAGE).parts[0]
         for node in ast.walk(ast.parse(path.read_text("utf-8"))):
             if isinstance(node, ast.ImportFrom) and node.module is not None:
                 parts = node.module.split(".")
-                if parts[0] == PACKAGE.name and len(parts) > 1 and parts[1] != path.parent.name:
-                    found[path.parent.name, parts[1]] += 1
+                if parts[0] == PACKAGE.name and len(parts) > 1 and parts[1] != room:
+                    found[room, parts[1]] += 1
     return found
 
 
