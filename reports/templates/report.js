@@ -250,6 +250,11 @@
     }]]), before = frame.previousElementSibling;
     var over = before && /^H[23]$/.test(before.tagName) && table.querySelector("caption .unseen");
     row.classList.toggle("over", Boolean(over));
+    if (frame.parentElement.matches(".pair, .trio, .split")) {
+      var both = document.createElement("div");
+      frame.replaceWith(both);
+      both.append(frame);
+    }
     frame.insertAdjacentElement(over ? "beforebegin" : "afterend", row);
   });
 

@@ -18,6 +18,7 @@ from syncline_design.cli.shared import (
     emit,
     guarded,
     output_targets,
+    pictured,
     refuse,
     watched,
 )
@@ -93,7 +94,9 @@ def timing(
     )  # fmt: skip
     wanted = _entry(as_id, write_catalog)
     reads = [*log, *([spec] if spec is not None else [])]
-    targets = output_targets(output, TIMING_FORMATS, reads, wanted.files.paths if wanted else ())
+    targets = output_targets(
+        output, pictured(TIMING_FORMATS), reads, wanted.files.paths if wanted else ()
+    )
     with watched(deadline, targets, quiet=quiet):
         told = _told(log, settings, spec, wanted, seed)
     whole = told.whole if wanted is None else _written(told, settings, wanted)
@@ -141,7 +144,8 @@ def _shown(whole: TimingAndSpec, targets: list[Target], quiet: bool) -> int:
     from syncline_design.report.on_timing import on_timing, render_timing
     from syncline_design.report.render_console import console
 
-    emit(console(on_timing(whole)), targets, lambda name: render_timing(name, whole), quiet=quiet)
+    emit(console(on_timing(whole)), targets, lambda name: render_timing(name, whole), quiet=quiet,
+         figures=lambda: {"": on_timing(whole)})  # fmt: skip
     return whole.exit_code
 
 

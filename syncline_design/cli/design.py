@@ -24,13 +24,16 @@ from syncline_design.cli.shared import (
     emit,
     guarded,
     output_targets,
+    pictured,
     refuse,
     road,
     watched,
 )
 from syncline_design.machine.streams import say
+from syncline_design.report.formats import PICTURED
 
 if TYPE_CHECKING:
+    from syncline_design.report.document import Document
     from syncline_design.verdict.optimisation import Optimised
     from syncline_design.verdict.tree import Checked, Verdict
 
@@ -71,8 +74,9 @@ def check(
     with watched(deadline, quiet=quiet):
         found = spec_files(spec, skip_others=skip_others)
     given = [] if baseline is None else [baseline]
-    targets = output_targets(output, CHECK_FORMATS, [*found.files, *given])
-    settings = CheckSettings(seed=seed, method=road(method), explain=tuple(explain or ()))
+    targets = output_targets(output, pictured(CHECK_FORMATS), [*found.files, *given])
+    settings = CheckSettings(seed=seed, method=road(method), explain=tuple(explain or ()),
+                             cloud=any(t.format in PICTURED for t in targets))  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
         earlier = None if baseline is None else read_verdicts(baseline)
         verdicts = check_files(found.files, settings)
@@ -91,7 +95,8 @@ def check(
     if found.skipped and not quiet:
         say(skipped_text(found.skipped))
     try:
-        emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet)
+        emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet,
+             figures=lambda: _pictures(verdicts))  # fmt: skip
     except OutputError as error:
         if len(refused) < len(verdicts):
             raise
@@ -105,6 +110,22 @@ def _since(verdict: Checked, earlier: Sequence[Verdict], file: str) -> Checked:
     from syncline_design.verdict.tree import Verdict
 
     return against(verdict, earlier, file) if isinstance(verdict, Verdict) else verdict
+
+
+def _pictures(verdicts: Sequence[Checked]) -> dict[str, Document]:
+    """The documents of the specs; of several, the figures' names begin with the spec's."""
+    from syncline_design.report.on_verdict import on_verdict
+    from syncline_design.verdict.tree import Verdict
+
+    found = [verdict for verdict in verdicts if isinstance(verdict, Verdict)]
+    if len(verdicts) == 1:
+        return {"": on_verdict(found[0])} if found else {}
+    named: dict[str, Document] = {}
+    for one in found:
+        stem = Path(one.file).stem
+        count = sum(name == stem or name.startswith(f"{stem}-") for name in named)
+        named[f"{stem}-{count + 1}" if stem in named else stem] = on_verdict(one)
+    return named
 
 
 def _demand_known(verdicts: Sequence[Checked], ids: Sequence[str]) -> None:
@@ -152,19 +173,23 @@ def optimize(
     """Find the best design, proven: optimum, exact front, runners-up, prices, what it hinges on."""
     deadline = deadline_of(time_limit)
     from syncline_design.report.on_choice import on_choice
-    from syncline_design.report.optimisations import OPTIMIZE_FORMATS, render_optimize
+    from syncline_design.report.optimisations import (
+        OPTIMIZE_FORMATS,
+        on_optimised,
+        render_optimize,
+    )
     from syncline_design.report.render_console import console
     from syncline_design.spec.load import load
     from syncline_design.verdict.admitted import NoSuchEntry
     from syncline_design.verdict.optimisation import OptimizeSettings
     from syncline_design.verdict.optimise import optimize
 
-    targets = output_targets(output, OPTIMIZE_FORMATS, [spec], [write_design])
+    targets = output_targets(output, pictured(OPTIMIZE_FORMATS), [spec], [write_design])
     drawn, figure = _axes(resource, against)
     settings = OptimizeSettings(
         best, pareto, drawn, figure, road(method), seed=seed,
         every=every, why_not=tuple(dict.fromkeys(why_not or ())),
-        report=any(target.format == "html" for target in targets),
+        report=any(target.format in PICTURED for target in targets),
     )  # fmt: skip
     with watched(deadline, targets, quiet=quiet):
         case = load(spec)
@@ -176,7 +201,8 @@ def optimize(
             refuse(f"syncline-design: --why-not {error}")
     if write_design is not None and found.result.exit_code == 0:
         _write_design(found, write_design)
-    emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet)
+    emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet,
+         figures=lambda: {"": on_optimised(found)})  # fmt: skip
     return found.result.exit_code
 
 
@@ -250,7 +276,7 @@ def study(
     from syncline_design.studies.store import FOLDER
 
     wanted = [*(output or ()), *([f"{output_format}:-"] if output_format else ())]
-    targets = output_targets(wanted, STUDY_FORMATS, [study_file])
+    targets = output_targets(wanted, pictured(STUDY_FORMATS), [study_file])
     if store is not None and os.path.lexists(store) and not store.is_dir():
         refuse(
             f"syncline-design: --store {store}: is no folder; give a folder, or a name not taken"
@@ -260,7 +286,8 @@ def study(
     with watched(deadline, targets, quiet=quiet, steps=False):
         result = run_study(study_file, settings, None if quiet else ProgressLine())
     text = f"{console(on_study(result))}\n{stored_text(result)}"
-    emit(text, targets, lambda name: render_study(name, result), quiet=quiet)
+    emit(text, targets, lambda name: render_study(name, result), quiet=quiet,
+         figures=lambda: {"": on_study(result)})  # fmt: skip
     return result.exit_code
 
 

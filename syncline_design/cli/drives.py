@@ -18,6 +18,7 @@ from syncline_design.cli.shared import (
     emit,
     guarded,
     output_targets,
+    pictured,
     watched,
 )
 from syncline_design.report.formats import GEODETIC_FORMATS, PLAN_FORMATS
@@ -69,14 +70,15 @@ def plan(
 
     asked = _asked(separate, reach)
     reads = [spec, *([diagnosis] if diagnosis is not None else []), *(flown or ())]
-    targets = output_targets(output, PLAN_FORMATS, reads)
+    targets = output_targets(output, pictured(PLAN_FORMATS), reads)
     with watched(deadline, targets, quiet=quiet):
         case = load(spec)
         _demand_origin(case, targets)
         found = None if diagnosis is None else _diagnosis(diagnosis)
         request = PlanRequest(asked, found, minutes, tuple(flown or ()), seed)
         run = plan_drive(as_measured(case, seed), request)
-    emit(console(on_plan(run)), targets, lambda name: render_plan(name, run), quiet=quiet)
+    emit(console(on_plan(run)), targets, lambda name: render_plan(name, run), quiet=quiet,
+         figures=lambda: {"": on_plan(run)})  # fmt: skip
     return run.result.exit_code
 
 

@@ -23,6 +23,7 @@ from syncline_design.cli.shared import (
     emit,
     guarded,
     output_targets,
+    pictured,
     refuse,
     watched,
 )
@@ -63,11 +64,12 @@ def simulate(
     from syncline_design.spec.load import load
     from syncline_design.verdict.simulated_spec import simulate_spec
 
-    targets = output_targets(output, SIMULATE_FORMATS, [spec])
+    targets = output_targets(output, pictured(SIMULATE_FORMATS), [spec])
     with watched(deadline, targets, quiet=quiet):
         run = simulate_spec(load(spec), seed=seed, samples=samples, workers=workers)
     text = console(on_simulation(run.result, run.system))
-    emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet)
+    emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet,
+         figures=lambda: {"": on_simulation(run.result, run.system)})  # fmt: skip
     return 0
 
 
@@ -137,7 +139,7 @@ def diagnose(
 
     together = _joint(joint=joint, logs=log, starts=starts, store=store)
     reads = [spec, *(log or ()), *([] if store is None else [store])]
-    targets = output_targets(output, DIAGNOSE_FORMATS, reads, [write_spec])
+    targets = output_targets(output, pictured(DIAGNOSE_FORMATS), reads, [write_spec])
     settings = DiagnosisSettings(
         seed=seed, false_alarm_rate=false_alarm_rate, max_effects=max_effects
     )
@@ -157,7 +159,8 @@ def diagnose(
     if write_spec is not None:
         _write_findings(case, found, means, write_spec)
     text = console(on_diagnosis(whole))
-    emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet)
+    emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet,
+         figures=lambda: {"": on_diagnosis(whole)})  # fmt: skip
     return found.demanded_exit_code(informative=require_informative)
 
 
@@ -265,9 +268,10 @@ def reproduce(
     from syncline_design.report.render_console import console
     from syncline_design.report.rendered import rendered
 
-    targets = output_targets(output, REPRODUCE_FORMATS)
+    targets = output_targets(output, pictured(REPRODUCE_FORMATS))
     with watched(deadline, targets, quiet=quiet):
         found = paper.reproduce(seed=seed)
     said = on_paper(found)
-    emit(console(said), targets, lambda name: rendered(name, found, lambda: said), quiet=quiet)
+    emit(console(said), targets, lambda name: rendered(name, found, lambda: said), quiet=quiet,
+         figures=lambda: {"": said})  # fmt: skip
     return 0 if found.ok else 1

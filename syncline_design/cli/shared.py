@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import os
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
@@ -18,6 +18,7 @@ from syncline_design.report import formats
 
 if TYPE_CHECKING:
     from syncline_design.machine.deadline import Deadline
+    from syncline_design.report.document import Document
     from syncline_design.report.write import Target
 
 PAGE_S = 1.0  # what drawing a page takes
@@ -58,23 +59,29 @@ def output_option(formats: tuple[str, ...]) -> Any:
         "-o",
         metavar="FORMAT:PATH",
         help=f"Write the result too; formats: {', '.join(formats)}; repeatable; path `-` is "
-        "standard output, no path a file named after the input for html.",
+        "standard output, no path a file named after the input for html"
+        + ("; svg and png: a folder." if "svg" in formats else "."),
     )
 
 
-CheckOutput = Annotated[list[str] | None, output_option(formats.CHECK_FORMATS)]
-OptimizeOutput = Annotated[list[str] | None, output_option(formats.OPTIMIZE_FORMATS)]
-SimulateOutput = Annotated[list[str] | None, output_option(formats.SIMULATE_FORMATS)]
-DiagnoseOutput = Annotated[list[str] | None, output_option(formats.DIAGNOSE_FORMATS)]
-StudyOutput = Annotated[list[str] | None, output_option(formats.STUDY_FORMATS)]
+def pictured(texts: tuple[str, ...]) -> tuple[str, ...]:
+    """The formats of a command whose result has figures."""
+    return (*texts, *formats.FIGURE_FORMATS)
+
+
+CheckOutput = Annotated[list[str] | None, output_option(pictured(formats.CHECK_FORMATS))]
+OptimizeOutput = Annotated[list[str] | None, output_option(pictured(formats.OPTIMIZE_FORMATS))]
+SimulateOutput = Annotated[list[str] | None, output_option(pictured(formats.SIMULATE_FORMATS))]
+DiagnoseOutput = Annotated[list[str] | None, output_option(pictured(formats.DIAGNOSE_FORMATS))]
+StudyOutput = Annotated[list[str] | None, output_option(pictured(formats.STUDY_FORMATS))]
 DiffOutput = Annotated[list[str] | None, output_option(formats.DIFF_FORMATS)]
 AcceptOutput = Annotated[list[str] | None, output_option(formats.ACCEPT_FORMATS)]
 LogOutput = Annotated[list[str] | None, output_option(formats.LOG_FORMATS)]
-AuditOutput = Annotated[list[str] | None, output_option(formats.AUDIT_FORMATS)]
-TimingOutput = Annotated[list[str] | None, output_option(formats.TIMING_FORMATS)]
-WatchOutput = Annotated[list[str] | None, output_option(formats.WATCH_FORMATS)]
-PlanOutput = Annotated[list[str] | None, output_option(formats.PLAN_FORMATS)]
-ReproduceOutput = Annotated[list[str] | None, output_option(formats.REPRODUCE_FORMATS)]
+AuditOutput = Annotated[list[str] | None, output_option(pictured(formats.AUDIT_FORMATS))]
+TimingOutput = Annotated[list[str] | None, output_option(pictured(formats.TIMING_FORMATS))]
+WatchOutput = Annotated[list[str] | None, output_option(pictured(formats.WATCH_FORMATS))]
+PlanOutput = Annotated[list[str] | None, output_option(pictured(formats.PLAN_FORMATS))]
+ReproduceOutput = Annotated[list[str] | None, output_option(pictured(formats.REPRODUCE_FORMATS))]
 
 
 def refuse(message: str, code: int = BAD_INPUT) -> NoReturn:
@@ -195,20 +202,39 @@ def _stem(reads: Sequence[Path]) -> str:
 
 
 def emit(
-    text: str, targets: list[Target], render: Callable[[str], str | bytes], *, quiet: bool
-) -> None:
-    """Write every target, then the text unless something else already claims standard output."""
+    text: str, targets: list[Target], render: Callable[[str], str | bytes], *, quiet: bool,
+    figures: Callable[[], Mapping[str, Document]] = dict,
+) -> None:  # fmt: skip
+    """Write every target, then the text unless something else already claims standard output.
+
+    figures: the documents whose figures go into a folder, by what the files' names begin with.
+    """
     from syncline_design.report.write import STDOUT, Target, write_outputs
 
-    rendered: list[tuple[Target, str | bytes]] = [
-        (target, render(target.format)) for target in targets
-    ]
+    rendered: list[tuple[Target, str | bytes]] = []
+    for target in targets:
+        if target.format in formats.FIGURE_FORMATS:
+            rendered += _figures(target, figures())
+        else:
+            rendered.append((target, render(target.format)))
     if text and not quiet and not any(target.path == STDOUT for target in targets):
         rendered.append((Target("text", STDOUT), without_commands(text)))
     write_outputs(rendered)
     for target in targets:
         if not target.named and not quiet:
             say(f"written to {target.path}")
+
+
+def _figures(target: Target, documents: Mapping[str, Document]) -> list[tuple[Target, str | bytes]]:
+    """A target for each figure; the user is told where there is none."""
+    from syncline_design.report.rendered import figure_files
+    from syncline_design.report.write import Target
+
+    found = figure_files(documents, "svg" if target.format == "svg" else "png")
+    if not found:
+        say(f"{target.path}: nothing written, this result has no figure")
+    folder = Path(target.path)
+    return [(Target(target.format, str(folder / name)), content) for name, content in found]
 
 
 def demand_spec(write_spec: Path | None, spec: Path | None) -> None:
@@ -242,7 +268,7 @@ def watched(
     from syncline_design.machine.deadline import OutOfTime, overdue, within
     from syncline_design.report.progress_line import StepLine
 
-    if any(target.format == "html" for target in targets):
+    if any(target.format in formats.PICTURED for target in targets):
         deadline.keep_back(PAGE_S)
     line = StepLine(quiet=quiet or not steps)
     deadline.tick = line

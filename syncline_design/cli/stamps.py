@@ -17,6 +17,7 @@ from syncline_design.cli.shared import (
     emit,
     guarded,
     output_targets,
+    pictured,
     say_unreadable,
     watched,
 )
@@ -56,7 +57,7 @@ def audit(
 
     demand_spec(write_spec, spec)
     reads = [*file, *([spec] if spec is not None else [])]
-    targets = output_targets(output, AUDIT_FORMATS, reads, [write_spec])
+    targets = output_targets(output, pictured(AUDIT_FORMATS), reads, [write_spec])
     with watched(deadline, targets, quiet=quiet):
         case = None if spec is None else load(spec)
         found = audit_files(file)
@@ -65,7 +66,8 @@ def audit(
     say_unreadable(found.unreadable)
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
-    emit(console(on_audit(found)), targets, lambda name: render_audit(name, found), quiet=quiet)
+    emit(console(on_audit(found)), targets, lambda name: render_audit(name, found), quiet=quiet,
+         figures=lambda: {"": on_audit(found)})  # fmt: skip
     return found.exit_code
 
 

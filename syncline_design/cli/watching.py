@@ -16,6 +16,7 @@ from syncline_design.cli.shared import (
     emit,
     guarded,
     output_targets,
+    pictured,
     refuse,
     watched,
 )
@@ -67,12 +68,13 @@ def watch(
     from syncline_design.verdict.pinned import as_measured
 
     files = tuple(file or ())
-    targets = output_targets(output, WATCH_FORMATS, [store, spec, *files])
+    targets = output_targets(output, pictured(WATCH_FORMATS), [store, spec, *files])
     with watched(deadline, targets, quiet=quiet):
         request = WatchRequest(store, files, false_alarm_rate)
         case = as_measured(load(spec), seed)
         found = watch_runs(case, request, DiagnosisSettings(seed=seed))
-    emit(console(on_watch(found)), targets, lambda name: render_watch(name, found), quiet=quiet)
+    emit(console(on_watch(found)), targets, lambda name: render_watch(name, found), quiet=quiet,
+         figures=lambda: {"": on_watch(found)})  # fmt: skip
     return found.exit_code
 
 

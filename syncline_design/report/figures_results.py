@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FAR = 30.0  # times the largest error of a front: beyond it no other design is drawn
+FAR = 8.0  # times the largest error of a front: beyond it no other design is drawn
 LEVEL = 0.075  # of the height of a distribution: what a line of text takes
 LETTER = 0.0185  # of its width: what a letter takes
 
@@ -177,12 +177,16 @@ def _accuracies(axes: Axes, shown: Sequence[GridPoint]) -> None:
 
 @dataclass(frozen=True, slots=True)
 class FrontMark:
-    """One design; words: its sensors and how each is stamped, where known."""
+    """One design; words: its sensors and how each is stamped, where known.
+
+    breaks: whether it breaks a requirement other than accuracy.
+    """
 
     cost: float
     error_m: float
     chosen: bool
     words: str = ""
+    breaks: bool = False
 
 
 def pareto_front(
@@ -201,11 +205,13 @@ def pareto_front(
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        _cloud(axes, cloud, points, currency)
         _staircase(axes, points, cost_limit)
         for point in points:
             tell(axes, point.cost, point.error_m, _says(point, currency))
         errors = [*(p.error_m for p in points), *([target_m] if target_m else [])]
+        around = _near(cloud, points, axes.get_xlim()[1])
+        errors += [p.error_m for p in around]
+        _cloud(axes, around, currency)
         if beside is not None:
             errors.append(beside[1])
             _named_mark(axes, *beside, "nearest", WARN)
@@ -222,14 +228,21 @@ def pareto_front(
     return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
 
 
-def _cloud(
-    axes: Axes, cloud: Sequence[FrontMark], front: Sequence[FrontMark], currency: str
-) -> None:  # fmt: skip
-    """Other designs, as far as they lie near the front: a quiet dot each."""
-    most = FAR * max(p.error_m for p in front)
-    shown = [p for p in cloud if p.error_m <= most]
-    axes.plot([p.cost for p in shown], [p.error_m for p in shown], "o", color=MUTED, alpha=0.35,
-              markersize=3, markeredgewidth=0, zorder=1)  # fmt: skip
+def _near(
+    cloud: Sequence[FrontMark], front: Sequence[FrontMark], most: float
+) -> list[FrontMark]:  # fmt: skip
+    """Designs whose price has a place on the axis and whose error is not far from the front's."""
+    far = FAR * max(p.error_m for p in front)
+    return [p for p in cloud if p.cost <= most and p.error_m <= far]
+
+
+def _cloud(axes: Axes, shown: Sequence[FrontMark], currency: str) -> None:
+    """Other designs: a quiet dot each, a cross for those that break another requirement."""
+    for marker, size, breaks in (("o", 3.0, False), ("x", 3.0, True)):
+        some = [p for p in shown if p.breaks is breaks]
+        axes.plot([p.cost for p in some], [p.error_m for p in some], marker, color=MUTED,
+                  alpha=0.45, markersize=size, markeredgewidth=0.7 if breaks else 0,
+                  linestyle="none", zorder=1)  # fmt: skip
     for point in shown:
         tell(axes, point.cost, point.error_m, _says(point, currency))
 

@@ -258,7 +258,7 @@ def _timing(verdict: Verdict) -> list[Node]:
     lead = ("A sensor whose \u03c4 stays below its \u03c4_crit is limited by its own noise, not by "
             "its timestamps.")  # fmt: skip
     return [
-        Text(lead), *show(table, silent=True),
+        Text(lead), *verdict_figures.clocks_chart(verdict), *show(table, silent=True),
         *show(verdict_tables.measured(verdict)),
     ]  # fmt: skip
 

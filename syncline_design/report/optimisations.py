@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from syncline_design.report.choice_csv import optimisation_csv
-from syncline_design.report.document import Heading, Node, Text, strong
+from syncline_design.report.document import Document, Heading, Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.report.json_out import json_text
 from syncline_design.report.on_choice import hinges_nodes, incomplete_lines
@@ -19,9 +19,14 @@ def render_optimize(name: str, found: Optimised) -> str:
         return optimisation_csv(found)
     if name == "json":
         return json_text(found.result.to_json())
+    return html(on_optimised(found))
+
+
+def on_optimised(found: Optimised) -> Document:
+    """The design report with all that the choice hinges on."""
     assert found.verdict is not None
     more: list[Node] = [Text((strong(line),)) for line in incomplete_lines(found.result)]
     asked = why_not_nodes(found.result.why_not, found.case.spec.currency)
     if asked:
         more += [Heading("Why not"), *asked]
-    return html(on_verdict(found.verdict, [*more, *hinges_nodes(found.result)]))
+    return on_verdict(found.verdict, [*more, *hinges_nodes(found.result)])

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from syncline_design.report import choice_tables, verdict_tables, verdict_words
 from syncline_design.report.document import Chart, Explorer, Node
 from syncline_design.report.text import shortened
+from syncline_design.report.words import PRIMITIVES
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
+    from syncline_design.verdict.named import CloudDesign
     from syncline_design.verdict.tree import SynclineFigures, Verdict
 
 # What draws is imported where it draws: ElementTree and matplotlib hide behind it.
@@ -102,6 +105,40 @@ def timing_chart(verdict: Verdict) -> list[Node]:
     return [Chart("timing", draw, caption)] if roles else []
 
 
+def clocks_chart(verdict: Verdict) -> list[Node]:
+    """Who stamps whom."""
+    design = verdict.design
+    if design is None:
+        return []
+
+    def draw() -> InlineFigure:
+        from syncline_design.report import figures_clocks as clocks
+
+        kept = {clock.vehicle: clock for clock in design.clocks}
+        drawn = []
+        for vehicle in dict.fromkeys(stage.vehicle for stage in design.stages):
+            sensors = tuple(
+                clocks.Stamped(
+                    f"{stage.name} \u00b7 {role}", one.name,
+                    PRIMITIVES.get(one.primitive, one.primitive), one.timestamping_name,
+                    one.timeline == "utc", one.tau_s, one.tau_crit_s,
+                    one.tau_crit_s is None or one.tau_s < one.tau_crit_s,
+                )
+                for stage, role, one in design.roles if stage.vehicle == vehicle
+            )  # fmt: skip
+            clock = kept.get(vehicle)
+            name = "no clock of its own named" if clock is None else clock.name
+            offset = None if clock is None else clock.offset_bound_s
+            drawn.append(clocks.Vehicle(vehicle, sensors, name, offset))
+        return clocks.clocks(drawn)
+
+    caption = (
+        "Each arrow leads from a sensor to the clock whose time its stamps are in. Above it: what "
+        "stamps; below it: the signal, and \u03c4, what the stamp may be wrong by."
+    )
+    return [Chart("clocks", draw, caption)]
+
+
 def ledger_chart(verdict: Verdict) -> list[Node]:
     """The terms of the total error."""
     entries = () if verdict.syncline is None else verdict.syncline.ledger
@@ -125,9 +162,23 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
     return [Chart("ledger", draw, caption)] if entries else []
 
 
+def _cloud_words(cloud: Sequence[CloudDesign], combinations: str | None) -> str:
+    """What the dots around the front are."""
+    if not cloud:
+        return ""
+    every = combinations is not None and str(len(cloud)) == combinations
+    which = "every other design" if every else f"{len(cloud)} designs drawn at random"
+    broken = any(one.breaks for one in cloud)
+    crosses = "; a cross breaks a requirement other than accuracy" if broken else ""
+    return f" Dots: {which}, as far as near the front{crosses}."
+
+
 def choice_chart(verdict: Verdict) -> list[Node]:
     """The exact front of cost against error, the chosen design on it."""
-    front = () if verdict.choice is None else verdict.choice.front or ()
+    choice = verdict.choice
+    if choice is None:
+        return []
+    front = choice.front or ()
     points = [
         (entry.cost, entry.error_m, choice_tables.is_chosen(verdict, entry),
          choice_tables.sensors(entry.design))
@@ -140,10 +191,16 @@ def choice_chart(verdict: Verdict) -> list[Node]:
 
         target, price = (lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
         drawn = [FrontMark(*point) for point in sorted(points, key=lambda point: point[0])]
-        return pareto_front(drawn, verdict_tables.currency_of(verdict), target, price)
+        around = [
+            FrontMark(one.cost, one.error_m, False, one.payload, bool(one.breaks))
+            for one in choice.cloud or ()
+            if one.error_m
+        ]
+        currency = verdict_tables.currency_of(verdict)
+        return pareto_front(drawn, currency, target, price, cloud=around)
 
     caption = (
         "Every design on the line is the cheapest with that error; nothing exists below and left "
         "of it."
-    )
+    ) + _cloud_words(choice.cloud or (), verdict.spec.combinations)
     return [Chart("choice", draw, caption)] if len(points) > 1 else []

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Final
 
 from syncline_design.machine.result_files import OutputError, descriptor_of, is_stream, write_files
-from syncline_design.report.formats import NOT_FOR_A_TERMINAL
+from syncline_design.report.formats import FIGURE_FORMATS, NOT_FOR_A_TERMINAL
 
 __all__ = [
     "STDOUT", "OutputError", "Target", "apart", "check_targets", "check_writable", "parse_target",
@@ -40,6 +40,11 @@ def parse_target(argument: str, known: Sequence[str], stem: str = "report") -> T
     of no use on a terminal, go to a file in the working folder named after `stem`.
     """
     name, separator, path = argument.partition(":")
+    if name in known and name in FIGURE_FORMATS and path in ("", STDOUT):
+        raise OutputError(
+            f"--output {argument}: figures go into a folder, a file each; expected {name}:FOLDER, "
+            f"as in --output {name}:figures"
+        )
     if name not in known:
         raise OutputError(
             f"--output {argument}: unknown format {name!r}; expected one of {', '.join(known)}, "
@@ -83,6 +88,9 @@ def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None
     inputs = {os.path.realpath(path) for path in reads}
     seen: set[str] = set()
     for target in targets:
+        if target.format in FIGURE_FORMATS:
+            _check_folder(target, inputs)
+            continue
         key = STDOUT if target.path == STDOUT else os.path.realpath(target.path)
         if key in seen:
             where = "standard output" if key == STDOUT else target.path
@@ -93,6 +101,14 @@ def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None
         if target.path != STDOUT and not is_stream(target.path):
             _keep_inputs(target, key, inputs)
             check_writable(Path(target.path))
+
+
+def _check_folder(target: Target, inputs: set[str]) -> None:
+    """Refuse a place for figures that is a file, or cannot become a folder."""
+    path = Path(target.path)
+    if os.path.realpath(path) in inputs or (path.exists() and not path.is_dir()):
+        raise OutputError(f"{target.path}: is no folder; {target.format} writes a file a figure")
+    check_writable(path / f"figure.{target.format}")
 
 
 def apart(path: Path, targets: Sequence[Target]) -> None:

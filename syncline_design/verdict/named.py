@@ -247,13 +247,27 @@ class Nearest(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class CloudDesign(Record):
+    """One of all designs, for a picture; payload: sensors and how each is stamped.
+
+    breaks: kinds of requirement that its sums break, accuracy aside.
+    """
+
+    cost: float
+    error_m: float
+    payload: str
+    breaks: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ChoiceResult(Record):
     """The `choice` of a verdict; without a design, only what is known of one.
 
     front: of cost against error, where costs are known; front_left_out: what has no place on it.
     next_best: designs that differ in a sensor; next_best_every: of all designs.  excluded: a
     thousand rows at most, excluded_count: how many there are.  alternatives: without a sensor each;
-    bargains: what a little more money, or a little more error, would buy.
+    bargains: what a little more money, or a little more error, would buy.  cloud: all designs, or
+    a sample of them, where a picture was asked for.
     """
 
     proof: Proof | None = optional()
@@ -266,6 +280,7 @@ class ChoiceResult(Record):
     excluded_count: int | None = optional()
     alternatives: tuple[Alternative, ...] | None = optional()
     bargains: tuple[Bargain, ...] | None = optional()
+    cloud: tuple[CloudDesign, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

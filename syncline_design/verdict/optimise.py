@@ -74,7 +74,10 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     build = Simulations(settings.seed).problem_of
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
-        settings.seed, settings.method, monte_carlo=simulated or settings.report
+        settings.seed,
+        settings.method,
+        monte_carlo=simulated or settings.report,
+        cloud=settings.report,
     )
     problem = NO_TABLES
     try:

@@ -20,6 +20,7 @@ class CheckSettings:
 
     monte_carlo: whether to simulate (a monte_carlo requirement stays undecided without).
     explain: ids of requirements to work out step by step.
+    cloud: whether designs around the front are told too, for a picture.
     today: the day on which waivers are judged; None: the machine's date.
     """
 
@@ -28,6 +29,7 @@ class CheckSettings:
     monte_carlo: bool = True
     explain: tuple[str, ...] = ()
     today: date | None = None
+    cloud: bool = False
 
 
 def build_of(settings: CheckSettings) -> Build:

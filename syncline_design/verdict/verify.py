@@ -18,6 +18,7 @@ from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS
 from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.cautions import unproven
 from syncline_design.verdict.choice_data import choice_of, left_out_text, without_choice
+from syncline_design.verdict.cloud import cloud
 from syncline_design.verdict.no_design import infeasible_verdict, unfinished_verdict
 from syncline_design.verdict.one_design import verdict_on, verify
 from syncline_design.verdict.open_choice import Picked, pick
@@ -117,6 +118,8 @@ def open_verdict(
         return infeasible_verdict(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
     choice = choice_of(case, problem, picked, pieces, points)
+    if settings.cloud:
+        choice = replace(choice, cloud=tuple(pieces.listed("cloud", lambda: cloud(problem))))
     found = verdict_on(case, problem, picked.verified, settings, choice)
     missing = choice.front_left_out
     warnings = (

@@ -1,0 +1,144 @@
+"""Who stamps whom: every sensor, the signal and method that stamp it, the clock that they go by.
+
+A row a sensor, grouped by vehicle; an arrow ends at the bar of the clock whose time its stamps are
+in: the vehicle's host clock, or UTC.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+from syncline_design.report import numbers
+from syncline_design.report.figures import WIDTH
+from syncline_design.report.palette import BAD, GRID, INK, LINE, MUTED, SERIES, SHADE
+from syncline_design.report.svg import InlineFigure, draw, tell
+from syncline_design.report.text import shortened
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+ROW: Final = 44.0  # height of a sensor's row, and below
+HEAD: Final = 20.0  # of a vehicle's name [SVG units]
+BOX, HOST, UTC, BAR = 112.0, 268.0, 318.0, 18.0  # right end of the boxes; left ends; width
+LETTERS: Final = 18, 28  # of a name in a box, of a method above an arrow
+
+
+@dataclass(frozen=True, slots=True)
+class Stamped:
+    """One sensor: what it is, what stamps it, by which clock, with what error.
+
+    within: whether tau stays below tau_crit; signal: PPS, network time and so on.
+    """
+
+    role: str
+    sensor: str
+    signal: str
+    method: str
+    by_utc: bool
+    tau_s: float
+    tau_crit_s: float | None
+    within: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Vehicle:
+    """The sensors of one vehicle and its host clock; offset_s None: taken as in step with UTC."""
+
+    name: str
+    sensors: tuple[Stamped, ...]
+    clock: str
+    offset_s: float | None
+
+
+def clocks(vehicles: Sequence[Vehicle], name: str = "fig-clocks") -> InlineFigure:
+    """Sensors to the left, clocks to the right, tau on every arrow between them."""
+    rows = sum(len(v.sensors) for v in vehicles)
+    height = HEAD + (HEAD + ROW) * len(vehicles) + ROW * rows
+
+    def build(figure: Figure) -> None:
+        figure.set_layout_engine("none")
+        axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        axes.set_axis_off()
+        axes.set_xlim(0.0, WIDTH)
+        axes.set_ylim(height, 0.0)
+        _bar(axes, UTC, HEAD, height, "UTC", SERIES[2])
+        top = HEAD
+        for vehicle in vehicles:
+            top = _vehicle(axes, vehicle, top)
+
+    spoken = "; ".join(
+        f"{one.role} {one.sensor}: {one.signal}, {one.method}, in "
+        f"{'UTC' if one.by_utc else 'host time'}, tau {numbers.time(one.tau_s)}"
+        for vehicle in vehicles
+        for one in vehicle.sensors
+    )
+    return draw(name, "Who stamps whom", spoken, (WIDTH, height), build)
+
+
+def _vehicle(axes: Axes, vehicle: Vehicle, top: float) -> float:
+    """One vehicle from `top` downwards; where it ends."""
+    axes.text(4.0, top + 0.5 * HEAD, shortened(vehicle.name, 40), va="center", color=MUTED)
+    first = top + HEAD
+    end = first + ROW * len(vehicle.sensors)
+    _bar(axes, HOST, first, end + ROW - 8.0, "host clock", SERIES[0])
+    for place, one in enumerate(vehicle.sensors):
+        _sensor(axes, one, first + (place + 0.5) * ROW)
+    _to_utc(axes, vehicle, end + 0.5 * ROW - 4.0)
+    return end + ROW
+
+
+def _bar(axes: Axes, left: float, top: float, bottom: float, words: str, colour: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    axes.add_patch(Rectangle((left, top), BAR, bottom - top, facecolor=SHADE, edgecolor=colour,
+                             linewidth=1.2, zorder=1))  # fmt: skip
+    axes.text(left + 0.5 * BAR, 0.5 * (top + bottom), words, rotation=90, ha="center",
+              va="center", color=INK, zorder=5, gid=f"cell-{words}-{top:.0f}")  # fmt: skip
+
+
+def _sensor(axes: Axes, one: Stamped, y: float) -> None:
+    from matplotlib.patches import Rectangle
+
+    high = 32.0
+    axes.add_patch(Rectangle((2.0, y - 0.5 * high), BOX - 2.0, high, facecolor="none",
+                             edgecolor=GRID, linewidth=1.2))  # fmt: skip
+    axes.text(8.0, y - 7.5, shortened(one.role, LETTERS[0]), va="center", color=MUTED)
+    axes.text(8.0, y + 7.5, shortened(one.sensor, LETTERS[0]), va="center", color=INK)
+    colour = LINE if one.within else BAD
+    end = UTC if one.by_utc else HOST
+    _arrow(axes, BOX, end, y, colour)
+    axes.text(BOX + 5.0, y - 10.0, shortened(one.method, LETTERS[1]), va="center", color=INK)
+    words = f"\u03c4 {numbers.time(one.tau_s, 3)}, {one.signal}"
+    axes.text(BOX + 5.0, y + 10.0, shortened(words, LETTERS[1]), va="center", color=colour)
+    tell(axes, (2.0, HOST), (y - 0.5 * high, y + 0.5 * high), [
+        ("Sensor", f"{one.role}: {one.sensor}"), ("Signal", one.signal),
+        ("Stamped by", one.method), ("In the time of", "UTC" if one.by_utc else "the host clock"),
+        ("\u03c4", numbers.time(one.tau_s)), ("\u03c4_crit", numbers.time_limit(one.tau_crit_s)),
+    ])  # fmt: skip
+
+
+def _to_utc(axes: Axes, vehicle: Vehicle, y: float) -> None:
+    """How the host clock keeps to UTC; taken as the same where nothing is said of it."""
+    offset = "in step" if vehicle.offset_s is None else (
+        f"within {numbers.time(vehicle.offset_s, 3)}"
+    )  # fmt: skip
+    _arrow(axes, HOST + BAR, UTC, y, MUTED)
+    axes.text(HOST - 5.0, y - 7.0, shortened(vehicle.clock, 40), ha="right", va="center",
+              color=MUTED)  # fmt: skip
+    axes.text(HOST - 5.0, y + 7.0, f"{offset} of UTC" if vehicle.offset_s is not None else
+              "taken as in step with UTC", ha="right", va="center", color=MUTED)  # fmt: skip
+    bound = numbers.MISSING if vehicle.offset_s is None else numbers.time(vehicle.offset_s)
+    tell(axes, (HOST, UTC), (y - 8.0, y + 8.0), [
+        ("Sensor", f"host clock of {vehicle.name}"), ("Stamped by", vehicle.clock),
+        ("In the time of", "UTC"), ("\u03c4", bound),
+    ])  # fmt: skip
+
+
+def _arrow(axes: Axes, left: float, right: float, y: float, colour: str) -> None:
+    axes.annotate("", (right, y), (left, y), zorder=3, arrowprops={
+        "arrowstyle": "-|>", "color": colour, "linewidth": 1.4, "shrinkA": 0.0, "shrinkB": 0.0,
+        "mutation_scale": 9.0,
+    })  # fmt: skip
