@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+import csv
 import os
 import shutil
+import struct
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import pytest
 
+import page_looks
 import report_samples as samples
 from diagnosis_samples import diagnosis
+from study_specs import write
+from syncline_design.auditing.run import audit
+from syncline_design.report.on_audit import on_audit
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.on_paper import on_paper
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
+from syncline_design.report.studies import render_study
+from syncline_design.spec.load import load_text
+from syncline_design.studies import StudySettings, run_study
+from syncline_design.verdict.cloud import cloud
+from syncline_design.verdict.settings import CheckSettings, build_of
+from syncline_design.verdict.tree import Verdict
 
 pytestmark = pytest.mark.browser
 
-AXE = Path(__file__).parent / "vendor" / "axe-core" / "axe.min.js"
 FLAGS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run",
     "--disable-background-networking", "--disable-component-update", "--disable-sync",
@@ -263,37 +276,137 @@ def test_page_fits_the_window(browser: Any, report: Path, width: int) -> None:
         assert opened.page.evaluate("() => document.documentElement.scrollWidth") <= width
 
 
-WIDE, NARROW = ("light", 1280), ("dark", 400)
+GRID = """\
+study: 1
+name: Grid
+base: [spec.yaml]
+grid:
+  "stages[uav].distance": {low: 30 m, high: 140 m, count: 5}
+  "requirements[ACC-1].limit": {low: 0.05 m, high: 0.5 m, count: 3}
+meets_when: decided
+"""
+SAMPLE = """\
+study: 1
+name: Sample
+base: [spec.yaml]
+sample:
+  count: 8
+  seed: 3
+  over:
+    "stages[uav].distance": 30 m .. 140 m
+    "stages[uav].v_max": {low: 1 m/s, high: 60 m/s, scale: log}
+    "stages[uav].ranging.sensor": [velodyne_hdl32e, riegl_vux1uav]
+meets_when: decided
+"""
 
 
-@pytest.mark.parametrize(
-    ("make", "view"),
-    [
-        (lambda: html(on_verdict(samples.fixed_wing())), WIDE),
-        (lambda: html(on_verdict(samples.fixed_wing())), NARROW),
-        (lambda: html(on_verdict(samples.infeasible())), NARROW),
-        (lambda: html(on_verdicts([samples.fixed_wing(), samples.failing()])), NARROW),
-        (lambda: html(on_paper(samples.reproduction())), NARROW),
-        (lambda: html(samples.simulation()[0]), NARROW),
-        (lambda: html(on_diagnosis(diagnosis())), WIDE),
-    ],
-)
-def test_axe_finds_nothing(
-    browser: Any, tmp_path: Path, make: Callable[[], str], view: tuple[str, int]
-) -> None:
+def around(verdict: Verdict) -> Verdict:
+    """As a command makes it that writes a page: with the designs around the front."""
+    found = cloud(build_of(CheckSettings())(load_text(samples.OPEN, samples.FILE)))
+    assert verdict.choice is not None
+    return replace(verdict, choice=replace(verdict.choice, cloud=found))
+
+
+def study_page(folder: Path, text: str) -> str:
+    return str(render_study("html", run_study(write(folder, text), StudySettings(workers=1))))
+
+
+def audit_page(folder: Path) -> str:
+    """A stream of stamps that slip by a second for a while."""
+    stamps = [1_700_000_000.0 + 0.1 * k + (1.0 if 100 <= k < 180 else 0.0) for k in range(400)]
+    rows = [f"{s:.6f},{1_700_000_000.001 + 0.1 * k:.6f}" for k, s in enumerate(stamps)]
+    path = folder / "gnss.csv"
+    path.write_text("stamp_s,receive_s\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return html(on_audit(audit([path])))
+
+
+KINDS: dict[str, Callable[[Path], str]] = {
+    "verdict": lambda _: html(on_verdict(around(samples.fixed_wing()))),
+    "chain": lambda _: html(on_verdict(samples.two_stages())),
+    "infeasible": lambda _: html(on_verdict(samples.infeasible())),
+    "several": lambda _: html(on_verdicts([samples.fixed_wing(), samples.failing()])),
+    "paper": lambda _: html(on_paper(samples.reproduction())),
+    "simulation": lambda _: html(samples.simulation()[0]),
+    "diagnosis": lambda _: html(on_diagnosis(diagnosis())),
+    "audit": audit_page,
+    "grid": lambda folder: study_page(folder, GRID),
+    "sample": lambda folder: study_page(folder, SAMPLE),
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_page_is_sound(browser: Any, tmp_path: Path, kind: str) -> None:
+    """One load a kind: flaws at three widths, axe in both themes, no word to the console."""
     path = tmp_path / "report.html"
-    path.write_text(make(), encoding="utf-8")
-    size = {"width": view[1], "height": 900}
-    with Opened(browser, path, color_scheme=view[0], viewport=size) as opened:
-        assert opened.page.evaluate("() => document.documentElement.scrollWidth") <= view[1]
-        opened.page.evaluate(AXE.read_text(encoding="utf-8"))
-        result = opened.page.evaluate("() => axe.run(document)")
-        found = [
-            (v["id"], v["impact"], [n["html"][:120] for n in v["nodes"]][:3])
-            for v in result["violations"]
-        ]
-        assert found == []
-        assert len(result["passes"]) > 20
+    path.write_text(KINDS[kind](tmp_path), encoding="utf-8")
+    with Opened(browser, path, viewport={"width": 1300, "height": 900}) as opened:
+        assert page_looks.flaws(opened.page) == []
+        opened.page.set_viewport_size({"width": 420, "height": 900})
+        assert page_looks.barriers(opened.page) == []
+        assert opened.console == []
+        assert opened.requests == [path.as_uri()]
+
+
+def test_a_verdict_fits_a_screen(browser: Any, report: Path) -> None:
+    """Headline, requirements and three figures within 1300 by 900; the rest is folded."""
+    size = {"width": 1300, "height": 900}
+    with Opened(browser, report, unfolded=False, viewport=size) as opened:
+        page = opened.page
+        ends = page.eval_on_selector_all(
+            "#banner, #requirements > .scroll, #requirements figure .drawing",
+            "all => all.map(e => e.getBoundingClientRect().bottom)",
+        )
+        assert len(ends) == 5
+        assert max(ends) <= 900
+        assert page.locator("details.part[open]").count() == 0
+        page.click("nav a[href='#bill']")
+        page.wait_for_selector("#bill table:visible")
+        page.emulate_media(media="print")
+        shown = "e => e.checkVisibility() && e.getBoundingClientRect().height > 20"
+        assert page.eval_on_selector("#payload table", shown)
+
+
+def test_what_a_bar_says_shows_under_the_pointer_and_by_keys(browser: Any, report: Path) -> None:
+    syncline = samples.fixed_wing().syncline
+    assert syncline is not None
+    with Opened(browser, report, viewport={"width": 1300, "height": 900}) as opened:
+        page, tip = opened.page, "#requirements .tip"
+        drawing = page.locator("#requirements .drawing").first
+        drawing.focus()
+        said = []
+        for _ in syncline.ledger:
+            page.keyboard.press("ArrowRight")
+            said.append(page.inner_text(tip))
+        largest = max(syncline.ledger, key=lambda term: term.value_m)
+        assert sum(f"{1000 * largest.value_m:.4g}" in text.replace("\u00a0", " ")
+                   for text in said) == 1  # fmt: skip
+        page.keyboard.press("Escape")
+        assert page.locator(tip).count() == 0
+        box = drawing.bounding_box()
+        assert box is not None
+        page.mouse.move(box["x"] + 0.42 * box["width"], box["y"] + 0.88 * box["height"])
+        assert "total" in page.inner_text(tip)
+
+
+def test_figures_and_tables_can_be_taken_away(browser: Any, report: Path, tmp_path: Path) -> None:
+    """SVG that stands alone, PNG of three times its size, CSV with the cells; no request."""
+    with Opened(browser, report, accept_downloads=True) as opened:
+        page, taken = opened.page, {}
+        for word in ("SVG", "PNG", "CSV"):
+            with page.expect_download() as waiting:
+                page.locator("#requirements").get_by_role("button", name=f"as {word}").first.click()
+            taken[word] = tmp_path / waiting.value.suggested_filename
+            waiting.value.save_as(taken[word])
+        drawing = ElementTree.parse(taken["SVG"]).getroot()
+        assert "var(" not in taken["SVG"].read_text("utf-8")
+        width, height = float(drawing.attrib["width"]), float(drawing.attrib["height"])
+        head = taken["PNG"].read_bytes()
+        assert head.startswith(b"\x89PNG")
+        assert struct.unpack(">II", head[16:24]) == (round(3 * width), round(3 * height))
+        rows = list(csv.reader(taken["CSV"].read_text("utf-8").splitlines()))
+        verdict = samples.fixed_wing()
+        assert [row[0] for row in rows] == ["Requirement", *(r.id for r in verdict.requirements)]
+        assert [url for url in opened.requests if not url.startswith("data:")] == [report.as_uri()]
         assert opened.console == []
 
 

@@ -223,6 +223,8 @@ def pareto_front(
         axes.set_xlabel(f"cost [{currency}]")
         axes.set_ylabel("Syncline error")
         scales.grid(axes)
+        if axes.get_legend_handles_labels()[1]:
+            figure.legend(loc="outside upper left", ncols=2, handlelength=1.6)
 
     title = "Pareto front of cost against error"
     return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
@@ -269,9 +271,7 @@ def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None
 
 def _named_mark(axes: Axes, cost: float, error_m: float, words: str, color: str) -> None:
     axes.plot([cost], [error_m], "D", color=color, markersize=10, markeredgecolor=SURFACE,
-              markeredgewidth=1.4, zorder=5)  # fmt: skip
-    axes.annotate(words, (cost, error_m), xytext=(9, 7), textcoords="offset points", color=color,
-                  fontweight="bold")  # fmt: skip
+              markeredgewidth=1.4, zorder=5, linestyle="none", label=words)  # fmt: skip
 
 
 def _front_words(
@@ -294,15 +294,11 @@ def _front_words(
 
 def _limits(axes: Axes, target_m: float | None, cost_limit: float | None, currency: str) -> None:
     if target_m:
-        axes.axhline(target_m, color=WARN, linewidth=1.6)
-        axes.annotate(f"target {numbers.length(target_m, 4)}", (0, target_m),
-                      xycoords=("axes fraction", "data"), xytext=(4, -4),
-                      textcoords="offset points", va="top", color=WARN)  # fmt: skip
+        axes.axhline(target_m, color=WARN, linewidth=1.6,
+                     label=f"target {numbers.length(target_m, 4)}")  # fmt: skip
     if cost_limit:
-        axes.axvline(cost_limit, color=WARN, linewidth=1.6, linestyle=(0, (5, 3)))
-        axes.annotate(f"limit {numbers.money(cost_limit, currency)}", (cost_limit, 1),
-                      xycoords=("data", "axes fraction"), xytext=(-4, -2),
-                      textcoords="offset points", ha="right", va="top", color=WARN)  # fmt: skip
+        axes.axvline(cost_limit, color=WARN, linewidth=1.6, linestyle=(0, (5, 3)),
+                     label=f"limit {numbers.money(cost_limit, currency)}")  # fmt: skip
 
 
 def _money_ticks(axes: Axes) -> None:

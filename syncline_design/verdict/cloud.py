@@ -4,20 +4,27 @@ from __future__ import annotations
 
 import itertools
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from syncline_design.choice.evaluate import broken, chosen_options, evaluate
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import in_force
-from syncline_design.verdict.named import CloudDesign
+from syncline_design.verdict.named import CloudDesign, FrontDesign
 
 MOST: Final = 400  # designs of a picture
+ROUNDED: Final = 1.0 + 1e-9
+SIMULATED: Final = "simulated"
 SEED: Final = 0  # which of many are drawn tells nothing, so that it need not follow the user's
 
 
-def cloud(problem: Problem) -> tuple[CloudDesign, ...]:
-    """Designs with a price, by rising price, whether they keep the requirements or not."""
+def cloud(problem: Problem, front: Sequence[FrontDesign] = ()) -> tuple[CloudDesign, ...]:
+    """Designs with a price, by rising price, whether they keep the requirements or not.
+
+    front: of cost; where figures are simulated, a design that it leaves out though no other is as
+    good breaks one of them: nothing else could have kept it out.
+    """
     found = []
     for design in _designs(problem):
         in_force().check()
@@ -26,8 +33,19 @@ def cloud(problem: Problem) -> tuple[CloudDesign, ...]:
             options = chosen_options(problem, design)
             payload = ", ".join(f"{one.sensor} ({one.method})" for one in options)
             breaks = broken(problem, sums, accuracy=False)
-            found.append(CloudDesign(float(sums.cost), float(sums.total_m), payload, breaks))
+            one = CloudDesign(float(sums.cost), float(sums.total_m), payload, breaks)
+            if not breaks and problem.judge is not None and front and not _beaten(one, front):
+                one = replace(one, breaks=(SIMULATED,))
+            found.append(one)
     return tuple(sorted(found, key=lambda one: (one.cost, one.error_m, one.payload)))
+
+
+def _beaten(one: CloudDesign, front: Sequence[FrontDesign]) -> bool:
+    """Whether a design of the front costs no more and errs no more, to rounding."""
+    return any(
+        (point.cost or 0.0) <= one.cost * ROUNDED and point.error_m <= one.error_m * ROUNDED
+        for point in front
+    )
 
 
 def _designs(problem: Problem) -> Iterator[Design]:

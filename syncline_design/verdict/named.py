@@ -250,7 +250,8 @@ class Nearest(Record):
 class CloudDesign(Record):
     """One of all designs, for a picture; payload: sensors and how each is stamped.
 
-    breaks: kinds of requirement that its sums break, accuracy aside.
+    breaks: kinds of requirement that its sums break, accuracy aside, or `simulated`; what is
+    simulated is not asked of designs that the front beats.
     """
 
     cost: float

@@ -119,7 +119,9 @@ def open_verdict(
     pieces = Pieces(lambda: refusals(problem))
     choice = choice_of(case, problem, picked, pieces, points)
     if settings.cloud:
-        choice = replace(choice, cloud=tuple(pieces.listed("cloud", lambda: cloud(problem))))
+        choice = replace(
+            choice, cloud=tuple(pieces.listed("cloud", lambda: cloud(problem, choice.front or ())))
+        )
     found = verdict_on(case, problem, picked.verified, settings, choice)
     missing = choice.front_left_out
     warnings = (

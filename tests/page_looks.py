@@ -1,0 +1,68 @@
+"""What makes a page hard to read, measured in a browser; and axe, in both themes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+AXE = Path(__file__).parent / "vendor" / "axe-core" / "axe.min.js"
+WIDTHS = (420, 768, 1300)
+FLAWS = """(width) => {
+  const flaws = [], seen = e => e.checkVisibility();
+  if (document.documentElement.scrollWidth > width) flaws.push('the page is wider than the window');
+  document.querySelectorAll('.scroll, .inner').forEach(frame => {
+    if (!seen(frame) || frame.scrollWidth <= frame.clientWidth + 1) return;
+    const hint = getComputedStyle(frame, '::before').content;
+    if (!hint.includes('scroll')) flaws.push('cut without a hint: ' + frame.ariaLabel);
+  });
+  document.querySelectorAll('figure svg').forEach(svg => {
+    if (!seen(svg)) return;
+    const name = svg.querySelector('title').textContent, frame = svg.getBoundingClientRect();
+    if (width > 1000) {
+      const part = svg.closest('section').getBoundingClientRect();
+      const beside = svg.closest('.pair, .trio, .split, .alone');
+      if (!beside && frame.width < 0.7 * part.width) flaws.push('half blank: ' + name);
+    }
+    const boxes = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim()).map(t => {
+      const m = t.getScreenCTM(), b = t.getBoundingClientRect();
+      const size = Math.hypot(m.a, m.b) * parseFloat(getComputedStyle(t).fontSize);
+      if (width < 500 && size < 11) flaws.push(`${size.toFixed(1)} px in ${name}`);
+      const out = b.left < frame.left - 1 || b.right > frame.right + 1 ||
+        b.top < frame.top - 1 || b.bottom > frame.bottom + 1;
+      if (out) flaws.push(`${t.textContent} sticks out of ${name}`);
+      return [b, t.textContent];
+    });
+    boxes.forEach(([a, one], i) => boxes.slice(i + 1).forEach(([b, other]) => {
+      const across = Math.min(a.right, b.right) - Math.max(a.left, b.left);
+      const down = Math.min(a.bottom, b.bottom) - Math.max(a.top, b.top);
+      if (across > 1.5 && down > 0.3 * Math.min(a.height, b.height))
+        flaws.push(`${one} lies on ${other} in ${name}`);
+    }));
+  });
+  return flaws;
+}"""
+
+
+def flaws(page: Any) -> list[str]:
+    """Flaws at every width, each with its width."""
+    found = []
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 900})
+        page.evaluate("() => new Promise(done => requestAnimationFrame(() => setTimeout(done)))")
+        found += [f"{width}: {flaw}" for flaw in page.evaluate(FLAWS, width)]
+    return found
+
+
+def barriers(page: Any) -> list[tuple[str, str, list[str]]]:
+    """What axe finds in the light theme at the width that there is, then in the dark one."""
+    page.evaluate(AXE.read_text(encoding="utf-8"))
+    found = []
+    for theme in ("light", "dark"):
+        page.emulate_media(color_scheme=theme)
+        result = page.evaluate("() => axe.run(document)")
+        assert len(result["passes"]) > 15
+        found += [
+            (theme, one["id"], [node["html"][:120] for node in one["nodes"]][:3])
+            for one in result["violations"]
+        ]
+    return found
