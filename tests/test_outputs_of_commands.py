@@ -7,10 +7,14 @@ import re
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
+from typing import cast
 
 import pytest
+from typer import Typer
+from typer.testing import CliRunner
 
 import command as commands
+from syncline_design.cli.app import app, called
 
 ROOT = Path(__file__).resolve().parent.parent
 TRACK, USV = "specs/position_track.yaml", "specs/usv_mapping.yaml"
@@ -139,3 +143,21 @@ def test_no_page_installs_from_an_index_that_does_not_have_it() -> None:
         for line in page.read_text("utf-8").splitlines():
             if "pip install" in line:
                 assert re.search(r"install (--\S+ |-\S+ )*['\"]?(\.|git\+)", line), (page, line)
+
+
+def test_a_command_alone_is_the_command_among_all() -> None:
+    runner = CliRunner()
+    commands = [[str(one.name)] for one in app.registered_commands]
+    commands += [
+        [str(group.name), str(one.name)]
+        for group in app.registered_groups
+        for one in cast(Typer, group.typer_instance).registered_commands
+    ]
+    assert len(commands) > 15
+    for arguments in [*commands, ["catalog"], ["log"]]:
+        alone, among = (
+            runner.invoke(one, [*arguments, "--help"]) for one in (called(arguments), app)
+        )
+        assert alone.output == among.output
+    for arguments in ([], ["--version"], ["chek"], ["--", "check"]):
+        assert called(arguments) is app
