@@ -23,6 +23,7 @@ from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_log import LogEvidence, by_log
 from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.on_paper import OnPaper
+from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.result import (
     BlindSpot,
@@ -93,7 +94,7 @@ def found(short: Path) -> Diagnosis:
 def late(short: Path, found: Diagnosis) -> Acceptance:
     """The acceptance on that log, whose diagnosis is made once."""
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr(acceptance, "diagnose", lambda *_: found)
+        patched.setattr(acceptance, "sighted", lambda *_: Sighted(found))
         return accept(load(EXAMPLE), [short], AcceptSettings())
 
 
@@ -494,6 +495,25 @@ def test_what_cannot_be_asked_is_refused(clocked: Path, tmp_path: Path) -> None:
         done = run("accept", clocked, *arguments)
         assert (done.exit_code, done.stdout) == (2, ""), done.stderr
         assert words in done.stderr
+
+
+def test_a_table_of_stamps_is_not_assigned_but_named(clocked: Path) -> None:
+    log = stamped(clocked.parent / "stamps.csv", 0.0)
+    done = run("accept", clocked, "--assign", f"uav/position={log}", "--only", "timing")
+    assert (done.exit_code, done.stdout) == (2, "")
+    assert "uav_position.csv" in done.stderr
+    assert "log: {streams: {position: stamps}}" in done.stderr
+
+
+def test_a_spec_of_several_missions_is_refused_at_its_place() -> None:
+    spec = ROOT / "examples" / "uav_three_heights.yaml"
+    lines = spec.read_text("utf-8").splitlines()
+    at = 1 + next(k for k, line in enumerate(lines) if line.startswith("missions:"))
+    done = run("accept", spec, EXAMPLE.with_suffix(".csv"))
+    assert (done.exit_code, done.stdout) == (2, "")
+    line = int(done.stderr.split("uav_three_heights.yaml:")[1].split(":")[0])
+    assert line in (at, at + 1)
+    assert "give it a spec of one mission" in done.stderr
 
 
 def test_a_clock_log_of_several_vehicles_needs_an_owner(tmp_path: Path) -> None:

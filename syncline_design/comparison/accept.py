@@ -27,7 +27,7 @@ from syncline_design.comparison.evidence_files import EvidenceFiles, evidence_fi
 from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.comparison.stamp_meaning import held_against
-from syncline_design.diagnosis.run import diagnose
+from syncline_design.diagnosis.built import sighted
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
 from syncline_design.spec.case import Case
@@ -114,9 +114,9 @@ def _diagnosed(
     if not places and not (wanted and named):
         return None
     pinned = as_measured(case, seed)
-    found = diagnose(pinned, places, DiagnosisSettings(seed=seed, unseen_block=False))
-    paper = OnPaper.beside(pinned, found, seed)
-    return LogEvidence(found, paper, case.stages[-1].choice.name, _clocks(case, rests_on))
+    sight = sighted(pinned, places, DiagnosisSettings(seed=seed, unseen_block=False))
+    paper = OnPaper.beside(pinned, sight.found, seed)
+    return LogEvidence.of(sight, paper, case.stages[-1].choice.name, _clocks(case, rests_on))
 
 
 def _broken_by(sound: bool, rows: Sequence[AssumptionResult]) -> Iterator[str]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 from syncline_design.effects.record import Promise
-from syncline_design.machine.records import Named, Record
+from syncline_design.machine.records import Named, Record, optional
 from syncline_design.verdict.tree import Word
 
 SCHEMA: Final = "syncline-design/acceptance/v1"
@@ -25,7 +25,8 @@ class MeasuredFigure(Record):
     """A figure that evidence gives, with its 95 % interval where there is one, in SI.
 
     Of a departure that was looked for and not found the value is 0 and the interval what the log
-    would have shown.
+    would have shown; of a bound of clock logs low is what they show themselves; of messages with
+    two times the error of a stamp lies between 0 and the time to its receipt.
     """
 
     value: float | None
@@ -41,6 +42,9 @@ class AssumptionResult(Record):
     and rate, `target` of the reference.  assumed: a bound (timing, clock, speed, rate), the
     departure from the spec (0; latency, lever_arm, mounting), or a factor on the spec's figure (1;
     noise); None where the spec says none.  line, column: where the spec says it.
+    from_s, to_s: the stamps between which the departure stands out, where it is a part of the log.
+    least_stretch_s: the shortest stretch of the log that a row speaks about that holds: what turns
+    the verdict would have shown wherever it had acted so long.
     """
 
     stage: str
@@ -53,6 +57,9 @@ class AssumptionResult(Record):
     evidence: str
     line: int
     column: int
+    from_s: float | None = optional()
+    to_s: float | None = optional()
+    least_stretch_s: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

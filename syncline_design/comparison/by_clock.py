@@ -37,7 +37,7 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
         return Judgement("not_shown", f"the clock logs are in doubt: {found.doubts[0]}")
     if found.bound_s is None or one.value is None:
         return Judgement("not_shown", f"the clock logs bound nothing: {found.claim.why_not}")
-    figure = MeasuredFigure(found.bound_s)
+    figure = MeasuredFigure(found.bound_s, min(_seen_s(found), found.bound_s), found.bound_s)
     asked, measured = format_duration(one.value), format_duration(found.bound_s)
     if found.bound_s > one.value and _seen_s(found) <= one.value:
         said = (f"measured bound {measured}, more than the {asked} assumed, but no session was "

@@ -9,16 +9,19 @@ from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.by_stretch import SPOKEN_OF, InStretches, amount
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper, size_of
+from syncline_design.diagnosis.built import Sighted
+from syncline_design.diagnosis.limits import Beyond
+from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.model.quantity import format_duration
 
 # what undoes a departure, so that neither the log nor the objects' places show both together
 _ALONE: Final = {
-    "latency": ", but for a delay common to all sensors, which moves nothing that stands still, "
-    "and for one that acts for a part of the log only, which has to be larger to show",
+    "latency": ", but for a delay common to all sensors, which moves nothing that stands still",
     "lever_arm": ", but for an equal error of the other lever arm, which undoes it",
     "mounting": ", but for a turn of the other sensor that undoes it",
 }
@@ -40,6 +43,23 @@ class LogEvidence:
     paper: OnPaper
     last_stage: str
     clocks: Mapping[str, str] = field(default_factory=dict)
+    sight: Sighted | None = None
+
+    @classmethod
+    def of(
+        cls, sight: Sighted, paper: OnPaper, last_stage: str, clocks: Mapping[str, str]
+    ) -> LogEvidence:
+        """All that a log says."""
+        return cls(sight.found, paper, last_stage, clocks, sight)
+
+    @property
+    def parts(self) -> InStretches:
+        """What it says of stretches, and of departures that undo one another."""
+        duration_s = self.found.log.duration_s
+        if self.sight is None:
+            return InStretches(self.paper, self.is_of, duration_s)
+        seen = self.sight
+        return InStretches(self.paper, self.is_of, duration_s, seen.stretches, seen.open)
 
     def is_of(self, effect: str, sensors: Collection[str], stage: str, one: Assumed) -> bool:
         """Whether an effect of a stage's sensors would break this assumption."""
@@ -53,14 +73,23 @@ class LogEvidence:
 def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     """What a measured log says of one assumption."""
     if one.name in _CODES:
-        return _of_platform(one, log.found, log.last_stage)
+        return _of_platform(one, log)
     own = [f for f in log.found.findings if log.is_of(f.effect, _sensors(f), f.stage, one)]
     breaking = [f for f in own if f.material and f.kind != "stand_in"]
-    if breaking:
-        return _broken(one, breaking)
+    unsure = _whose_noise(one, log, breaking)
+    if unsure is not None:
+        return unsure
+    standing = log.parts.standing(one)
+    if breaking or (standing is not None and standing.status == "broken"):
+        return _broken(one, breaking, standing, _noise_figure(one, log))
     doubt = _doubt(one, log)
     if doubt:
         return Judgement("not_shown", doubt)
+    if standing is not None:
+        return standing
+    undone = list(log.parts.undone(one))
+    if undone:
+        return Judgement("not_shown", f"not told apart on this log: {'; '.join(undone)}")
     if own:
         return _immaterial(one, own, log.paper)
     return _nothing_found(one, log)
@@ -71,11 +100,39 @@ def _sensors(finding: Finding) -> tuple[str, ...]:
     return (finding.sensor, *(finding.also or ()))
 
 
-def _broken(one: Assumed, breaking: Sequence[Finding]) -> Judgement:
+def _broken(
+    one: Assumed, breaking: Sequence[Finding], standing: Judgement | None,
+    noise: MeasuredFigure | None,
+) -> Judgement:  # fmt: skip
     """By the largest departure; all of them are said, with what the log cannot tell them from."""
+    also = standing if standing is not None and standing.status == "broken" else None
+    if not breaking:
+        assert also is not None
+        return also
     first = max(breaking, key=lambda f: f.size_m or 0.0)
-    words = "; ".join(_said(f) for f in breaking)
-    return Judgement("broken", words, _figure(one, first))
+    words = "; ".join([*(_said(f) for f in breaking), *([also.words] if also else [])])
+    figure = _figure(one, first)
+    if one.name == "noise" and noise is not None:
+        figure = noise
+        words += "; the interval counts what is as likely another sensor's"
+    return Judgement("broken", words, figure, first.from_s, first.to_s)
+
+
+def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) -> Judgement | None:
+    """Noise beyond the figure that the log cannot lay on one sensor."""
+    figure = _noise_figure(one, log)
+    if one.name != "noise" or figure is None or figure.low is None or figure.high is None:
+        return None
+    if not breaking or any(f.effect != "noise_understated" for f in breaking) or figure.low > 1.0:
+        return None
+    others = [name.split("/")[1] for name, f in (log.sight.factors if log.sight else {}).items()
+              if name.startswith(f"{one.stage}/") and name != f"{one.stage}/{one.role}"
+              and f.high > FACTOR_LIMIT]  # fmt: skip
+    if not others:
+        return None
+    words = (f"noise beyond the spec's, of {one.role} or {' or '.join(others)}: this log cannot "
+             f"tell whose ({_said(breaking[0])})")  # fmt: skip
+    return Judgement("not_shown", words, figure)
 
 
 def _said(finding: Finding) -> str:
@@ -146,7 +203,7 @@ def _nothing_found(one: Assumed, log: LogEvidence) -> Judgement:
     """Holds where the log would have shown whatever turns the verdict."""
     if one.name in ("timing", "clock"):
         return Judgement("not_shown", "a log of places alone does not show a bound of stamps")
-    figure = _noise_figure(one, log.found) if one.name == "noise" else _seen(one, log)
+    figure = _noise_figure(one, log) if one.name == "noise" else _seen(one, log)
     hidden = list(_hidden(one, log))
     if hidden:
         words = f"this log could hide what turns the verdict: {'; '.join(hidden)}"
@@ -155,8 +212,27 @@ def _nothing_found(one: Assumed, log: LogEvidence) -> Judgement:
         return Judgement("not_shown", "this log cannot show it")
     if one.name == "noise":
         return _noise(one, log, figure)
-    words = f"not found, and this log would have shown what turns the verdict{_ALONE[one.name]}"
-    return Judgement("holds", words, figure)
+    return _shown(one, log, figure)
+
+
+def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
+    """Holds, and says how long what turns the verdict would have had to act to show."""
+    alone = _ALONE[one.name]
+    least = log.parts.least_s(one)
+    if least is None:
+        words = f"not found, and this log would have shown what turns the verdict{alone}"
+        return Judgement("holds", words, figure)
+    length_s, sizes = least
+    if not length_s <= SPOKEN_OF * log.found.log.duration_s:
+        begins = "half" if math.isinf(length_s) else format_duration(float(f"{length_s:.2g}"))
+        shows = f" (it shows {sizes})" if sizes else ""
+        words = (f"what turns the verdict and acts for less than {begins} of this log would not "
+                 f"have shown{shows}; a longer log would do")  # fmt: skip
+        return Judgement("not_shown", words)
+    stretch = format_duration(float(f"{length_s:.2g}"))
+    words = (f"not found, and what turns the verdict would have shown wherever it had acted for "
+             f"{stretch} or longer ({sizes}){alone}")  # fmt: skip
+    return Judgement("holds", words, figure, least_stretch_s=length_s)
 
 
 def _hidden(one: Assumed, log: LogEvidence) -> Iterator[str]:
@@ -180,27 +256,17 @@ def _hidden_words(shown: Smallest, log: LogEvidence) -> str:
     units = {p.name: p.unit for p in registry()[shown.effect].parameters}
     unit = units[shown.parameter]
     at = log.paper.turns_at(shown)
-    begins = "" if at is None else f" from {_amount(at, unit)} on"
+    begins = "" if at is None else f" from {amount(at, unit)} on"
     if shown.sure is None:
         return f"{shown.effect} turns it{begins}, and no size of it shows"
     words = f"{shown.effect} turns it{begins or ' before it shows'}, "
-    words += f"{'and shows ' if at else ''}from {_amount(shown.sure, unit)} on"
+    words += f"{'and shows ' if at else ''}from {amount(shown.sure, unit)} on"
     if registry()[shown.effect].grows and at is not None:
         # what drifts shows with the log's length to the power 3/2
         longer_s = log.found.log.duration_s * (shown.sure / at) ** (2.0 / 3.0)
         words += (f" (over the spec's horizon; a log of {format_duration(_rounded_up(longer_s))} "
                   "would show it)")  # fmt: skip
     return words
-
-
-def _amount(value: float, unit: str) -> str:
-    """Two digits are enough of what is an estimate."""
-    rounded = float(f"{value:.2g}")
-    if unit == "s":
-        return format_duration(rounded)
-    if unit.startswith("rad"):
-        return f"{math.degrees(rounded):.2g} deg{unit[3:]}"
-    return f"{rounded:g} {unit}".rstrip()
 
 
 def _rounded_up(duration_s: float) -> float:
@@ -226,9 +292,13 @@ def _sizes(one: Assumed, log: LogEvidence) -> Iterator[float]:
             yield size_of(shown)
 
 
-def _noise_figure(one: Assumed, found: Diagnosis) -> MeasuredFigure | None:
+def _noise_figure(one: Assumed, log: LogEvidence) -> MeasuredFigure | None:
     """The standard deviation that was found, white and slow together, over the spec's."""
     key = f"{one.stage}/{one.role}"
+    own = log.sight.factors.get(key) if log.sight is not None else None
+    if own is not None:
+        return MeasuredFigure(own.value, own.low, own.high)
+    found = log.found
     white = found.noise.white_factor.get(key)
     if white is None:
         return None
@@ -239,31 +309,50 @@ def _noise_figure(one: Assumed, found: Diagnosis) -> MeasuredFigure | None:
 
 def _noise(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
     factor = figure.value or 0.0
-    if log.paper.noisier(one.role, one.stage, factor):
-        words = f"{factor:.3g} times the spec's figure is nothing unusual, but turns the verdict"
+    most = max(factor, figure.high or 0.0)
+    if log.paper.noisier(one.role, one.stage, most):
+        words = (f"up to {most:.3g} times the spec's figure is nothing unusual on this log, but "
+                 "turns the verdict")  # fmt: skip
         return Judgement("not_shown", words, figure)
     return Judgement(
         "holds", f"{factor:.3g} times the spec's figure, nothing material beyond it", figure
     )
 
 
-def _of_platform(one: Assumed, found: Diagnosis, last_stage: str) -> Judgement:
-    """Speed or turn rate: a contradiction or caution of the log's checks breaks it."""
-    beyond = _check(found.checks, _CODES[one.name], one.stage)
-    if beyond is not None:
-        return Judgement("broken", beyond.message, MeasuredFigure(beyond.value))
+def _of_platform(one: Assumed, log: LogEvidence) -> Judgement:
+    """Speed or turn rate: a contradiction or caution of the log's checks breaks it, and so does a
+    mean over seconds that lies beyond the limit whatever the readings' noise."""
+    found, code = log.found, _CODES[one.name]
     name, unit = _MOTION[one.name]
     motion = found.log.motion.get(name)
-    if motion is None or one.stage != last_stage or one.value is None:
+    mean = log.sight.beyond.get((code, one.stage)) if log.sight is not None else None
+    beyond = _check(found.checks, code, one.stage)
+    if beyond is not None:
+        ends = (None, None) if mean is None else (mean.low, mean.high)
+        return Judgement("broken", beyond.message, MeasuredFigure(beyond.value, *ends))
+    if mean is not None and one.value is not None and mean.least > (1.0 + READ) * one.value:
+        return _over(one, mean)
+    if motion is None or one.stage != log.last_stage or one.value is None:
         return Judgement("not_shown", "the log does not tell of it")
     reached = max(abs(motion.low), abs(motion.high)) * unit
     most = reached if motion.most is None else motion.most * unit
+    figure = MeasuredFigure(most)
+    if mean is not None:
+        figure = MeasuredFigure(most, min(mean.low, most), max(mean.high, most))
     if reached < MOVED * one.value:
-        return Judgement("not_shown", "the log stays far below the limit", MeasuredFigure(most))
+        return Judgement("not_shown", "the log stays far below the limit", figure)
     if most > (1.0 + READ) * one.value:
         words = "the log goes beyond the limit for moments, or its readings scatter that far"
-        return Judgement("not_shown", words, MeasuredFigure(most))
-    return Judgement("holds", "the most that the log reaches", MeasuredFigure(most))
+        return Judgement("not_shown", words, figure)
+    return Judgement("holds", "the most that the log reaches", figure)
+
+
+def _over(one: Assumed, mean: Beyond) -> Judgement:
+    share = mean.share((1.0 + READ) * (one.value or 0.0))
+    words = (f"beyond the limit in {100.0 * share:.2g} % of the log, by means over "
+             f"{format_duration(float(f'{mean.over_s:.2g}'))} and more than the readings' noise "
+             "can do")  # fmt: skip
+    return Judgement("broken", words, MeasuredFigure(mean.most, mean.low, mean.high))
 
 
 def _check(checks: Iterable[Check], code: str, stage: str) -> Check | None:

@@ -85,12 +85,13 @@ def _sound(bound_s: float, stream: StreamAudit, size: float, but: str = "") -> J
     """
     seen, asked = format_duration(size), format_duration(bound_s)
     state = f"stays within what is assumed ({but})" if but else "is sound"
+    figure = MeasuredFigure(size, 0.0, size)
     lead = f"stream {stream.name} {state}; receipts come within {seen} of their stamps"
     if stream.messages < LEAST_MESSAGES:
         return Judgement("not_shown", f"{lead}, but {stream.messages} messages bear no bound out: "
-                         f"{LEAST_MESSAGES} are needed", MeasuredFigure(size))  # fmt: skip
+                         f"{LEAST_MESSAGES} are needed", figure)  # fmt: skip
     if size <= bound_s:
         return Judgement("holds", f"{lead}, and {asked} are assumed; a delay before the stamp was "
-                         "taken would not show here (`latency`)", MeasuredFigure(size))  # fmt: skip
+                         "taken would not show here (`latency`)", figure)  # fmt: skip
     return Judgement("not_shown", f"{lead}, transport included: more than the {asked} assumed",
-                     MeasuredFigure(size))  # fmt: skip
+                     figure)  # fmt: skip

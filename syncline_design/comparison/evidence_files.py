@@ -41,6 +41,8 @@ def evidence_files(
 ) -> EvidenceFiles:
     """Sort the files of a call; BadInput where it cannot be told whose clock a log is of."""
     _demand_places(case, assigned)
+    for name, paths in assigned.items():
+        _demand_clocks(name, paths)
     clocks = dict(assigned)
     plain = tuple(path for path in logs if is_clock_log(path))
     if plain:
@@ -76,6 +78,18 @@ def _demand_places(case: Case, assigned: Mapping[str, Sequence[Path]]) -> None:
         expected = "a vehicle or STAGE/ROLE: " + ", ".join(known)
         raise BadInput((Flaw(str(case.path), 0, 0, "", f"--assign {wrong}: not in the spec",
                              expected, repr(wrong), ""),))  # fmt: skip
+
+
+def _demand_clocks(name: str, paths: Sequence[Path]) -> None:
+    """Refuse tables of stamps: they are not assigned, but told by their names."""
+    for path in paths:
+        if not path.is_file() or is_clock_log(path) or "stamps" not in _kinds(path):
+            continue
+        table, role = f"{name.replace('/', '_')}.csv", name.split("/")[-1]
+        hint = (f"give it without --assign: it is told by its file's name ({table}), or by the "
+                f"spec's `log: {{streams: {{{role}: {path.stem}}}}}`")  # fmt: skip
+        raise BadInput((Flaw(str(path), 0, 0, "", f"--assign {name}: messages with two times, no "
+                             "clock log", "a log of a clock", path.name, hint),))  # fmt: skip
 
 
 def _only_vehicle(case: Case, log: Path) -> str:

@@ -12,11 +12,17 @@ from syncline_design.spec.case import Case
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """What one piece of evidence says: the status, in words why, and the figure if it has one."""
+    """What one piece of evidence says: the status, in words why, and the figure if it has one.
+
+    from_s, to_s: the stretch that it is about; least_stretch_s: the shortest that it speaks about.
+    """
 
     status: Status
     words: str
     measured: MeasuredFigure | None = None
+    from_s: float | None = None
+    to_s: float | None = None
+    least_stretch_s: float | None = None
 
 
 NO_EVIDENCE = Judgement("not_shown", "none of these logs tells of it")
@@ -28,8 +34,10 @@ def together(case: Case, one: Assumed, said: Sequence[Judgement]) -> AssumptionR
     status = "holds" if "holds" in statuses and "broken" not in statuses else worst(statuses)
     telling = [each for each in said if each.status == status] or [NO_EVIDENCE]
     line, column = case.position(one.key)
+    place = next((each for each in telling if each.from_s is not None), telling[0])
     return AssumptionResult(
         one.stage, one.role, one.name, one.value,
         next((each.measured for each in telling if each.measured is not None), None),
         one.unit, status, "; ".join(each.words for each in telling), line, column,
+        place.from_s, place.to_s, place.least_stretch_s,
     )  # fmt: skip

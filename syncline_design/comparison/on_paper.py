@@ -5,7 +5,7 @@ The requirements that `check` judges are all asked, whatever their kind.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -66,6 +66,11 @@ class OnPaper:
         """Whether findings that do not matter by themselves turn the verdict."""
         entries = [e for f in own if f.fits_a_spec for e in f.as_entries()]
         return self.sound and bool(entries) and not self.meets(entries)
+
+    def turned(self, effect: str, sensor: str, stage: str, values: Mapping[str, float]) -> bool:
+        """Whether a departure turns the verdict, its other parameters at zero."""
+        zero = {p.name: 0.0 for p in registry()[effect].parameters}
+        return self.sound and not self.meets([_entry(effect, sensor, stage, {**zero, **values})])
 
     def noisier(self, sensor: str, stage: str, factor: float) -> bool:
         """Whether a sensor so many times noisier than its figure turns the verdict."""

@@ -1,0 +1,153 @@
+"""Evidence of stretches of a log, and what it leaves open while other assumptions are free."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+from syncline_design.comparison.acceptance import MeasuredFigure
+from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.judgement import Judgement
+from syncline_design.comparison.on_paper import OnPaper
+from syncline_design.diagnosis.stretches import Reach, Stands, Stretches
+from syncline_design.diagnosis.undone import LeftOpen
+from syncline_design.effects import registry
+from syncline_design.model.quantity import format_duration
+
+SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show
+TOLD_S: Final = 1.0  # a short stretch whose size is told beside
+IsOf = Callable[[str, tuple[str, ...], str, Assumed], bool]
+
+
+@dataclass(frozen=True, slots=True)
+class InStretches:
+    """What stands out in stretches of a log or would have, and what it leaves open.
+
+    duration_s: of the log.  is_of: whether an effect of sensors of a stage breaks an assumption.
+    """
+
+    paper: OnPaper
+    is_of: IsOf
+    duration_s: float
+    found: Stretches = field(default_factory=Stretches)
+    open: tuple[LeftOpen, ...] = ()
+
+    def standing(self, one: Assumed) -> Judgement | None:
+        """What stands out and turns the verdict: of this assumption, or perhaps of it."""
+        said = [j for s in self.found.stands if (j := self._of(s, one)) is not None]
+        return next((j for j in said if j.status == "broken"), said[0] if said else None)
+
+    def _of(self, s: Stands, one: Assumed) -> Judgement | None:
+        name, sensor, _ = s.label
+        own = self.is_of(name, (sensor,), s.stage, one)
+        also = any(self.is_of(other, (by,), s.stage, one) for other, by, _ in s.others)
+        if not (own or also) or not self.paper.turned(name, sensor, s.stage, _values(s)):
+            return None
+        place = f"from {s.from_s:.6g} s to {s.to_s:.6g} s"
+        if own and s.sure:
+            others = [f"{name} ({sensor})" for name, sensor, _ in s.others]
+            rivals = f" (or {', '.join(others)}: this log cannot tell)" if others else ""
+            words = f"{_amounts(s)} stands out {place}, and would turn the verdict{rivals}"
+            return Judgement("broken", words, _figure(s, one), s.from_s, s.to_s)
+        if s.sure:
+            words = f"this log cannot tell it from what stands out {place}: {name} ({sensor})"
+        else:
+            by_chance = f"{math.exp(s.log_p):.1g}"
+            words = (f"{_amounts(s)} seems to stand out {place}: a sound log shows as much "
+                     f"anywhere with a chance of {by_chance}; a longer log would tell")  # fmt: skip
+        return Judgement("not_shown", words, None, s.from_s, s.to_s)
+
+    def least_s(self, one: Assumed) -> tuple[float, str] | None:
+        """The shortest stretch in which what turns the verdict would have shown, and what shows.
+
+        None where nothing was looked for in stretches; inf where no stretch shows it.
+        """
+        told = [self._shortest(own) for own in self._reaches(one)]
+        return max(told, key=lambda pair: pair[0]) if told else None
+
+    def _reaches(self, one: Assumed) -> list[list[Reach]]:
+        groups: dict[tuple[str, str, int], list[Reach]] = {}
+        for reach in self.found.reaches:
+            name, sensor, _ = reach.label
+            if self.is_of(name, (sensor,), reach.stage, one):
+                groups.setdefault(reach.label, []).append(reach)
+        return list(groups.values())
+
+    def _shortest(self, own: Sequence[Reach]) -> tuple[float, str]:
+        """Of one effect, by the parameter that shows least at each length; by halving."""
+        lengths = own[0].lengths_s
+        worst = [max(own, key=lambda r: r.sizes[k]) for k in range(len(lengths))]
+
+        def shown(k: int) -> bool:
+            size = worst[k].sizes[k]
+            name, sensor, _ = worst[k].label
+            values = {worst[k].parameter: min(size, worst[k].most)}
+            return math.isfinite(size) and not self.paper.turned(
+                name, sensor, worst[k].stage, values
+            )
+
+        low, high = 0, len(lengths)
+        while low < high:
+            middle = (low + high) // 2
+            low, high = (low, middle) if shown(middle) else (middle + 1, high)
+        least = lengths[low] if low < len(lengths) else math.inf
+        return least, "; ".join(_sizes(lengths, worst, low))
+
+    def undone(self, one: Assumed) -> Iterator[str]:
+        """Departures that another one undoes on this log, so far that the verdict would turn."""
+        told: set[tuple[str, str, int]] = set()
+        for each in self.open:
+            name, sensor, _ = each.label
+            if each.label in told or not self.is_of(name, (sensor,), each.stage, one):
+                continue
+            if self.paper.turned(name, sensor, each.stage, {each.parameter: each.size}):
+                told.add(each.label)
+                by, whose, _ = each.by
+                yield (f"{name} may be as large as {amount(each.size, each.unit)} where {by} "
+                       f"({whose}) undoes it on this log; alone it would be known to "
+                       f"{amount(each.alone, each.unit)}")  # fmt: skip
+
+
+def _sizes(lengths: Sequence[float], worst: Sequence[Reach], at: int) -> Iterator[str]:
+    """What shows in the least stretch, and in one of about a second."""
+    short = next((k for k, length in enumerate(lengths) if length >= TOLD_S), 0)
+    for k in sorted({short, min(at, len(lengths) - 1)}):
+        size, lasts = worst[k].sizes[k], format_duration(float(f"{lengths[k]:.2g}"))
+        if math.isfinite(size):
+            yield f"in {lasts} from {amount(size, worst[k].unit)} on"
+
+
+def _values(s: Stands) -> dict[str, float]:
+    return dict(zip(s.parameters, s.values, strict=True))
+
+
+def _amounts(s: Stands) -> str:
+    name, sensor, _ = s.label
+    units = {p.name: p.unit for p in registry()[name].parameters}
+    parts = [amount(v, units[p]) for p, v in zip(s.parameters, s.values, strict=True)]
+    return f"{name} ({sensor}) of {', '.join(parts)}"
+
+
+def _figure(s: Stands, one: Assumed) -> MeasuredFigure | None:
+    """Of several components, their root sum of squares, with that of their intervals' ends."""
+    units = {p.name: p.unit for p in registry()[s.label[0]].parameters}
+    if any(units[p] != one.unit for p in s.parameters):
+        return None
+    ends = [(v - 1.96 * u, v + 1.96 * u) for v, u in zip(s.values, s.spreads, strict=True)]
+    if len(ends) == 1:
+        return MeasuredFigure(s.values[0], *ends[0])
+    least = math.hypot(*(0.0 if a <= 0.0 <= b else min(abs(a), abs(b)) for a, b in ends))
+    return MeasuredFigure(math.hypot(*s.values), least,
+                          math.hypot(*(max(abs(a), abs(b)) for a, b in ends)))  # fmt: skip
+
+
+def amount(value: float, unit: str) -> str:
+    """Two digits are enough of what is an estimate."""
+    rounded = float(f"{value:.2g}")
+    if unit == "s":
+        return format_duration(rounded)
+    if unit.startswith("rad"):
+        return f"{math.degrees(rounded):.2g} deg{unit[3:]}"
+    return f"{rounded:g} {unit}".rstrip()
