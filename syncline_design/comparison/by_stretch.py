@@ -11,7 +11,7 @@ from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper
-from syncline_design.diagnosis.stretches import Reach, Stands, Stretches
+from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.model.quantity import format_duration
@@ -67,15 +67,15 @@ class InStretches:
         told = [self._shortest(own) for own in self._reaches(one)]
         return max(told, key=lambda pair: pair[0]) if told else None
 
-    def _reaches(self, one: Assumed) -> list[list[Reach]]:
-        groups: dict[tuple[str, str, int], list[Reach]] = {}
+    def _reaches(self, one: Assumed) -> list[list[ShownSize]]:
+        groups: dict[tuple[str, str, int], list[ShownSize]] = {}
         for reach in self.found.reaches:
             name, sensor, _ = reach.label
             if self.is_of(name, (sensor,), reach.stage, one):
                 groups.setdefault(reach.label, []).append(reach)
         return list(groups.values())
 
-    def _shortest(self, own: Sequence[Reach]) -> tuple[float, str]:
+    def _shortest(self, own: Sequence[ShownSize]) -> tuple[float, str]:
         """Of one effect, by the parameter that shows least at each length; by halving."""
         lengths = own[0].lengths_s
         worst = [max(own, key=lambda r: r.sizes[k]) for k in range(len(lengths))]
@@ -110,7 +110,7 @@ class InStretches:
                        f"{amount(each.alone, each.unit)}")  # fmt: skip
 
 
-def _sizes(lengths: Sequence[float], worst: Sequence[Reach], at: int) -> Iterator[str]:
+def _sizes(lengths: Sequence[float], worst: Sequence[ShownSize], at: int) -> Iterator[str]:
     """What shows in the least stretch, and in one of about a second."""
     short = next((k for k, length in enumerate(lengths) if length >= TOLD_S), 0)
     for k in sorted({short, min(at, len(lengths) - 1)}):

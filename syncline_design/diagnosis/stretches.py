@@ -73,7 +73,7 @@ class Stands:
 
 
 @dataclass(frozen=True, slots=True)
-class Reach:
+class ShownSize:
     """The size of one parameter that 19 of 20 such logs would have shown, by how long it acts.
 
     lengths_s rising; sizes falling.  label, stage: the effect's.
@@ -93,7 +93,7 @@ class Stretches:
     """What stands out, the clearest first, and what would have."""
 
     stands: tuple[Stands, ...] = ()
-    reaches: tuple[Reach, ...] = ()
+    reaches: tuple[ShownSize, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,7 +153,7 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int = 
     rng = np.random.Generator(np.random.Philox([seed, STREAM]))
     whitened = _whitened(data, clean_errors(data, model, rng, DRAWS), model)
     hits: list[_Hit] = []
-    reaches: list[Reach] = []
+    reaches: list[ShownSize] = []
     for s in asked:
         sums = _summed(data, whitened, s)
         windows = list(_scanned(sums, s.columns.shape[2]))
@@ -350,7 +350,9 @@ def _usual_gap_s(time_s: Array) -> float:
     return float(np.max(steps[told], initial=0.0)) if np.any(told) else float(np.max(steps))
 
 
-def _reaches(data: Data, s: Signature, sums: _Sums, windows: Sequence[_Windows]) -> Iterator[Reach]:
+def _reaches(
+    data: Data, s: Signature, sums: _Sums, windows: Sequence[_Windows]
+) -> Iterator[ShownSize]:
     """Size by length: sqrt(T) + 1.645 standard uncertainties, where nearly all places show it."""
     blocks = len(sums.first) - 1
     duration_s = float(sums.time_s[-1] - sums.time_s[0])
@@ -367,5 +369,5 @@ def _reaches(data: Data, s: Signature, sums: _Sums, windows: Sequence[_Windows])
     lengths = tuple(duration_s * one.length / blocks for one in windows)
     stage = data.view.system.stages[s.candidate.stage].name
     for k, p in enumerate(s.candidate.effect.slopes()):
-        yield Reach(s.candidate.label, stage, p.name, p.unit, p.high, lengths,
+        yield ShownSize(s.candidate.label, stage, p.name, p.unit, p.high, lengths,
                     tuple(float(size[k]) for size in sizes))  # fmt: skip
