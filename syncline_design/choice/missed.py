@@ -40,7 +40,7 @@ def nearest_miss(case: Case, problems: Iterable[Problem]) -> Missed:
         text += "" if minimal else " (a smaller set was not ruled out)"
         return Missed("requirements", None, None, text)
     _, part, value, limit = min(found, key=lambda one: (one[0], one[1]))
-    reached, asked = _shown(case, part.kind, value, limit)
+    reached, asked = shown_figures(case, part.kind, value, limit)
     text = f"{part.id or IMPLIED}: at best {reached}, the limit is {asked}"
     return Missed(part.kind, float(value), float(limit), text)
 
@@ -62,7 +62,7 @@ def _limit_of(problem: Problem, part: Part) -> Fraction | None:
     return None if limit is None else Fraction(limit)
 
 
-def _shown(case: Case, kind: str, value: Fraction, limit: Fraction) -> tuple[str, str]:
+def shown_figures(case: Case, kind: str, value: Fraction, limit: Fraction) -> tuple[str, str]:
     """Both figures, in so many digits that they differ."""
     dimension = LIMIT_DIMENSIONS.get(kind, Dimension.DIMENSIONLESS)
     texts = ("", "")

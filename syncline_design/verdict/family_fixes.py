@@ -125,7 +125,7 @@ def limit_fixes(work: Work, build: Callable[[], Build], seed: int) -> Iterator[F
     found: list[Fix] = []
     try:
         for one in asked_of(work):
-            value = _least(work, one)
+            value = least_of(work, one)
             if value is not None:
                 found += _proven(work, one, value, build, seed)
     except OutOfTime:
@@ -133,7 +133,7 @@ def limit_fixes(work: Work, build: Callable[[], Build], seed: int) -> Iterator[F
     yield from by_size(found)
 
 
-def _least(work: Work, one: Asked) -> Fraction | None:
+def least_of(work: Work, one: Asked) -> Fraction | None:
     """The least limit at which some payload meets all; None: at none, or not to be proven."""
     try:
         if one.part.kind == "sync":

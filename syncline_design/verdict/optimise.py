@@ -60,7 +60,7 @@ from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Word
 from syncline_design.verdict.verified import Verified, error_figures
 from syncline_design.verdict.verify import open_verdict
-from syncline_design.verdict.why_not import Asked, questions_of, refuse_scenarios, why_not
+from syncline_design.verdict.why_not import Asked, questions_of, why_not
 
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
@@ -68,7 +68,6 @@ def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     if settings.figure is not None:
         refuse_missions(case)
     if is_family(case):
-        refuse_scenarios(case, settings.why_not)
         return optimize_family(case, settings)
     questions = questions_of(case, settings.why_not)
     build = Simulations(settings.seed).problem_of

@@ -14,9 +14,12 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.edit import pinned_spec_text
 from syncline_design.spec.edit_missions import pinned_missions_text
 from syncline_design.spec.load import BadInput, Flaw
-from syncline_design.verdict.family import MERGED, Chosen, Work, front_of
+from syncline_design.verdict.acceptance import Simulations
+from syncline_design.verdict.family import MERGED, Chosen, Work, choose_family, front_of
 from syncline_design.verdict.family_named import as_point, front_design, ranked, ruled_out_of
 from syncline_design.verdict.family_others import next_best, with_stampings
+from syncline_design.verdict.family_why_not import Question, why_not_in_family
+from syncline_design.verdict.missions import Found as Judged
 from syncline_design.verdict.missions import judged_family
 from syncline_design.verdict.named import FrontDesign, RankedDesign
 from syncline_design.verdict.optimisation import (
@@ -29,6 +32,7 @@ from syncline_design.verdict.optimisation import (
 from syncline_design.verdict.pinned import pinned_role
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Verdict
+from syncline_design.verdict.why_not import Answer, questions_of
 
 Front = tuple[tuple[FrontDesign, ...], tuple[PriceStep, ...]]
 LEFT_OUT = Caution(
@@ -41,7 +45,7 @@ LEFT_OUT = Caution(
 def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best payloads of a family, with its front where that is asked for."""
     _refuse_unanswered(case, settings)
-
+    _, kinds = questions_of(case, settings.why_not)
     simulated = any(r.kind == "monte_carlo" for r in case.spec.requirements)
     checking = CheckSettings(
         settings.seed, settings.method, monte_carlo=simulated or settings.report
@@ -53,12 +57,16 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     designs: list[RankedDesign] = []
     front: Front | None = None
     pieces = Pieces()
-    if judged.chosen is not None and judged.chosen.found is not None:
-        designs = _designs(work, judged.chosen, settings, pieces)
+    found, choice = _with_sums(judged, pieces), verdict.choice
+    if found is not None and found.found is not None:
+        designs = _designs(work, found, settings, pieces)
         if settings.pareto:
             front = pieces.made("front", lambda: _front(work, settings), front)
+    answers: tuple[Answer, ...] | None = None
+    if kinds:
+        asked = Question(work, found, lambda: Simulations(settings.seed).problem_of, settings.seed)
+        answers = tuple(pieces.listed("why not", lambda: why_not_in_family(asked, kinds)))
     excluded, count = ruled_out_of(work)
-    found, choice = judged.chosen, verdict.choice
     has_design = found is not None and found.found is not None
     result = Optimisation(
         verdict=verdict.verdict,
@@ -77,13 +85,21 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
         bargains=choice.bargains if has_design and choice is not None else None,
         front=front and front[0],
         staircase=front and front[1],
+        why_not=answers,
     )
-    text = None
-    if designs and judged.chosen is not None:
-        text = _pinned_text(work, judged.chosen)
+    text = _pinned_text(work, found) if designs and found is not None else None
     first = work.scenarios[0].problem
     shown = verdict if settings.report else None
     return Optimised(case, first, settings, (), (), result, shown, text)
+
+
+def _with_sums(judged: Judged, pieces: Pieces) -> Chosen | None:
+    """The payload of a verdict; one that the spec pins has its sums worked out."""
+    found, work = judged.chosen, judged.work
+    if found is None or work is None or found.found is not None or found.undecided:
+        return found
+    nothing: Chosen | None = None
+    return pieces.made("choosing", lambda: choose_family(work), nothing)
 
 
 def _told(verdict: Verdict, settings: OptimizeSettings) -> Iterator[Caution]:
@@ -116,10 +132,9 @@ def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Opt
 
 def _refuse_unanswered(case: Case, settings: OptimizeSettings) -> None:
     """What `optimize` answers for one mission only."""
-    asked = "--why-not" if settings.why_not else "--against a figure" if settings.figure else ""
-    if asked:
+    if settings.figure is not None:
         key = "missions" if case.missions else "choose_for"
-        message = f"{asked} is answered for one mission chosen at given figures"
+        message = "--against a figure of the error is drawn for one mission chosen at given figures"
         hint = "ask it of a spec with one mission's overrides in its stages"
         place = case.position((key,))
         raise BadInput((Flaw(str(case.path), *place, key, message, hint=hint),))

@@ -16,7 +16,6 @@ from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import Build
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
-from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.admitted import Kinds, admissions, homes, kinds_of, with_whole_catalog
 from syncline_design.verdict.choice_data import ruled_out_rows
 from syncline_design.verdict.design_data import full_design
@@ -95,16 +94,6 @@ class Asked:
     whole: Case
 
 
-def refuse_scenarios(case: Case, entries: Sequence[str]) -> None:
-    """BadInput where an entry is asked about and the spec holds in more than one scenario."""
-    if entries:
-        key = "missions" if case.missions else "choose_for"
-        message = "why an entry is not in the design is answered for one mission at nominal figures"
-        place = (str(case.path), *case.position((key,)), key)
-        hint = "ask a spec of one mission, without choose_for"
-        raise BadInput((Flaw(*place, message, hint=hint),))
-
-
 def questions_of(case: Case, entries: Sequence[str]) -> tuple[Case, Kinds]:
     """The case with every entry that is asked about, and what kind of entry each is."""
     if not entries:
@@ -128,20 +117,23 @@ def _answers(asked: Asked, kind: EntryKind, entry: str) -> Iterator[Answer]:
     if any(True for _ in parts_with(asked.problem, kind, entry)):
         yield _kept_out(asked.case, asked.problem, kind, entry)
         return
-    gone = list(_excluded(asked.case, asked.problem, kind, entry))
+    gone = list(excluded_rows(asked.case, asked.problem, kind, entry))
     if gone:
         yield from gone
         return
-    yield NotTaken(entry, kind, "not-a-candidate", None, None, _unlisted(asked, kind, entry))
+    yield NotTaken(
+        entry, kind, "not-a-candidate", None, None, unlisted_text(asked.whole, kind, entry)
+    )
     yield from _if_it_were(asked, kind, entry)
 
 
-def _unlisted(asked: Asked, kind: EntryKind, entry: str) -> str:
+def unlisted_text(whole: Case, kind: EntryKind, entry: str) -> str:
+    """That a spec does not list an entry."""
     if kind == "hardware":
         return f"no method or clock of this spec requires {entry}"
-    where = list(homes(asked.whole, kind, entry))
+    where = list(homes(whole, kind, entry))
     if not where:
-        modality = asked.whole.catalog.sensors[entry].modality
+        modality = whole.catalog.sensors[entry].modality
         return f"{entry} is a {modality} sensor, and no stage of this spec has that role"
     return f"{entry} is not among the candidates of {listed(where)}"
 
@@ -158,7 +150,7 @@ def _if_it_were(asked: Asked, kind: EntryKind, entry: str) -> Iterator[Answer]:
         elif any(True for _ in parts_with(there.problem, kind, entry)):
             missed.append(_kept_out(case, there.problem, kind, entry))
         else:
-            missed += _excluded(case, there.problem, kind, entry)
+            missed += excluded_rows(case, there.problem, kind, entry)
     if found:
         yield min(found, key=lambda one: _order(asked.case, one))
     else:
@@ -214,7 +206,7 @@ def _places(asked: Asked, design: Design, kind: EntryKind, entry: str) -> list[s
     return found
 
 
-def _excluded(case: Case, problem: Problem, kind: EntryKind, entry: str) -> Iterator[NotTaken]:
+def excluded_rows(case: Case, problem: Problem, kind: EntryKind, entry: str) -> Iterator[NotTaken]:
     """Why it was ruled out before the choice: of each place the way that comes nearest."""
     names = set(_requiring(case, entry)) if kind == "hardware" else {entry}
     nearest: dict[str, Exclusion] = {}
