@@ -15,7 +15,6 @@ from questions_oracle import answers_of, best, case_of, compare_why_not, drawn
 from syncline_design.cli.app import app
 from syncline_design.report.on_choice import on_choice
 from syncline_design.report.render_console import console
-from syncline_design.spec.load import BadInput
 from syncline_design.verdict.optimise import OptimizeSettings, optimize
 from syncline_design.verdict.why_not import HeldBack, NotTaken
 
@@ -90,8 +89,18 @@ def test_the_command_says_what_the_entry_says_and_what_is_asked(tmp_path: Path) 
     assert "--why-not livox_mid36: no such entry in the catalogs; did you mean" in text
 
 
-def test_a_spec_of_several_scenarios_is_not_answered_in_silence() -> None:
+def test_choosing_for_all_figures_answers_as_one_mission_where_none_is_an_interval() -> None:
     spec = yaml.safe_load((SPECS / "position_track.yaml").read_text("utf-8"))
-    spec["choose_for"] = "always"
-    with pytest.raises(BadInput, match="answered for one mission at nominal figures"):
-        optimize(case_of(spec), OptimizeSettings(why_not=("trimble_r12_rtk",)))
+    asked = OptimizeSettings(why_not=("trimble_r12_rtk", "arrival_gnss_serial"))
+    plain = optimize(case_of(spec), asked).result.why_not
+    found = optimize(case_of(spec | {"choose_for": "always"}), asked).result.why_not
+    assert plain is not None
+    assert found is not None
+    assert [type(one) for one in found] == [type(one) for one in plain]
+    for one, other in zip(found, plain, strict=True):
+        if isinstance(one, HeldBack) and isinstance(other, HeldBack):
+            assert one.dearer_by == other.dearer_by
+            assert one.worse_by == pytest.approx(other.worse_by, rel=1e-9)
+        elif isinstance(one, NotTaken) and isinstance(other, NotTaken):
+            assert (one.code, one.limit) == (other.code, other.limit)
+            assert one.figure == pytest.approx(other.figure, rel=1e-9)
