@@ -61,18 +61,20 @@ def _parabola(time_s: Array, place_m: Array, at: int, start: Index, width: int) 
 
 
 def derived_rate(time_s: Array, euler_rad: Array) -> Array:
-    """Body rates (n, 3) [rad/s] from attitudes: the turn between the neighbours over its time.
+    """Body rates (n, 3) [rad/s] from attitudes: the slope of the turns added up, smoothed.
 
-    Rows of one stamp have one attitude, the first row's, and share the rate.
+    The turns between neighbours, each in the body's axes, add up to the integral of the rate with
+    the attitudes' own noise on top, white as it was.  Unsmoothed, that noise would be in every
+    sensitivity and in the error at once, and the one would seem to explain the other.  Rows of one
+    stamp have one attitude, the first row's, and share the rate.
     """
     from scipy.spatial.transform import Rotation
 
+    from syncline_design.logs.smoothing import velocity_of
+
     first = starts(time_s)
-    stamps = time_s[first]
-    if stamps.shape[0] < 2:
-        return np.zeros_like(euler_rad)
     pose = Rotation.from_matrix(euler_to_rotation(euler_rad[first]))
-    turn = (pose[:-1].inv() * pose[1:]).as_rotvec() / np.diff(stamps)[:, None]
-    middle = 0.5 * (stamps[1:] + stamps[:-1])
-    rate: Array = np.stack([np.interp(time_s, middle, turn[:, k]) for k in range(3)], axis=1)
+    turn = np.zeros((first.shape[0], 3))
+    turn[1:] = np.cumsum((pose[:-1].inv() * pose[1:]).as_rotvec(), axis=0)
+    rate: Array = velocity_of(time_s[first], turn)[groups(time_s)]
     return rate
