@@ -89,12 +89,10 @@ def cut_rows(rows: StageRows, index: Rows) -> StageRows:
 
 def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
     """Put a log beside a system; measured states stand in for true ones, to first order."""
-    motions = tuple(_motion(log, s) for s in log.stages)
+    motions: list[LoggedMotion] = []
     rows: list[StageRows] = []
     place: Array | None = None
-    for index, (stage, logged, motion) in enumerate(
-        zip(system.stages, log.stages, motions, strict=True)
-    ):
+    for index, (stage, logged) in enumerate(zip(system.stages, log.stages, strict=True)):
         antenna, ranging = levers(stage, index)
         if log.kind == "position":  # the reference point itself is compared
             ranging = np.zeros(3)
@@ -103,14 +101,34 @@ def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
         if source is None:
             raise ValueError(f"stage {stage.name!r} has no position")
         position = source - rotate(rotation, antenna)
-        rows.append(_stage_rows(log, logged, motion, rotation, position, antenna, ranging))
+        moved = _of_the_reference_point(log, logged, rotation, antenna)
+        motions.append(_motion(log, moved))
+        path = _path_velocity(log, logged)
+        rows.append(_stage_rows(log, moved, path, rotation, position, antenna, ranging))
         place = position + rotate(rotation, ranging + _logged_vector(logged, len(log)))
     last = rows[-1]
     assert place is not None
     truth = np.where(np.isnan(log.truth_m), place, log.truth_m)
     fields = {name: getattr(last, name) for name in StageRows.__slots__}
     rows[-1] = StageRows(**(fields | {"target_m": truth}))
-    return Scene(system, log, motions, tuple(rows), tuple(known))
+    return Scene(system, log, tuple(motions), tuple(rows), tuple(known))
+
+
+def _of_the_reference_point(
+    log: Log, logged: StageLog, rotation: Array, antenna: Array
+) -> StageLog:
+    """The stage with the velocity of its reference point, v = v_A - R (w x l_G).
+
+    Slopes of the antenna's places hold the sweep of its arm, which is added where a delay is felt.
+    """
+    if not logged.follows_position or not np.any(antenna):
+        return logged
+    sweep = rotate(rotation, np.cross(logged.rate_radps, antenna))
+    track = logged.velocity_track
+    if track is not None:
+        swept = [np.interp(track.time_s, log.time_s, sweep[:, k]) for k in range(3)]
+        track = LogTrack(track.time_s, track.value - np.stack(swept, axis=1))
+    return replace(logged, velocity_mps=logged.velocity_mps - sweep, velocity_track=track)
 
 
 def _motion(log: Log, stage: StageLog) -> LoggedMotion:
@@ -146,7 +164,7 @@ def _logged_vector(logged: StageLog, rows: int) -> Array:
 def _stage_rows(
     log: Log,
     logged: StageLog,
-    motion: LoggedMotion,
+    path: LogTrack,
     rotation: Array,
     position: Array,
     antenna: Array,
@@ -173,7 +191,7 @@ def _stage_rows(
         target_m=position + rotate(rotation, ranging + vector),
         lagged=LoggedPast(
             log.time_s,
-            _path_velocity(log, logged),
+            path,
             log.time_s,
             rotation,
             logged.rate_radps,
