@@ -209,6 +209,18 @@ def test_no_row_excludes_what_the_world_hides(
     assert (met > 0) == undone or not undone
 
 
+def test_a_delay_that_was_found_leaves_the_others_as_sure_as_before(tmp_path: Path) -> None:
+    """The three delays together move nothing; with one of them in the model that stays so."""
+    effect = hidden("latency", "position", latency_s=0.05)
+    data, model, found = settled(*files(tmp_path, world("multirotor_lines", 5), (effect,)))
+    late_one = next(s for s in found if s.candidate.label == ("latency", "position", 0))
+    with one_thread():
+        held = fit(data, (late_one.candidate.acting({"latency_s": 0.05}),), start=model.level)
+    sizes = {one.label: one.size for one in left_open(data, held, found)}
+    assert sizes.get(("latency", "attitude", 0), 0.0) < 0.005
+    assert sizes.get(("latency", "ranging", 0), 0.0) < 0.005
+
+
 def test_a_delay_and_an_arm_that_cancel_are_told_of_one_another(tmp_path: Path) -> None:
     """Straight on at constant speed v: 30 ms of delay and v times that of arm."""
     run = world("straight_constant_speed", 1, 40.0, 3.0)

@@ -63,11 +63,17 @@ def sighted(case: Case, paths: Sequence[Path], settings: DiagnosisSettings) -> S
             in_force().doing("diagnosing the log without what stands out")
             one = examined(less, settings)
             seen = _seen(one)
-        model, free = one.result.model, one.search.free_signatures(one.result.model)
+        model = one.result.model
+        left = left_open(one.data, model, one.search.signatures)
+        stands = (*taken, *seen.stands)
         return Sighted(
-            told(one, case), replace(seen, stands=(*taken, *seen.stands)),
-            left_open(one.data, model, free), factors(one.data, model), beyond, tuple(taken),
-        )  # fmt: skip
+            told(one, case),
+            replace(seen, stands=stands),
+            left,
+            factors(one.data, model),
+            beyond,
+            tuple(taken),
+        )
 
 
 def _seen(one: Examined) -> Stretches:

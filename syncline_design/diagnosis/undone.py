@@ -46,7 +46,11 @@ class LeftOpen:
 
 
 def left_open(data: Data, model: Model, found: Sequence[Signature]) -> tuple[LeftOpen, ...]:
-    """Every departure that another one makes much less certain, with that other one."""
+    """Every departure that another one makes much less certain, with that other one.
+
+    found: signatures of all effects, those that the model holds as well: a delay that was found may
+    be a part of one that all sensors share.
+    """
     asked = [s for s in found if s.plain and s.candidate.effect.name in FREE]
     if len(asked) < 2:
         return ()
@@ -128,7 +132,9 @@ def _by(joint: _Joint, asked: Sequence[Signature], own: int, at: int) -> Label:
 
 
 def _joint(data: Data, model: Model, asked: Sequence[Signature]) -> _Joint:
-    own = np.nan_to_num(slopes(data.view, model.acting))
+    labels = {s.candidate.label for s in asked}
+    others = [one for one in model.acting if one.label not in labels]
+    own = np.nan_to_num(slopes(data.view, others))
     columns = np.concatenate(
         [
             np.nan_to_num(s.columns) * [BUILD[p.unit] for p in s.candidate.effect.slopes()]
