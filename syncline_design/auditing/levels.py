@@ -18,7 +18,7 @@ from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.series import Array, Mask
 from syncline_design.machine.deadline import in_force
 
-Kind = Literal["drift", "bend", "step", "episode", "relock", "holdover"]
+Kind = Literal["drift", "bend", "ramp", "step", "episode", "relock", "holdover"]
 _LONGEST: Final = 0.3  # of the log: what settles more slowly is drift
 _WILD: Final = 10.0  # of what is seen: sizes that nearly cancel one another
 _LEAST_BLOCKS: Final = 3  # of an episode
@@ -26,8 +26,10 @@ MOST_SHAPES: Final = 6
 SURE: Final = 8.0  # sigma of a size that is believed
 # what a shape has to explain beyond chance for its freedom, in units of the noise squared
 _PENALTY: Final = {
-    "drift": 0.0, "bend": 12.0, "step": 6.0, "episode": 14.0, "relock": 14.0, "holdover": 20.0,
+    "drift": 0.0, "bend": 12.0, "ramp": 14.0, "step": 6.0, "episode": 14.0, "relock": 14.0,
+    "holdover": 20.0,
 }  # fmt: skip
+_RIVAL: Final = 0.5  # of the best: shapes of coarse places that may turn out better
 _EXTRA: Final = 0.004  # of what a shape explains: its freedom also fits what is nearly right
 _STEP_SHARE: Final = 0.25  # of the delays' spread: smaller steps are not named
 _DRIFT_SHARE: Final = 0.4  # of the delays' spread, over the whole log
@@ -41,7 +43,8 @@ class Shape:
     """An offset over time; size: seconds of receipt minus stamp (drift: over the whole log).
 
     begin_s, end_s: of a step its place and the end of the log; settle_s: time constant.  bend: how
-    a rate changes slowly, a Legendre polynomial of `order` over the log.
+    a rate changes slowly, a Legendre polynomial of `order` over the log.  ramp: drift that begins
+    and may end within the log, as of a clock that is slewed.
     """
 
     kind: Kind
@@ -62,11 +65,11 @@ class Shape:
             return np.where(time_s >= self.begin_s, 1.0, 0.0)
         if self.kind == "episode":
             return np.where((time_s >= self.begin_s) & (time_s < self.end_s), 1.0, 0.0)
-        back = np.exp(-np.maximum(time_s - self.end_s, 0.0) / self.settle_s)
+        back = np.exp(-np.maximum(time_s - self.end_s, 0.0) / (self.settle_s or 1.0))
         if self.kind == "relock":
             return np.where(time_s >= self.begin_s, back, 0.0)
         away = np.clip((time_s - self.begin_s) / (self.end_s - self.begin_s), 0.0, 1.0)
-        return np.asarray(away * back)
+        return np.asarray(away if self.kind == "ramp" else away * back)
 
 
 Family = tuple[list[Shape], Array]
@@ -87,37 +90,84 @@ def course(shapes: tuple[Shape, ...], time_s: Array) -> Array:
     return total
 
 
-def shapes_of(blocks: Blocks, *, least_s: float = 0.0) -> tuple[Shape, ...]:
-    """The shapes that the levels show; least_s: smaller ones cannot be told from transport."""
+def shapes_of(
+    blocks: Blocks, *, least_s: float = 0.0, settling_s: Sequence[float] = ()
+) -> tuple[Shape, ...]:
+    """The shapes that the levels show; least_s: smaller ones cannot be told from transport.
+
+    settling_s: when something is known to have jumped that settles.
+    """
     use = blocks.usable
     time_s, low = blocks.time_s[use], blocks.low_s[use]
     if time_s.size < 8:
         return ()
-    found: tuple[Shape, ...] = ()
+    found = _known_to_settle(time_s, low, settling_s, blocks)
     families = tuple(_families(time_s))
     for _ in range(MOST_SHAPES):
         in_force().check()
-        keep = ~_straddling(found, time_s, blocks.length_s)
+        keep = ~straddling(found, time_s, blocks.length_s)
         best = _best(time_s[keep], low[keep], found, blocks, families, keep)
         if best is None:
             break
-        better = (*found, _refined(time_s[keep], low[keep], found, best))
+        better = (*found, best)
         grown = polished(better, [True] * len(better), blocks, within=1.1)
         wild = any(abs(s.size_s) > _WILD * float(np.ptp(low)) for s in grown)
         if wild or not _believed(grown[-1], blocks, least_s):
             break
         found = grown
-    keep = ~_straddling(found, time_s, blocks.length_s)
+    found = _in_two_rates(found, blocks)
+    keep = ~straddling(found, time_s, blocks.length_s)
     kept = _pruned(time_s[keep], low[keep], found, blocks)
     return tuple(s for s in kept if _believed(s, blocks, least_s))
 
 
+def _known_to_settle(
+    time_s: Array, low: Array, begins: Sequence[float], blocks: Blocks
+) -> tuple[Shape, ...]:
+    """Locks that settle from known moments on, with the time constants that explain most."""
+    length = float(time_s[-1] - time_s[0])
+    drift = Shape("drift", begin_s=float(time_s[0]), end_s=float(time_s[-1]))
+    found: tuple[Shape, ...] = (drift,) if begins else ()  # a needless one is pruned
+    for begin in begins[:MOST_SHAPES]:
+        keep = ~straddling((Shape("step", begin_s=begin),), time_s, blocks.length_s)
+        base = np.linalg.qr(_columns(found, time_s[keep]))[0]
+        rest = low[keep] - base @ (base.T @ low[keep])
+        trials = [Shape("relock", begin_s=begin, end_s=begin, settle_s=share * length)
+                  for share in (0.5 * _SETTLINGS[0], *_SETTLINGS)]  # fmt: skip
+        best = max(trials, key=lambda s: _gain(s, time_s[keep], base, rest))
+        grown = polished((*found, best), [True] * (len(found) + 1), blocks, within=1.1)
+        if abs(grown[-1].size_s) > SURE * grown[-1].sigma_s:
+            found = grown
+    return found
+
+
+def _in_two_rates(found: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape, ...]:
+    """In place of several slow shapes one change of rate, where that explains as much."""
+    slow = [s for s in found if s.kind not in ("step", "episode")]
+    if not any(s.kind != "drift" for s in slow):
+        return found
+    others = tuple(s for s in found if s not in slow)
+    keep = blocks.usable & ~straddling(found, blocks.time_s, blocks.length_s)
+    time_s, low = blocks.time_s[keep], blocks.low_s[keep]
+    if time_s.size < 12:
+        return found
+    first, last = float(time_s[0]), float(time_s[-1])
+    drift = Shape("drift", begin_s=first, end_s=last)
+    trials = [(*others, drift, Shape("ramp", begin_s=float(e), end_s=last)) for e in time_s[3:-3]]
+    worst = [float(np.sum(_rest(time_s, low, trial) ** 2)) for trial in trials]
+    best = polished(trials[int(np.argmin(worst))], [True] * (len(others) + 2), blocks)
+    now = float(np.sum(_rest(time_s, low, found) ** 2))
+    new = float(np.sum(_rest(time_s, low, best) ** 2))
+    more = sum(_PENALTY[s.kind] for s in slow) - _PENALTY["ramp"]
+    return best if new < now + more * blocks.noise_s**2 else found
+
+
 def _believed(shape: Shape, blocks: Blocks, least_s: float) -> bool:
     share = _DRIFT_SHARE if shape.kind == "drift" else _STEP_SHARE
-    least_s = max(least_s, _LEAST_RUN_S if shape.kind in ("drift", "bend") else 0.0)
+    least_s = max(least_s, _LEAST_RUN_S if shape.kind in ("drift", "bend", "ramp") else 0.0)
     floor = max(share * blocks.spread_s, least_s, SURE * shape.sigma_s)
     return abs(shape.size_s) > floor and (
-        shape.kind in ("drift", "bend", "step") or _seen(shape, blocks)
+        shape.kind in ("drift", "bend", "ramp", "step") or _seen(shape, blocks)
     )
 
 
@@ -159,7 +209,7 @@ def _best(
     """The shape that explains most of what is left, in units of the noise."""
     base = np.linalg.qr(_columns(found, time_s))[0]
     rest = low - base @ (base.T @ low)
-    best, gained = None, SURE**2
+    best, rivals = SURE**2, []
     for shapes, all_courses in families:
         courses = all_courses[:, keep]
         own = courses - (courses @ base) @ base.T
@@ -167,12 +217,21 @@ def _best(
         usable = norm > 0.5
         gain = np.zeros(norm.size)
         gain[usable] = (own[usable] @ rest) ** 2 / norm[usable] / blocks.noise_s**2
-        k = int(np.argmax(gain))
-        penalty = _PENALTY[shapes[k].kind]
-        worth = float(gain[k]) * (1.0 - _EXTRA * penalty) - penalty
-        if worth > gained:
-            best, gained = shapes[k], worth
-    return best
+        shape = shapes[int(np.argmax(gain))]
+        worth = _worth(shape, float(gain.max()))
+        best = max(best, worth)
+        rivals.append((worth, shape))
+    refined = [_refined(time_s, low, found, s) for worth, s in rivals if worth > _RIVAL * best]
+    worths = [_worth(s, _gain(s, time_s, base, rest) / blocks.noise_s**2) for s in refined]
+    if not worths or max(worths) <= SURE**2:
+        return None
+    return refined[int(np.argmax(worths))]
+
+
+def _worth(shape: Shape, gain: float) -> float:
+    """What a shape explains beyond what its freedom would by chance."""
+    penalty = _PENALTY[shape.kind]
+    return gain * (1.0 - _EXTRA * penalty) - penalty
 
 
 def _families(time_s: Array) -> Iterator[Family]:
@@ -195,6 +254,10 @@ def _families(time_s: Array) -> Iterator[Family]:
     ]  # fmt: skip
     yield relocks, _courses(relocks, time_s)
     coarse = knots[::2]
+    ramps = [Shape("ramp", begin_s=float(a), end_s=float(b))
+             for i, a in enumerate(coarse) for b in (*coarse[i + 1 :], last)
+             if (a, b) != (edges[0], last)]  # fmt: skip
+    yield ramps, _courses(ramps, time_s)
     holdovers = [
         Shape("holdover", begin_s=float(a), end_s=float(b), settle_s=share * length)
         for i, a in enumerate(coarse) for b in coarse[i + 1 : -1] for share in _SETTLINGS[1:4]
@@ -219,7 +282,8 @@ def _courses(shapes: list[Shape], time_s: Array) -> Array:
     back = np.exp(-np.maximum(row - end, 0.0) / settle)
     if kind == "relock":
         return np.where(row >= begin, back, 0.0)
-    return np.asarray(np.clip((row - begin) / (end - begin), 0.0, 1.0) * back)
+    away = np.clip((row - begin) / (end - begin), 0.0, 1.0)
+    return np.asarray(away if kind == "ramp" else away * back)
 
 
 def _refined(time_s: Array, low: Array, found: tuple[Shape, ...], shape: Shape) -> Shape:
@@ -232,14 +296,14 @@ def _refined(time_s: Array, low: Array, found: tuple[Shape, ...], shape: Shape) 
     knot = max(width, float(time_s[-1] - time_s[0]) / _KNOTS)
     best, gained = shape, _gain(shape, time_s, base, rest)
     for scale in (1.0, 0.5, 0.25):
-        for trial in list(_around(best, scale * knot, scale)):
+        for trial in list(_around(best, scale * knot, scale, float(time_s[-1]))):
             gain = _gain(trial, time_s, base, rest)
             if gain > gained * (1.0 + 1e-9):
                 best, gained = trial, gain
     return best
 
 
-def _around(shape: Shape, width: float, scale: float) -> Iterator[Shape]:
+def _around(shape: Shape, width: float, scale: float, last_s: float) -> Iterator[Shape]:
     moves = (-2.0, -1.0, 0.0, 1.0, 2.0)
     if shape.kind == "step":
         return
@@ -253,6 +317,7 @@ def _around(shape: Shape, width: float, scale: float) -> Iterator[Shape]:
     for a in moves:
         for b in moves:
             begin, end = shape.begin_s + a * width, shape.end_s + b * width
+            end = min(end, last_s) if shape.kind == "ramp" else end
             if end - begin < 0.5 * width:
                 continue
             for factor in (0.6, 1.0, 1.6) if shape.kind == "holdover" else (1.0,):
@@ -296,8 +361,8 @@ def polished(
     """
     from scipy.optimize import least_squares
 
-    curved = [k for k, s in enumerate(shapes) if s.kind in ("relock", "holdover")]
-    use = blocks.usable & ~_straddling(shapes, blocks.time_s, within * blocks.length_s)
+    curved = [s for s in shapes if s.kind in ("relock", "holdover", "ramp")]
+    use = blocks.usable & ~straddling(shapes, blocks.time_s, within * blocks.length_s)
     time_s, low = blocks.time_s[use], blocks.low_s[use]
     if time_s.size < len(shapes) + 3:
         return shapes
@@ -308,7 +373,8 @@ def polished(
         return _fitted(time_s, low, shapes, blocks)
 
     span = float(np.ptp(time_s))
-    limits = math.log(blocks.length_s), math.log(_LONGEST * span), float(time_s[0])
+    settle = math.log(blocks.length_s), math.log(_LONGEST * span)
+    limits = *settle, float(time_s[0]), float(time_s[-1])
 
     def rest(values: Array) -> Array:
         moved = _set(shapes, fixed, start + values * scale, limits)
@@ -319,7 +385,7 @@ def polished(
     return _fitted(time_s, low, best, blocks)
 
 
-def _straddling(shapes: tuple[Shape, ...], time_s: Array, within_s: float) -> Mask:
+def straddling(shapes: tuple[Shape, ...], time_s: Array, within_s: float) -> Mask:
     """Blocks near a jump: they hold both sides of it."""
     out = np.zeros(time_s.size, bool)
     for shape in shapes:
@@ -345,17 +411,20 @@ def _free(
             if shape.kind == "holdover":
                 values.append(shape.begin_s)
                 scale.append(blocks.length_s)
+        elif shape.kind == "ramp":
+            values += [shape.begin_s, shape.end_s]
+            scale += 2 * [blocks.length_s]
     return np.asarray(values), np.asarray(scale)
 
 
 def _set(
     shapes: tuple[Shape, ...], fixed: Sequence[bool], values: Array,
-    limits: tuple[float, float, float],
+    limits: tuple[float, float, float, float],
 ) -> tuple[Shape, ...]:  # fmt: skip
     """The shapes with those values, in the order of `_free`; limits: of log settling times, and the
     log's begin, before which nothing drifts away."""
     left = [float(v) for v in values]
-    shortest, longest, first = limits
+    shortest, longest, first, last = limits
     out = []
     for shape, known in zip(shapes, fixed, strict=True):
         if shape.kind in ("relock", "holdover"):
@@ -364,6 +433,9 @@ def _set(
             away = max(left.pop(0), first) if shape.kind == "holdover" else end
             begin = min(away, end - 1e-6) if shape.kind == "holdover" else end
             shape = replace(shape, settle_s=settle, begin_s=begin, end_s=end)
+        elif shape.kind == "ramp":
+            begin = min(max(left.pop(0), first), last - 1e-3)
+            shape = replace(shape, begin_s=begin, end_s=min(max(left.pop(0), begin + 1e-3), last))
         out.append(shape)
     return tuple(out)
 

@@ -154,6 +154,8 @@ def _set_back(series: Series, fall: int, about: int) -> int | None:
             return about if about > LARGE_SET_NS else None
         scattered = max(spread(before.astype(np.float64)), spread(after.astype(np.float64)))
         size = float(np.median(before) - np.median(after))
+        if size > 2.0 * about + 4.0 * scattered:  # more than receipts fall by: the stamps' own
+            return None
         sure = 5.0 * scattered / np.sqrt(min(before.size, after.size))
         if size < max(0.5 * about - scattered, sure, 0.2 * about):
             return None

@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design import __version__
+from syncline_design.auditing.recorder import without_recorder_clock
 from syncline_design.auditing.result import (
     Audit,
     IncompleteFile,
@@ -106,7 +107,8 @@ def _rows(group: Sequence[_Opened]) -> list[StreamAudit]:
     starts = [s for o in group for stream in o.streams if (s := _first(stream)) is not None]
     start = min(starts) if starts and max(starts) - min(starts) < 10**15 else None
     told = [(o, s) for o in group for s in o.streams if _is_told(s)]
-    found = held_together([examined(stream, start) for _, stream in told])
+    alone = [examined(stream, start) for _, stream in told]
+    found = held_together(without_recorder_clock(alone, start))
     rows = [_row(o, one) for (o, _), one in zip(told, found, strict=True)]
     rows += [_untold(o, s) for o in group for s in o.streams if not _is_told(s)]
     return sorted(rows, key=lambda row: (row.file, row.name))

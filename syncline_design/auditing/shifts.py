@@ -17,9 +17,11 @@ from syncline_design.auditing import witness
 from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
 from syncline_design.auditing.grains import best_timer
+from syncline_design.auditing.jumps import Jump, without_jumps
 from syncline_design.auditing.levels import Shape, course, polished, shapes_of
+from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import Consequence, StampFault
-from syncline_design.auditing.series import NS, Array, Series, in_words, seconds, spread
+from syncline_design.auditing.series import NS, Array, Series, seconds, spread
 from syncline_design.auditing.witness import Side
 
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
@@ -29,6 +31,7 @@ _BLUR_S: Final = 0.2  # interquartile range of delays: from here on whole second
 _DRIFTING_S: Final = 0.03  # over the log: slower drifts do not blur whole seconds
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
+_OTHER_TICKS: Final = 3  # receipts that show a tick
 _LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
 
 
@@ -52,6 +55,7 @@ class Shifts:
     shifts: tuple[Shift, ...]
     blocks: Blocks | None
     breathing_s: float = 0.0  # how far receipts move to and fro while stamps keep their rhythm
+    seen: tuple[Shape, ...] = ()  # in the levels, whosever they are
 
 
 def without_slips(series: Series, known_s: float | None) -> Shifts:
@@ -178,21 +182,43 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     nothing = Shifts(series, (), (), None)
     if series.receive is None or series.good.sum() < 2:
         return nothing
+    mended = without_jumps(series, cadence(series), least_s)
+    series = mended.series
+    assert series.receive is not None
     places = series.places()
     time_s = series.seconds[places]
     late = seconds((series.receive - series.stamp)[places])
     late = late - np.median(late)
+    own = tuple(_shift_of(jump, time_s) for jump in mended.jumps)
+    moved = _slow_shifts(series, places, time_s, late, least_s, mended.settling_s)
+    return replace(moved, faults=(*mended.faults, *moved.faults), shifts=(*own, *moved.shifts))
+
+
+def _shift_of(jump: Jump, time_s: Array) -> Shift:
+    end = None if jump.end is None else float(time_s[jump.end])
+    return Shift(float(time_s[jump.place]), end, -jump.size_s, "stamp", 0.0)
+
+
+def _slow_shifts(
+    series: Series, places: np.ndarray, time_s: Array, late: Array, least_s: float,
+    settling_s: tuple[float, ...],
+) -> Shifts:  # fmt: skip
+    """What levels of stretches show."""
+    nothing = Shifts(series, (), (), None)
     blocks = blocks_of(time_s, late)
     if blocks is None or not bool(np.all(np.diff(time_s) >= 0)):
         return replace(nothing, blocks=blocks)
     pace = cadence(series)
-    placed = [_placed(s, time_s, late, blocks) for s in shapes_of(blocks, least_s=least_s)]
+    placed = [
+        _placed(s, time_s, late, blocks)
+        for s in shapes_of(blocks, least_s=least_s, settling_s=settling_s)
+    ]
+    seen = tuple(placed)
     judged = [_judged(pace, shape, time_s, blocks) for shape in placed]
     rest = late - course(tuple(shape for shape, _ in judged), time_s)
-    if judged and _waits_for_ticks(
-        series, rest
-    ):  # what is slow may be a beat between sensor and ticks
-        judged = [(shape, side) for shape, side in judged if side == "stamp"]
+    tick = _ticks_of(series, rest) if judged else 0.0
+    # what is slow may be a beat between sensor and ticks
+    judged = [(s, side) for s, side in judged if side == "stamp" or abs(s.size_s) > 1.2 * tick]
     found, sides = tuple(shape for shape, _ in judged), [side for _, side in judged]
     found = polished(found, [side == "stamp" for side in sides], blocks)
     count = witness.witness_of(series, pace, blocks)
@@ -207,14 +233,14 @@ def without_shifts(series: Series, *, least_s: float = 0.0) -> Shifts:
     own = witness.simplest(count, own, blocks)
     whole = series.stamp.copy()
     whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
-    faults = tuple(_all_named(own, time_s))
+    faults = tuple(all_named(own, time_s))
     shifts = tuple(
         Shift(s.begin_s, None if s.kind == "step" else s.end_s, s.size_s, side, blocks.length_s)
         for s, side, seen in zip(found, sides, sharp, strict=True) if seen or side == "stamp"
     )  # fmt: skip
     left = tuple(s for s in found if s not in own and s.kind not in ("step", "episode"))
     breathing = float(np.ptp(course(left, blocks.time_s))) if left else 0.0
-    return Shifts(replace(series, stamp=whole), faults, shifts, blocks, breathing)
+    return Shifts(replace(series, stamp=whole), faults, shifts, blocks, breathing, seen)
 
 
 def _own(
@@ -239,7 +265,7 @@ def _own(
 
 def _placed(shape: Shape, time_s: Array, late: Array, blocks: Blocks) -> Shape:
     """Begin (and end) to the message: where the jump parts the messages best."""
-    if shape.kind in ("drift", "bend", "holdover"):
+    if shape.kind in ("drift", "bend", "ramp", "holdover"):
         return shape
     begin = _change(shape.begin_s, shape.size_s, time_s, late, blocks)
     if shape.kind == "episode":
@@ -264,16 +290,25 @@ def _change(at_s: float, size_s: float, time_s: Array, late: Array, blocks: Bloc
     return float(time_s[a + split])
 
 
-def _waits_for_ticks(series: Series, late: Array) -> bool:
-    """Whether receipts keep to the ticks of a timer, and delays are not those of transport.
+def _ticks_of(series: Series, late: Array) -> float:
+    """The host's tick [s] where receipts keep to one, and delays are not those of transport; or 0.
 
     A sensor whose interval is nearly a multiple of the host's tick waits a little less each time:
-    a beat, which looks like drift.  Transport's delays have a tail, waits for a tick have none.
+    a beat, which looks like drift, of a tick at most.  An even sensor is on many grids itself; what
+    shows a tick is a receipt that comes whole ticks sooner or later than the sensor's interval.
+    Transport's delays have a tail, waits for a tick have none.
     """
     assert series.receive is not None
     receive = np.sort(series.receive[series.good])
     when = seconds(receive - receive[0])
-    return best_timer(when) is not None and not _has_tail(late)
+    tick = best_timer(when)
+    if tick is None or _has_tail(late):
+        return 0.0
+    counts = np.round(np.diff(when) / tick)
+    values, often = np.unique(counts, return_counts=True)
+    usual = values[int(np.argmax(often))]
+    whole = counts % usual == 0.0 if usual > 0.0 else np.zeros(counts.size, bool)
+    return tick if int(np.sum(~whole | (counts == 0.0))) >= _OTHER_TICKS else 0.0
 
 
 def _has_tail(late: Array) -> bool:
@@ -290,7 +325,7 @@ def _has_tail(late: Array) -> bool:
 
 def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple[Shape, Side]:
     """A shape put where the stamps' own rhythm breaks, and whether it breaks there at all."""
-    if shape.kind in ("drift", "bend", "holdover") or not pace.regular:
+    if shape.kind in ("drift", "bend", "ramp", "holdover") or not pace.regular:
         return shape, "unknown"
     side, at = _broken(pace, shape.begin_s, -shape.size_s, time_s, blocks, shape.settle_s)
     if at is not None:
@@ -344,58 +379,6 @@ def _broken(
 def _may_be_wander(shape: Shape, wander_s: float) -> bool:
     """Whether a small shift of a clock that runs away may be how its rate changes."""
     return shape.kind not in ("drift", "bend") and abs(shape.size_s) < _WANDER * wander_s
-
-
-def _all_named(shapes: Sequence[Shape], time_s: Array) -> Iterator[StampFault]:
-    """One fault for all that moves slowly, one for every other shape."""
-    slow = tuple(s for s in shapes if s.kind in ("drift", "bend"))
-    if slow:
-        yield _drift(slow, time_s)
-    for shape in shapes:
-        if shape not in slow:
-            yield _named(shape, time_s)
-
-
-def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
-    """Rate of the stamps against receipts: its mean, and from where to where it changes."""
-    grid = np.linspace(float(time_s[0]), float(time_s[-1]), 101)
-    moved = -course(slow, grid)
-    length = float(grid[-1] - grid[0])
-    ppm = 1e6 * float(moved[-1] - moved[0]) / length
-    sure = max(abs(s.size_s) / max(s.sigma_s, 1e-12) for s in slow)
-    parameters: dict[str, float | str] = {"ppm": ppm}
-    words = f"stamps run {abs(ppm):.4g} ppm {'fast' if ppm > 0 else 'slow'} against receipts"
-    if len(slow) > 1 or slow[0].kind == "bend":
-        rate = 1e6 * np.diff(moved) / np.diff(grid)
-        parameters |= {"kind": "wandering", "ppm_low": float(rate.min()),
-                       "ppm_high": float(rate.max())}  # fmt: skip
-        words += f" in the mean, between {rate.min():+.3g} and {rate.max():+.3g} ppm"
-    span = in_words(float(np.ptp(moved)))
-    words += f": {span} over the log, {sure:.3g} times its uncertainty"
-    return StampFault("drift", parameters, None, None, words)
-
-
-def _named(shape: Shape, time_s: Array) -> StampFault:
-    end = float(time_s[-1])
-    size = -shape.size_s
-    sure = f"{abs(shape.size_s) / max(shape.sigma_s, 1e-12):.3g} times its uncertainty"
-    if shape.kind in ("step", "episode"):
-        stop = end if shape.kind == "step" else shape.end_s
-        lasts = "and stay so" if shape.kind == "step" else f"until {stop:.4g} s"
-        return StampFault(
-            "step", {"seconds": size}, shape.begin_s, stop,
-            f"stamps move by {_signed(size)} against receipts {lasts}, {sure}",
-        )  # fmt: skip
-    away = "drift away and settle" if shape.kind == "holdover" else "jump and settle"
-    stop = min(end, shape.end_s + 5.0 * shape.settle_s)
-    return StampFault(
-        "relock", {"seconds": size, "settling_s": shape.settle_s}, shape.begin_s, stop,
-        f"stamps {away} again: {_signed(size)}, time constant {shape.settle_s:.3g} s",
-    )  # fmt: skip
-
-
-def _signed(size_s: float) -> str:
-    return f"{'+' if size_s >= 0 else '-'}{in_words(abs(size_s))}"
 
 
 def common(shifts: Sequence[Shift]) -> float:

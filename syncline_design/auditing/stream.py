@@ -13,7 +13,7 @@ from syncline_design.auditing.cadence import Cadence, cadence, level_scatter, mi
 from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
-from syncline_design.auditing.levels import smallest
+from syncline_design.auditing.levels import Shape, smallest
 from syncline_design.auditing.result import (
     Consequence,
     EnvelopePoint,
@@ -52,6 +52,8 @@ class Examined:
     smallest: SmallestSeen
     trace: tuple[EnvelopePoint, ...]
     constant_s: float | None  # latency, or a clock that is wrong: stamps cannot tell
+    blocks: Blocks | None = None  # levels of receipt minus stamp, without jumps of the stamps' own
+    seen: tuple[Shape, ...] = ()  # in these levels
     breathing_s: float = 0.0  # of receipts, while the stamps keep their rhythm
 
 
@@ -283,7 +285,7 @@ def _summed(
     return Examined(
         stream, raw, series, faults, (*moved[0].shifts, *moved[1].shifts), pace, _offset(raw),
         residual_of(raw, series, faults), _smallest(moved[1].blocks), _trace(raw) if told else (),
-        constant, moved[1].breathing_s,
+        constant, moved[1].blocks, moved[1].seen, moved[1].breathing_s,
     )  # fmt: skip
 
 

@@ -110,12 +110,14 @@ def _clock_drift(streams: list[Examined]) -> list[Examined]:
     """One drift in all streams: one clock, and receipts are what they share."""
     drifts = {
         k: float(f.parameters["ppm"])
-        for k, one in enumerate(streams) for f in one.faults if f.fault == "drift"
+        for k, one in enumerate(streams) for f in one.faults
+        if f.fault == "drift" and f.from_s is None
     }  # fmt: skip
-    with_receipts = [k for k, one in enumerate(streams) if one.series.receive is not None]
-    if len(drifts) < 2 or len(drifts) < len(with_receipts):
+    if len(drifts) < 2:
         return streams
     ppm = float(np.median(list(drifts.values())))
+    if any(k not in drifts and _would_drift(one, ppm) for k, one in enumerate(streams)):
+        return streams
     if any(abs(one - ppm) > _DRIFT_ALIKE * abs(ppm) + 1.0 for one in drifts.values()):
         return streams
     for k in drifts:
@@ -127,6 +129,12 @@ def _clock_drift(streams: list[Examined]) -> list[Examined]:
         others = tuple(f for f in streams[k].faults if f.fault != "drift")
         streams[k] = replace(streams[k], faults=(*others, fault))
     return streams
+
+
+def _would_drift(one: Examined, ppm: float) -> bool:
+    """Whether a stream that drifts so would have shown it."""
+    least = one.smallest.drift_ppm
+    return one.series.receive is not None and least is not None and least < 0.7 * abs(ppm)
 
 
 # ---- how it writes --------------------------------------------------------------------------

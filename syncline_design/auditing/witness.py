@@ -20,7 +20,7 @@ from syncline_design.auditing.levels import SURE, Shape, course
 from syncline_design.auditing.series import Array, Series, scatter, seconds
 
 Side = Literal["stamp", "receipt", "unknown"]
-SLOW: Final = ("bend", "relock", "holdover")
+SLOW: Final = ("bend", "ramp", "relock", "holdover")
 _OWN: Final = 0.4  # of a course: how near to it the count's must be
 _NONE: Final = 0.35  # and how little of it where it is not the stamps'
 _BLURRED: Final = 0.5  # of a course: a count that scatters more says nothing

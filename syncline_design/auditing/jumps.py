@@ -1,0 +1,202 @@
+"""Jumps of the clock that stamps, message by message: where its rhythm breaks and receipts do not.
+
+A sensor measures at a + k T.  Where its clock jumps by s, one interval of the stamps is n T + s,
+and receipt minus stamp falls by s with the same message, n counted by receipts.  A late message
+moves receipts alone, a late measurement both.  So a jump is known to the message and to the
+sensor's jitter, however short it lasts; one that goes back by the same amount is an episode.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from syncline_design.auditing.cadence import Cadence
+from syncline_design.auditing.result import StampFault
+from syncline_design.auditing.series import NS, Array, Series, in_words, scatter, seconds, spread
+
+_BESIDE: Final = 12  # messages on each side that tell a level
+_APART: Final = 6  # messages: receipts in bunches are even from one to the next
+_LEAST: Final = 3
+_MOST: Final = 4000  # intervals that are looked at
+_MOST_JUMPS: Final = 200  # of a log; more are how the sensor measures
+_JITTER: Final = 10.0  # times: smaller breaks are the rhythm's own
+_LEVEL: Final = 5.0  # times its uncertainty that a level has to change by
+_ALIKE: Final = 0.35  # how near rhythm and level agree
+_SHARE: Final = 0.25  # of the delays' spread: smaller jumps are not named
+_GRAINS: Final = 2.2  # of the coarser time: both its values lie on a grid
+_ALONE: Final = 8.0  # times what the intervals around it are off by
+_REPEATED: Final = 0.9  # of an episode's stamps: old messages that are sent again
+_LEAST_S: Final = 2e-5
+_SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
+_BACK: Final = 0.3  # of a jump: what returns by more settles, and is no step
+_EQUAL: Final = 0.02
+_SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
+
+
+@dataclass(frozen=True, slots=True)
+class Jump:
+    """Stamps gain `size_s` with the message at `place` (among the good ones), until `end`."""
+
+    place: int
+    size_s: float
+    end: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Mended:
+    """The series without its jumps, and the jumps as faults.  settling_s: when others begin."""
+
+    series: Series
+    faults: tuple[StampFault, ...]
+    jumps: tuple[Jump, ...]
+    settling_s: tuple[float, ...] = ()
+
+
+def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
+    """Steps and episodes that a regular sensor's rhythm shows; least_s: smaller ones are left."""
+    nothing = Mended(series, (), ())
+    if series.receive is None or not pace.regular or pace.interval.size < 2 * _BESIDE:
+        return nothing
+    times = series.seconds[pace.places]
+    late = seconds((series.receive - series.stamp)[pace.places])
+    late = late - np.median(late)
+    found = _found(pace, late, least_s)
+    if not found or len(found) > _MOST_JUMPS:
+        return nothing
+    lasting = _lasting(found, times, late)
+    settling = tuple(float(times[j.place]) for j in found if j not in lasting)
+    found = _paired(lasting, pace.jitter_s)
+    known = series.stamp[pace.places]
+    found = [jump for jump in found if not _replays(jump, known)]
+    stamp = series.stamp.copy()
+    for jump in found:
+        part = pace.places[jump.place : jump.end]
+        stamp[part] -= round(jump.size_s * NS)
+        if jump.end is None:
+            stamp[part[-1] + 1 :] -= round(jump.size_s * NS)
+    faults = tuple(_fault(jump, times) for jump in found)
+    return Mended(replace(series, stamp=stamp), faults, tuple(found), settling)
+
+
+def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
+    """Jumps that intervals of the stamps and levels of receipt minus stamp both show."""
+    pace = _without_jumps_of_its_own(pace)
+    period = pace.period_s
+    noise = max(_JITTER * pace.jitter_s, _LEAST_S, _GRAINS * least_s)
+    off = np.abs(pace.interval - np.round(pace.interval / period) * period)
+    off_here = off > np.maximum(noise, _ALONE * _around(off))
+    odd = np.flatnonzero(off_here | (pace.steps != 1.0))[:_MOST]
+    if not odd.size:
+        return []
+    width = min(spread(late), spread(late[_APART:] - late[:-_APART]))  # no slow course enters
+    floor = max(noise, _SHARE * width)
+    broken = odd[off_here[odd]]
+    first = _sizes(pace, late, odd, broken, (width, floor))
+    return _sizes(pace, late, odd, np.asarray([j.place - 1 for j in first], np.intp),
+                  (width, floor))  # fmt: skip
+
+
+def _around(off: Array) -> Array:
+    """The median of the five values around each: what settles breaks one interval after another."""
+    padded = np.concatenate([off[:1], off[:1], off, off[-1:], off[-1:]])
+    return np.asarray(np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1))
+
+
+def _without_jumps_of_its_own(pace: Cadence) -> Cadence:
+    """The rhythm with the mean interval of those alone that no jump lengthens."""
+    single = pace.interval[pace.steps == 1.0]
+    middle = float(np.median(single))
+    near = single[np.abs(single - middle) <= _JITTER * scatter(single) + 1e-7]
+    return replace(pace, period_s=float(near.mean()))
+
+
+def _sizes(
+    pace: Cadence, late: Array, odd: NDArray[np.intp], edges: NDArray[np.intp],
+    limits: tuple[float, float],
+) -> list[Jump]:  # fmt: skip
+    """The jumps among odd intervals; no level reaches beyond `edges`."""
+    width, floor = limits
+    apart = np.abs(pace.interval - pace.steps * pace.period_s)
+    uneven = float(np.percentile(apart, 95.0))  # of one interval
+    found = []
+    for k in odd:
+        at = int(np.searchsorted(edges, k))
+        begin = int(edges[at - 1]) + 1 if at > 0 else 0
+        beyond = at + 1 if at < edges.size and edges[at] == k else at
+        end = int(edges[beyond]) + 1 if beyond < edges.size else late.size
+        before, after = late[max(begin, k + 1 - _BESIDE) : k + 1], late[k + 1 : end][:_BESIDE]
+        if min(before.size, after.size) < _LEAST:
+            continue
+        moved = float(np.median(after) - np.median(before))
+        sure = _SIGMA * width * float(np.sqrt(1.0 / before.size + 1.0 / after.size))
+        interval = float(pace.interval[k])
+        count = max(1, round((interval + moved) / pace.period_s))
+        size = interval - count * pace.period_s
+        least = max(floor, _LEVEL * sure, _SLOW * count * pace.period_s)
+        clear = 3.0 * sure < 0.5 * pace.period_s
+        if clear and abs(size) > least and abs(size + moved) < _ALIKE * abs(size) + 2.0 * sure:
+            found.append(Jump(int(k) + 1, size if uneven < 2.0 * sure else -moved))
+    return found
+
+
+def _lasting(found: list[Jump], times: Array, late: Array) -> list[Jump]:
+    """Those after which the level stays, but for a drift of the whole log: the others settle."""
+    level = late.copy()
+    for jump in found:
+        level[jump.place :] += jump.size_s
+    level = level - _slope(times, level) * (times - times[0])
+    ends = [*(jump.place for jump in found[1:]), late.size]
+    return [j for j, end in zip(found, ends, strict=True) if not _settles(j, level[j.place : end])]
+
+
+def _settles(jump: Jump, level: Array) -> bool:
+    part = max(_LEAST, min(_BESIDE, level.size // 3))
+    if level.size < 2 * part:
+        return False
+    last = level[-max(part, level.size // 4) :]
+    back = float(np.median(last) - np.median(level[:part])) / jump.size_s
+    return back > _BACK
+
+
+def _slope(times: Array, level: Array) -> float:
+    lag = max(1, level.size // 10)
+    passed = times[lag:] - times[:-lag]
+    use = passed > 0.0
+    return float(np.median((level[lag:] - level[:-lag])[use] / passed[use])) if use.any() else 0.0
+
+
+def _paired(found: list[Jump], jitter_s: float) -> list[Jump]:
+    """A jump and the one after it that takes it back, as one episode."""
+    out: list[Jump] = []
+    for jump in found:
+        last = out[-1] if out else None
+        near = max(_JITTER * jitter_s, _EQUAL * abs(jump.size_s), 1e-6)
+        if last is not None and last.end is None and abs(last.size_s + jump.size_s) < near:
+            out[-1] = replace(last, end=jump.place)
+        else:
+            out.append(jump)
+    return out
+
+
+def _replays(jump: Jump, stamp: NDArray[np.int64]) -> bool:
+    """Whether an episode's stamps were all seen before: messages that were sent once more."""
+    if jump.size_s > 0.0 or jump.end is None:
+        return False
+    again = np.isin(stamp[jump.place : jump.end], stamp[: jump.place])
+    return float(np.mean(again)) > _REPEATED
+
+
+def _fault(jump: Jump, times: Array) -> StampFault:
+    begin = float(times[jump.place])
+    end = float(times[-1] if jump.end is None else times[jump.end])
+    lasts = "and stay so" if jump.end is None else f"until {end:.4g} s"
+    sign = "+" if jump.size_s >= 0 else "-"
+    return StampFault(
+        "step", {"seconds": jump.size_s}, begin, end,
+        f"stamps move by {sign}{in_words(abs(jump.size_s))} {lasts}: one interval breaks the "
+        "sensor's rhythm by as much as receipts shift against stamps",
+    )  # fmt: skip
