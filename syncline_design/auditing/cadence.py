@@ -7,6 +7,7 @@ against the rhythm is the clock of the stamps, what does not is transport or the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -26,6 +27,7 @@ _MOST_STRETCHES: Final = 5000
 _GROWTH: Final = 2.0  # of irregularity over 16 intervals against over one: a rhythm 1, a walk 4
 _HOLE: Final = 0.85  # of an interval: more than a late message
 _WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
+_IN_A_ROW: Final = 8  # intervals that are lengthened alike: no chance losses
 LONG_GAP: Final = 4  # missing in a row; fewer may be single losses
 
 
@@ -129,7 +131,8 @@ def missing(
         long_ = lost >= run
     if long_.sum() > max(2.0, _MOST_GAPS * long_.size):
         return ()
-    blurred = blurred or float(lost[~long_].sum()) > _MOST_LOST * lost.size
+    left_out = float(lost[~long_].sum()) + float(np.sum(_at_another_rate(pace.steps)))
+    blurred = blurred or left_out > _MOST_LOST * lost.size
     singles = () if blurred else _losses(series, pace, np.where(long_, 0.0, lost))
     return (*_gaps(series, pace, long_), *singles)
 
@@ -138,6 +141,7 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
     """Missing messages of every interval, those taken out as unusable not counted."""
     between = np.diff(pace.places) - 1.0
     lost = np.maximum(pace.steps - 1.0 - between, 0.0)
+    lost[_at_another_rate(pace.steps)] = 0.0
     if series.receive is not None:
         late = seconds(np.diff((series.receive - series.stamp)[pace.places]))
         shifted = np.abs(late) > np.maximum(6.0 * level_s + 1e-6, 0.5 * lost * pace.period_s)
@@ -149,6 +153,16 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
             if not _stays(series, pace, int(k)):
                 lost[k] = 0.0
     return lost
+
+
+def _at_another_rate(steps: Array) -> Mask:
+    """Intervals of one and the same number of periods in a row: the sensor measures less often."""
+    out = np.zeros(steps.size, bool)
+    edges = np.flatnonzero(np.diff(np.concatenate([[-1.0], steps, [-1.0]])) != 0)
+    for begin, end in pairwise(edges):
+        if end - begin >= _IN_A_ROW and steps[begin] > 1.0:
+            out[begin:end] = True
+    return out
 
 
 def _stays(series: Series, pace: Cadence, k: int) -> bool:

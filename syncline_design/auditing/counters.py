@@ -80,8 +80,12 @@ def unwrapped(series: Series) -> Continuous:
         return _aliased(series, places, stamp)
     expected, even = _expected(series, places, change)
     fallen = (expected - change)[falls]
+    levels = _by_levels(series, places, falls, fallen)
     if not even:
-        fallen = _by_levels(series, places, falls, fallen)
+        fallen = levels
+    elif series.receive is not None:  # messages may be lost where the counter begins anew
+        period = float(np.median(change[change > 0]))
+        fallen = fallen + np.round((levels - fallen) / period) * period
     found = _range(fallen, stamp, _noise(series, places, expected - change, even))
     if found is None:
         return Continuous(series)
@@ -90,7 +94,9 @@ def unwrapped(series: Series) -> Continuous:
     turns[falls[matching] + 1] = 1.0
     if series.receive is not None:  # a gap may be longer than the range
         more = np.round((expected - change) / wrap.size_ns)
-        turns[1:] = np.where((turns[1:] > 0) | (more > 1), np.maximum(more, turns[1:]), turns[1:])
+        in_gap = (more == 1) & (expected > wrap.size_ns) & (change > 0)
+        within = (turns[1:] > 0) | (more > 1) | in_gap
+        turns[1:] = np.where(within, np.maximum(more, turns[1:]), turns[1:])
     whole = series.stamp.copy()
     whole[places] = stamp + np.round(np.cumsum(turns) * wrap.size_ns).astype(np.int64)
     at = series.seconds[places][falls[matching] + 1]

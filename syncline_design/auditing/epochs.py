@@ -45,6 +45,7 @@ _COUNTED: Final = (
     (DAY_S, ("utc", "gps"), "day_seconds", "stamps are seconds of the day"),
     (3600.0, ("utc", "gps"), "hour_seconds", "stamps are seconds of the hour"),
 )
+_TELLING: Final = 2  # messages: one alone may be old
 _FEW_FALLS: Final = 3
 _SLOWEST, _FASTEST = 0.98, 1.02  # no clock runs so: counts of another unit
 _STEADY: Final = 0.005  # how alike the rates of short and long stretches are
@@ -185,6 +186,8 @@ def epoch_fault(series: Series) -> StampFault | None:
     if found is None:
         return None
     shift, kind, words = found
+    if middle < 0.0 and stamp.size < _TELLING and kind in ("time_zone", "unknown"):
+        return None  # a latched message may be of long before the recording
     return StampFault("epoch_offset", {"seconds": shift, "kind": kind}, None, None,
                       f"stamps are {_spoken(middle)} their receipts: {words}")  # fmt: skip
 
@@ -212,7 +215,7 @@ def constant_fault(series: Series, known_s: float) -> StampFault | None:
             "whole_second_slip", {"seconds": float(-whole), "count": float(late.size)}, None, None,
             f"every stamp lies {abs(whole)} s {side} its receipt, but for {apart}",
         )  # fmt: skip
-    if least <= MOST_LATENCY_S:
+    if least <= MOST_LATENCY_S or late.size < _TELLING:
         return None
     return StampFault(
         "epoch_offset", {"seconds": -least, "kind": "unknown"}, None, None,

@@ -21,6 +21,10 @@ FTDI_S: Final = 0.016
 _FINE: Final = 5 * 10**7  # ns; coarser steps may be the epochs of a sensor
 _MOST_MOMENTS: Final = 200_000
 _LEAST_STEPS: Final = 5  # of a coarse stamp; one that hardly moves is stuck
+_REACH: Final = 0.6  # of a grain, by receipts
+_WIDEST: Final = 1.3  # of a tick: how far from an even rhythm stamps on ticks are
+_STRICT: Final = 0.97
+_DISORDER: Final = 0.02  # of all stamps: transport that changes their order
 _COHERENT: Final = 0.75
 _MOST_LOST: Final = 0.15  # of all messages
 _COARSE_STEPS: Final = 3.0
@@ -56,10 +60,23 @@ def truncated(series: Series, pace: Cadence, file_step_ns: float) -> Grain | Non
             continue
         if not _alternates(series, pace, grain) or _ticks(stamp, grain):
             return None
-        if _in_bunches(series, pace, grain):
+        if _in_bunches(series, pace, grain) or not _shown_by_receipts(series, pace, grain):
             return None
         return _grain(series, pace, grain)
     return None
+
+
+def _shown_by_receipts(series: Series, pace: Cadence, grain: int) -> bool:
+    """Whether receipt minus stamp reaches over most of a grain, as what was cut off does.
+
+    Stamps that lie on a grid because their sensor measures there are as late as transport alone.
+    """
+    if series.receive is None:
+        return True
+    late = (series.receive - series.stamp)[pace.places].astype(np.float64)
+    pieces = np.array_split(late, max(1, min(16, late.size // 40)))
+    reach = [float(np.subtract(*np.percentile(piece, [97.0, 3.0]))) for piece in pieces]
+    return max(reach) > _REACH * grain
 
 
 def _in_bunches(series: Series, pace: Cadence, grain: int) -> bool:
@@ -124,6 +141,16 @@ def skips_evenly(counts: Array) -> bool:
     return _evenly(skips)
 
 
+def _strictly(counts: Array) -> bool:
+    """Whether places are left out in one and the same distance: a count, or another rate.
+
+    A beat's distances are two that follow one another, unless both rates are whole multiples.
+    """
+    apart = np.diff(np.flatnonzero(counts == 2))
+    values, often = np.unique(apart, return_counts=True)
+    return bool(values.size and often.max() > _STRICT * apart.size)
+
+
 def _evenly(places: np.ndarray) -> bool:
     """Whether places come at even distances, as a beat makes them."""
     if places.size < 6:
@@ -167,7 +194,7 @@ def _packetised(series: Series, pace: Cadence, stamp: np.ndarray) -> Grain | Non
     when = (stamp - stamp[0]) / NS
     interval = np.diff(when)
     mean = float(when[-1]) / (when.size - 1)
-    if mean <= 0.0:
+    if mean <= 0.0 or float(np.mean(interval < 0.0)) > _DISORDER:
         return None
     together = interval < _TOGETHER * mean
     bunched = float(np.mean(together))
@@ -205,18 +232,22 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
     """A slow stream: every stamp is a tick of the timer, its intervals alternate."""
     about = about_rhythm(when)
     neighbours = interval[np.diff(pace.places) == 1]
-    if about is None or np.ptp(neighbours) < 0.25 * min(TIMERS):
+    if np.ptp(neighbours) < 0.25 * min(TIMERS):
         return None  # of one length: no sensor that a timer delays
-    usual = float(np.median(interval[interval > 0.0]))
-    period = float(interval[interval < 2.5 * usual].mean())
     beat = _beat(pace, interval)
     if beat is not None:
         return _packets(series, interval, beat, True, 1.0, pace)
+    if about is None:
+        return None
+    usual = float(np.median(interval[interval > 0.0]))
+    period = float(interval[interval < 2.5 * usual].mean())
     uneven = float(np.percentile(about, 95) - np.percentile(about, 5))
     if uneven < 0.5 * min(TIMERS):
         return None
     timer = best_timer(when)
-    if timer is None or uneven < 0.5 * timer or timer > 1.5 * period:
+    if timer is not None and abs(usual / timer - 1.0) < 0.002:
+        return None  # the rhythm itself, with messages left out
+    if timer is None or timer > 1.5 * period or not 0.5 < uneven / timer < _WIDEST:
         return None
     return _packets(series, interval, timer, True, 1.0, pace)
 
@@ -229,7 +260,8 @@ def _beat(pace: Cadence, interval: Array) -> float | None:
         one = interval[counts == 1]
         if one.size < 0.5 * interval.size or abs(float(np.median(one)) / timer - 1.0) > 0.002:
             continue
-        return timer if skips_evenly(counts) else None
+        known = timer == FTDI_S  # no sensor measures so often
+        return timer if skips_evenly(counts) and (known or not _strictly(counts)) else None
     return None
 
 

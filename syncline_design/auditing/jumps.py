@@ -27,6 +27,8 @@ _JITTER: Final = 10.0  # times: smaller breaks are the rhythm's own
 _LEVEL: Final = 5.0  # times its uncertainty that a level has to change by
 _ALIKE: Final = 0.35  # how near rhythm and level agree
 _SHARE: Final = 0.25  # of the delays' spread: smaller jumps are not named
+_BROKEN: Final = 0.05  # of an interval: what does not fit the rhythm
+_MOST_BROKEN: Final = 0.05  # of all intervals
 _GRAINS: Final = 2.2  # of the coarser time: both its values lie on a grid
 _ALONE: Final = 8.0  # times what the intervals around it are off by
 _REPEATED: Final = 0.9  # of an episode's stamps: old messages that are sent again
@@ -88,6 +90,8 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
     period = pace.period_s
     noise = max(_JITTER * pace.jitter_s, _LEAST_S, _GRAINS * least_s)
     off = np.abs(pace.interval - np.round(pace.interval / period) * period)
+    if float(np.mean(off > _BROKEN * period)) > _MOST_BROKEN:
+        return []  # no such rhythm
     off_here = off > np.maximum(noise, _ALONE * _around(off))
     odd = np.flatnonzero(off_here | (pace.steps != 1.0))[:_MOST]
     if not odd.size:

@@ -17,6 +17,7 @@ WEEK_NS: Final = 604_800 * 10**9
 BACK_NS: Final = 100_000  # no clock is set by less
 LARGE_SET_NS: Final = 5 * 10**8  # told without messages to compare
 MOST_SETS: Final = 20  # times that a clock is set in a log
+FEW_OTHERS: Final = 4  # falls near by: more are messages out of order
 MOST_TRIED: Final = 2000  # falls of receipts that are looked at one by one
 MOST_MOVED: Final = 50  # messages that one may be written too late by
 LONGEST_SPIKE: Final = 5  # messages that go back and return
@@ -160,7 +161,26 @@ def _set_back(series: Series, fall: int, about: int) -> int | None:
         if size < max(0.5 * about - scattered, sure, 0.2 * about):
             return None
         sizes.append(size)
-    return round(sizes[0])
+    return round(sizes[0]) if _by_count(series, fall, sizes[0]) else None
+
+
+def _by_count(series: Series, fall: int, size: float) -> bool:
+    """Whether receipts alone are behind by so much [ns], against the count of messages.
+
+    It tells a recorder's clock from stamps that jump while receipts come out of order.  Messages
+    that come too unevenly for it count where receipts fall nowhere else near by.
+    """
+    assert series.receive is not None
+    receive = series.receive
+    lag = min(60, receive.size // 2)
+    usual = float(np.median((receive[lag:] - receive[:-lag]) / lag))
+    low, high = max(0, fall - 59), min(receive.size, fall + 61)
+    apart = (receive[low:high] - receive[fall]) - usual * np.arange(low - fall, high - fall)
+    before, after = apart[: fall + 1 - low], apart[fall + 1 - low :]
+    if max(spread(before), spread(after)) < 0.3 * size:
+        return float(np.median(before) - np.median(after)) > 0.5 * size
+    others = int(np.sum(np.diff(receive[low:high]) < -BACK_NS)) - 1
+    return others < FEW_OTHERS
 
 
 def _without_disorder(series: Series) -> Series:

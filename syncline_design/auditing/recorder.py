@@ -42,8 +42,36 @@ def without_recorder_clock(streams: Sequence[Examined], start: int | None) -> li
         return list(streams)
     found = _shared(told)
     if found is None:
-        return list(streams)
+        said = _said(told)
+        return [_as_said(one, said, start) for one in streams]
     return [_again(one, found, start) if one.series.receive is not None else one for one in streams]
+
+
+def _said(streams: Sequence[Examined]) -> list[StampFault]:
+    """Times that receipts of most streams were seen to go back."""
+    every = [f for one in streams for f in one.faults if f.fault == "recorder_clock"]
+    return [f for f in every if 1 + sum(_same(f, g) for g in every) > _SHARE * len(streams)]
+
+
+def _same(one: StampFault, other: StampFault) -> bool:
+    size = float(one.parameters["seconds"])
+    return one is not other and (
+        abs(float(other.parameters["seconds"]) - size) < _ALIKE * abs(size)
+        and abs((other.from_s or 0.0) - (one.from_s or 0.0)) < 1.0 + abs(size)
+    )
+
+
+def _as_said(one: Examined, said: Sequence[StampFault], start: int | None) -> Examined:
+    """A stream too slow for its receipts to fall, whose level shows the same jump."""
+    if one.series.receive is None or any(f.fault == "recorder_clock" for f in one.faults):
+        return one
+    for fault in said:
+        size, at = -float(fault.parameters["seconds"]), fault.from_s or 0.0
+        for shape in one.seen:
+            near = abs(shape.begin_s - at) < 2.0 + abs(size)
+            if shape.kind == "step" and near and abs(shape.size_s - size) < _ALIKE * abs(size):
+                return _again(one, _Course((shape,), 1 + len(said)), start)
+    return one
 
 
 def _shared(streams: Sequence[Examined]) -> _Course | None:
@@ -107,17 +135,17 @@ def _confirms(one: Examined, shapes: tuple[Shape, ...]) -> list[bool | None] | N
 
 def _fit(columns: Array, low: Array, noise_s: float) -> tuple[Array, Array]:
     """Sizes and what they are uncertain by; levels far off weigh less (three rounds of Huber)."""
-    weight = np.ones(low.size)
-    sizes = np.zeros(columns.shape[1])
+    weight: Array = np.ones(low.size)
+    sizes: Array = np.zeros(columns.shape[1])
     for _ in range(4):
         root = np.sqrt(weight)
-        sizes, *_ = np.linalg.lstsq(columns * root[:, None], low * root, rcond=None)
+        sizes = np.asarray(np.linalg.lstsq(columns * root[:, None], low * root, rcond=None)[0])
         rest = np.abs(low - columns @ sizes)
         scale = 2.0 * max(noise_s, 1.48 * float(np.median(rest)))
-        weight = np.minimum(1.0, scale / np.maximum(rest, 1e-12))
+        weight = np.asarray(np.minimum(1.0, scale / np.maximum(rest, 1e-12)))
     inverse = np.linalg.pinv((columns * weight[:, None]).T @ columns)
-    spread = max(noise_s, 1.48 * float(np.median(np.abs(low - columns @ sizes))))
-    return np.asarray(sizes), np.sqrt(np.maximum(np.diag(inverse), 0.0)) * spread
+    width = max(noise_s, 1.48 * float(np.median(np.abs(low - columns @ sizes))))
+    return sizes, np.sqrt(np.maximum(np.diag(inverse), 0.0)) * width
 
 
 def _again(one: Examined, found: _Course, start: int | None) -> Examined:
@@ -127,12 +155,12 @@ def _again(one: Examined, found: _Course, start: int | None) -> Examined:
     assert stamps.secondary_ns is not None
     receive = stamps.secondary_ns
     known = (receive != UNSET) & (stamps.primary_ns != UNSET)
-    moved = np.zeros(receive.size)
+    moved: Array = np.zeros(receive.size)
     times = (receive[known] - one.raw.start) / NS
     late = (receive[known] - stamps.primary_ns[known]) / NS
-    total = np.zeros(times.size)
+    total: Array = np.zeros(times.size)
     for shape in found.shapes:
-        total += _moved(shape, times, late)
+        total = total + _moved(shape, times, late)
     moved[known] = np.round(total * NS)
     put_back = replace(
         stamps, secondary_ns=np.where(known, receive - moved.astype(np.int64), receive)

@@ -78,6 +78,8 @@ def without_slips(series: Series, known_s: float | None) -> Shifts:
         return nothing
     base = _right(late + (known_s or 0.0), turns, known_s is not None)
     turns = np.round(late - float(np.median(late[turns == base])))
+    single = 1 + np.flatnonzero((turns[1:-1] != turns[:-2]) & (turns[:-2] == turns[2:]))
+    turns[single] = turns[single - 1]  # one late message ends no stretch
     pace = cadence(series)
     found = [r for r in _runs(turns) if _is_slip(late, turns, r, pace, series, places)]
     if not found:

@@ -251,5 +251,6 @@ def sharp(shape: Shape, time_s: Array, late: Array) -> bool:
         k = int(np.searchsorted(time_s, edge))
         before, after = late[max(0, k - _BESIDE) : k], late[k : k + _BESIDE]
         if min(before.size, after.size) >= 4:
-            seen.append(abs(float(np.median(after) - np.median(before))) / abs(shape.size_s))
+            moved = abs(float(np.median(after) - np.median(before)))
+            seen.append(moved / max(abs(shape.size_s), 1e-12))
     return not seen or max(seen) > _SHARP
