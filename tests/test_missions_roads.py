@@ -197,3 +197,26 @@ def test_alternatives_are_what_the_spec_without_the_sensor_says(tmp_path: Path) 
     assert stamped is not None
     assert stamped.cost is not None
     assert stamped.cost[0] == costs[0]
+
+
+def test_what_nothing_asks_for_may_be_unknown(tmp_path: Path) -> None:
+    """A sensor without a price may have the least error; it has no place on the front of cost."""
+    spec = yaml.safe_load(SHIPPED.read_text("utf-8"))
+    spec |= {"objective": "error", "catalogs": ["mine.yaml"]}
+    spec["requirements"] = [one for one in spec["requirements"] if one["kind"] != "cost"]
+    spec["stages"][0]["attitude"] = {"candidates": ["novatel_cpt7"]}
+    spec["stages"][0]["position"] = {"candidates": ["ublox_f9p_rtk", "mine"]}
+    own = {"name": "mine", "modality": "position", "type": "gnss", "sigma_position": "1 mm"}
+    catalog = {"sensors": {"mine": own | {"primitives": ["pps"], "source": "measured"}}}
+    (tmp_path / "mine.yaml").write_text(yaml.safe_dump(catalog), "utf-8")
+    path = tmp_path / "unpriced.yaml"
+    path.write_text(yaml.safe_dump(spec, sort_keys=False), "utf-8")
+    found = check_file(path, CheckSettings(monte_carlo=False))
+    assert found.verdict == "meets"
+    assert found.design is not None
+    assert found.design.cost is None
+    assert found.design.stages[0].roles["position"].sensor == "mine"
+    assert found.choice is not None
+    assert found.choice.front
+    drawn = {one.design.stages[0].roles["position"].sensor for one in found.choice.front}
+    assert drawn == {"ublox_f9p_rtk"}

@@ -9,7 +9,7 @@ import numpy as np
 
 from syncline_design.choice.family import Family, FamilyDesign
 from syncline_design.choice.holding import EntryKind, hold, holds
-from syncline_design.choice.options import Bools, Indices
+from syncline_design.choice.options import Bools, Indices, ResourceName
 
 Whole = Callable[[FamilyDesign], FamilyDesign]
 
@@ -70,6 +70,24 @@ def without_sensor(family: Family, sensor: str) -> Family:
         np.flatnonzero(~ways_with(family, r, "sensor", sensor)) for r in range(len(family.roles))
     ]
     return narrowed_family(family, rows)[0]
+
+
+def stated_family(family: Family, resource: ResourceName) -> tuple[Family, Whole]:
+    """The designs of ways and clocks that say how much of a resource they take."""
+    rows = []
+    for r, role in enumerate(family.roles):
+        says = np.ones(len(role), dtype=bool)
+        for problem, places in zip(family.problems, role.places, strict=True):
+            options = problem.roles[r].options
+            if not options.spent(resource).known:
+                known = [one.resources.of(resource) is not None for one in options]
+                says &= np.array(known, dtype=bool)[places]
+        rows.append(np.flatnonzero(says))
+    clocks = []
+    for vehicle, own in zip(family.problems[0].vehicles, family.clocks, strict=True):
+        told = [vehicle.clocks[i].resources.of(resource) is not None for i in own[0].tolist()]
+        clocks.append(np.flatnonzero(told))
+    return narrowed_family(family, rows, clocks)
 
 
 def sensor_groups(family: Family, r: int) -> Indices:

@@ -32,7 +32,7 @@ from syncline_design.choice.family_best import (
     primary_of,
 )
 from syncline_design.choice.family_bounds import Rest, least_of_clocks
-from syncline_design.choice.family_parts import Whole, narrowed_family
+from syncline_design.choice.family_parts import Whole, narrowed_family, stated_family
 from syncline_design.choice.family_tables import FamilyTables, tabulate_family
 from syncline_design.choice.options import Floats, Indices, ResourceName
 from syncline_design.choice.outcome import NoVerdict, OutOfTime, Proof, Road, TooLarge
@@ -123,14 +123,18 @@ def front_by_road(
 ) -> tuple[FamilyPoint, ...]:
     """The exact front: by merging; where that gives up by enumeration or by integer programs.
 
-    accuracy: over designs that keep the accuracy of every mission too.
+    accuracy: over designs that keep the accuracy of every mission too.  What does not say how much
+    of the resource it takes has no place on it.
     """
+    part, whole = stated_family(family, resource)
     try:
-        return family_front(family, resource, accuracy=accuracy)
+        points = family_front(part, resource, accuracy=accuracy)
     except TooLarge:
-        if family.combinations <= MOST_ENUMERATED:
-            return tuple(_front_enumerated(family, resource, accuracy))
-        return tuple(_front_by_milp(family, resource, accuracy))
+        made = _front_by_milp
+        if part.combinations <= MOST_ENUMERATED:
+            made = _front_enumerated
+        points = tuple(made(part, resource, accuracy))
+    return tuple(replace(point, design=whole(point.design)) for point in points)
 
 
 def _front_enumerated(

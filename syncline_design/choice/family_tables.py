@@ -64,8 +64,9 @@ class FamilyTables:
     """All roles as arrays; what they are counted in.
 
     names: resources that are summed, the primary one first; units: denominators of their whole
-    numbers.  clocks: of each vehicle the places of its clocks.  rates: of each mission
-    the sync rate [m/s]; accuracy: its limit [m], infinite where there is none.
+    numbers, 0 where nothing asks for the primary one and some entry does not say it.  clocks: of
+    each vehicle the places of its clocks.  rates: of each mission the sync rate [m/s]; accuracy:
+    its limit [m], infinite where there is none.
     """
 
     family: Family
@@ -101,7 +102,9 @@ class FamilyTables:
         return not self.per_sensor and not ends
 
     def whole(self, k: int, amount: Fraction | None) -> int:
-        """An amount of a resource in its whole numbers."""
+        """An amount of a resource in its whole numbers; none where it is of no matter."""
+        if self.units[k] == 0:
+            return 0
         if amount is None:
             raise TooLarge(f"an entry gives no {self.names[k]}")
         return int(amount * self.units[k])
@@ -130,11 +133,15 @@ def tabulate_family(family: Family, primary: ResourceName) -> FamilyTables:
         int(np.lcm.reduce([s.denominator for s in (*own, more)], dtype=object))
         for own, more in zip(spent, other, strict=True)
     )
-    for own, more in zip(spent, other, strict=True):
-        if not all(one.known for one in (*own, more)):
+    for k, (own, more) in enumerate(zip(spent, other, strict=True)):
+        if all(one.known for one in (*own, more)):
+            continue
+        if family.objective != "error" or names[k] in dict(family.budgets):
             raise TooLarge("an entry that does not say how much of a resource it takes")
+        units = (0, *units[1:])  # nothing asks for it: every way takes none
+        spent[k] = [Spent(np.zeros(len(role), dtype=np.int64), 1) for role in family.roles]
     roles = tuple(
-        _ways(family, r, [own[r].scaled(unit) for own, unit in zip(spent, units, strict=True)],
+        _ways(family, r, [own[r].scaled(unit or 1) for own, unit in zip(spent, units, strict=True)],
               tracked)
         for r in range(len(family.roles))
     )  # fmt: skip
