@@ -20,7 +20,7 @@ FLAWS = """(width) => {
     const name = svg.querySelector('title').textContent, frame = svg.getBoundingClientRect();
     if (width > 1000) {
       const part = svg.closest('section').getBoundingClientRect();
-      const beside = svg.closest('.pair, .trio, .split, .alone');
+      const beside = svg.closest('.pair, .flow, .trio, .split, .alone');
       if (!beside && frame.width < 0.7 * part.width) flaws.push('half blank: ' + name);
     }
     const boxes = [...svg.querySelectorAll('text')].filter(t => t.textContent.trim()).map(t => {

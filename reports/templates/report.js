@@ -109,7 +109,7 @@
       tip.setAttribute("role", "status");
       drawing.appendChild(tip);
       data.labels.forEach(function (label, k) {
-        var value = row[4 + k];
+        var value = data.words[row[4 + k]];
         if (value === "") { return; }
         var line = document.createElement("div");
         line.append(span(label + " ", false), span(value, true));

@@ -129,13 +129,13 @@ class Explorer:
 class Group:
     """Nodes that belong together: an article, a column, side by side, folded.
 
-    split: three parts to two; pair: two in a row; trio: three in a row where there is room; alone:
-    a figure with its words and values beside it.
+    split: three parts to two; pair: two in a row; flow: two columns; trio: three in a row where
+    there is room; alone: a figure with its words and values beside it.
     """
 
     kind: ClassVar = "group"
     nodes: tuple[Node, ...]
-    look: Literal["article", "column", "split", "pair", "trio", "alone", "fold"] = "column"
+    look: Literal["article", "column", "split", "pair", "flow", "trio", "alone", "fold"] = "column"
     key: str = ""
     summary: str = ""  # of a fold
     reach: Reach = "everywhere"

@@ -205,9 +205,7 @@ def _meeting(
     for (kind, strength), points in groups.items():
         places = [p.x for p in points], [p.y for p in points]
         shape = SHAPES[kind % len(SHAPES)]
-        axes.plot(*places, shape, markersize=7, markerfacecolor=SERIES[0],
-                  markeredgecolor="none", alpha=strength)  # fmt: skip
-        axes.plot(*places, shape, markersize=7, markerfacecolor="none",
+        axes.plot(*places, shape, markersize=7, markerfacecolor=(SERIES[0], strength),
                   markeredgecolor=SERIES[0], markeredgewidth=0.8)  # fmt: skip
     for kind in sorted({kind for kind, _ in groups}):
         count = sum(p.kind == kind for p in meeting)

@@ -11,7 +11,7 @@ from dataclasses import replace
 from itertools import groupby
 from typing import Final
 
-from syncline_design.report.document import Chart, Group, Node, TableNode
+from syncline_design.report.document import Chart, Group, Items, Node, TableNode, charts
 
 BESIDE: Final = 4  # columns of a table that fits into half a page
 ROWS: Final = 14  # of a table that is not much longer than a figure is high
@@ -26,24 +26,24 @@ def _inner(nodes: Iterable[Node]) -> Iterator[Node]:
     for node in nodes:
         if isinstance(node, Group) and node.look in ("article", "column", "fold"):
             yield replace(node, nodes=laid_out(node.nodes))
-        elif isinstance(node, Group) and node.look == "pair" and len(node.nodes) == 1:
-            yield node.nodes[0]
+        elif isinstance(node, Group) and node.look == "pair":
+            yield from node.nodes if len(list(charts([node]))) == len(node.nodes) else (node,)
         else:
             yield node
 
 
 def _grids(nodes: Iterable[Node]) -> Iterator[Node]:
-    """Charts that follow one another as one group."""
+    """Charts that follow one another as one group, in two columns of their own lengths."""
     for is_chart, run in groupby(nodes, lambda node: isinstance(node, Chart)):
         together = tuple(run)
         if is_chart and len(together) > 1:
-            yield Group(together, "pair", reach="page")
+            yield Group(together, "flow", reach="page")
         else:
             yield from together
 
 
 def _beside(nodes: Sequence[Node]) -> Iterator[Node]:
-    """A single chart with the small table that follows it."""
+    """A single chart with the small table, or the list, that follows it."""
     place = 0
     while place < len(nodes):
         node, after = nodes[place], nodes[place + 1 : place + 2]
@@ -60,5 +60,5 @@ def _beside(nodes: Sequence[Node]) -> Iterator[Node]:
 
 def _small(node: Node) -> bool:
     if not isinstance(node, TableNode):
-        return False
+        return isinstance(node, Items)
     return len(node.table.heads) <= BESIDE and len(node.table.rows) <= ROWS

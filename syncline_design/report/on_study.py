@@ -191,8 +191,8 @@ def _figure(brief: Brief, place: int) -> float | None:
 
 def _sampled_caption(data: Scatter) -> str:
     text = (
-        "Computed cases only. A disc meets its requirements, the stronger its colour the dearer; "
-        "a cross does not."
+        "Computed cases only. A filled mark meets its requirements, the stronger its colour the "
+        "dearer; a cross does not."
     )
     return text + (f" Vary besides: {sentence_list(list(data.others))}." if data.others else "")
 

@@ -95,13 +95,18 @@ def _environment() -> Environment:
 
 
 def _points(figure: InlineFigure) -> str:
-    """What the places of a figure say, for the page's script: labels, then a row a place."""
-    labels = _labels(figure)
-    rows = [
-        [t.left, t.top, t.wide, t.high, *(t.says.get(label, "") for label in labels)]
-        for t in figure.told
-    ]
-    return json.dumps({"labels": labels, "rows": rows}, ensure_ascii=False, separators=(",", ":"))
+    """What the places of a figure say, for the page's script.
+
+    Labels; every word once; a row a place: left, top, width, height, the places of its words.
+    """
+    labels, words = _labels(figure), {"": 0}
+    rows = []
+    for t in figure.told:
+        said = (t.says.get(label, "") for label in labels)
+        found = [words.setdefault(word, len(words)) for word in said]
+        rows.append([t.left, t.top, t.wide, t.high, *found])
+    data = {"labels": labels, "words": list(words), "rows": rows}
+    return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
 
 
 def _values(figure: InlineFigure, caption: str) -> Table | None:
