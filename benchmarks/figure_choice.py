@@ -95,7 +95,7 @@ def horizontal(raw: Raw, names: Names) -> float:
         along, up, level = variances(raw, names, float(elevation))
         radial = along * math.cos(elevation) ** 2 + up * math.sin(elevation) ** 2
         large, small = max(radial, level), min(radial, level)
-        best = max(best, plane_quantile(round(small / large, 3)) * math.sqrt(large))
+        best = max(best, plane_quantile(max(round(small / large, 3), 1e-3)) * math.sqrt(large))
     return best
 
 

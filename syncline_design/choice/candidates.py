@@ -19,6 +19,7 @@ import numpy as np
 from syncline_design.choice.exclusions import Excluded, Exclusions
 from syncline_design.choice.options import (
     RESOURCES,
+    Bend,
     Bools,
     Floats,
     Indices,
@@ -52,6 +53,7 @@ from syncline_design.spec.existence import (
     strongest,
     too_sparse,
 )
+from syncline_design.spec.noise_table import NoiseTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,7 +120,29 @@ def sensor_error(sensor: SensorEntry, role: RoleName, motion: Motion) -> Fractio
     if role == "attitude":
         return norm(sensor.sigma_attitude or 0.0, 3) * motion.distance
     bearing = norm(sensor.sigma_bearing or 0.0, 2) * motion.distance
-    return fraction_of(sensor.sigma_range or 0.0) + bearing
+    return _range_sigma(sensor, motion.distance) + bearing
+
+
+def _range_sigma(sensor: SensorEntry, distance: Fraction) -> Fraction:
+    """Deviation of the range [m], at a distance."""
+    sigma = sensor.sigma_range or 0.0
+    by_range = isinstance(sigma, NoiseTable) and sigma.of == "range"
+    return sigma.at(distance) if isinstance(sigma, NoiseTable) and by_range else fraction_of(sigma)
+
+
+def bends_of(sensor: SensorEntry, role: RoleName, motion: Motion) -> tuple[Bend, ...]:
+    """What a sensor's error is where its noise by range bends inside the stage's distances."""
+    sigma, near = sensor.sigma_range, motion.near_end
+    if role != "ranging" or near is None or not isinstance(sigma, NoiseTable):
+        return ()
+    if sigma.of != "range":
+        return ()
+    found = []
+    for place in sigma.bends(min(near.distance, motion.distance), motion.distance):
+        there = replace(motion, distance=place, nearest=None)
+        rate = own_rate(role, there)
+        found.append(Bend(place, sensor_error(sensor, role, there), rate))
+    return tuple(found)
 
 
 def underway_m(
@@ -258,11 +282,25 @@ class Candidates:
         crit = np.full(len(error), math.inf) if rate is None else error / float(rate)
         nearer, near = np.zeros(len(error)), self._near
         if near is not None:
-            nearer = self.turned * float(self.motion.distance - near.distance)
+            nearer = self.turned * float(self.motion.distance - near.distance) + self._eased(near)
             slower = own_rate(self.role.role, near)
             if slower is not None:
                 crit = np.minimum(crit, (error - nearer) / float(slower))
+            for place, sensor in enumerate(self.role.sensors):
+                for bend in bends_of(sensor.entry, self.role.role, self.motion):
+                    crit[place] = min(crit[place], bend.crit_s)
         return error, added, crit, nearer
+
+    def _eased(self, near: Motion) -> Floats:
+        """By how much the range noise of each sensor is smaller at the near end [m]."""
+        found = np.zeros(len(self.fixed))
+        if self.role.role == "ranging":
+            for place, one in enumerate(self.role.sensors):
+                if "sigma_range" in one.entry.tables:
+                    far, close = self.motion.distance, near.distance
+                    eased = _range_sigma(one.entry, far) - _range_sigma(one.entry, close)
+                    found[place] = float(eased)
+        return found
 
     def _columns(self, rows: Indices) -> Options:
         """Options of some rows as columns."""
@@ -322,6 +360,8 @@ class Candidates:
             near_error = sensor_error(sensor.entry, self.role.role, near)
             near_rate = own_rate(self.role.role, near)
             crits += [] if near_rate is None else [near_error / near_rate]
+        bends = bends_of(sensor.entry, self.role.role, self.motion)
+        crits += [one.error_m / one.rate_mps for one in bends if one.rate_mps]
         return Option(
             sensor=sensor.id,
             primitive=way.primitive,
@@ -340,6 +380,7 @@ class Candidates:
             own_rate_mps=rate,
             near_error_m=near_error,
             near_rate_mps=near_rate,
+            bends=bends,
             reach_m=(float(self.near[place]), float(self.far[place])),
             rate_hz=_finite(sensor.entry.rate, self.rate[place]),
             sound_mps=_finite(self.stage.choice.sound_speed or SOUND_MPS, self.sound[place]),

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
 from syncline_design.model import timing
 from syncline_design.model.roles import ROLES, RoleName
-from syncline_design.model.system import UTC, Look, Platform, Sensor, Stage, System
+from syncline_design.model.system import UTC, Look, Platform, Sensor, Shape, Stage, System
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.catalog import (
     ClockEntry,
@@ -20,8 +21,10 @@ from syncline_design.spec.catalog import (
     TimestampError,
     UniformError,
 )
+from syncline_design.spec.exact import fraction_of
 from syncline_design.spec.existence import SOUND_MPS, is_acoustic, is_charged
 from syncline_design.spec.facts import FieldOfView
+from syncline_design.spec.noise_table import NoiseTable
 
 Vector = tuple[float, float, float]
 
@@ -127,7 +130,26 @@ def _sensor(case: Case, stage: StageCase, role: RoleCase, option: Option) -> Sen
         lever_arm_m=_vector(role.choice.lever_arm),
         type=entry.type,
         **_apart(case, stage, role.role, entry),
+        **_shapes(stage, entry),
     )
+
+
+def _shapes(stage: StageCase, entry: SensorEntry) -> dict[str, Any]:
+    """How noise that depends does so, as shares of the figure where the stage uses it."""
+    found: dict[str, Any] = {}
+    far = fraction_of(stage.platform.entry.distance)
+    for name, table in entry.tables.items():
+        if table.of == "range":
+            places = (*table.bends(Fraction(0), far), far)
+            found["range_shape"] = _shares(table, places)
+        else:
+            key = "range_by_beam" if name == "sigma_range" else "bearing_by_beam"
+            found[key] = _shares(table, [place for place, _ in table.rows])
+    return found
+
+
+def _shares(table: NoiseTable, places: Sequence[Fraction]) -> Shape:
+    return tuple((float(one), float(table.at(one) / table.exact)) for one in places)
 
 
 def _apart(case: Case, stage: StageCase, role: RoleName, entry: SensorEntry) -> dict[str, Any]:

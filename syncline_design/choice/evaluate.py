@@ -6,12 +6,13 @@ Formulas of the design rules: total = sync error + sensor error + systematic err
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 from fractions import Fraction
 
 from syncline_design.choice.options import RESOURCES, Option, ResourceName, Resources
-from syncline_design.choice.table import ClockOption, Design, Pair, Problem
+from syncline_design.choice.table import ClockOption, Design, Nearer, Pair, Problem
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,22 +82,37 @@ def _tightest(
     """Sensor error and sync rate where the first is the smallest share of the second.
 
     Both are sums of terms a + b d over the stages, so that their ratio is steady in each d: the
-    least lies at an end of every stage's distances.
+    least lies at an end of every stage's distances, or where a sensor's noise by range bends.
     """
-    ends = [(sensor_error, problem.sync_rate())]
-    for near in problem.near_ends():
-        stages = {one.stage for one in near}
-        less = sum(
-            (
-                option.nearer_m()
-                for table, option in zip(problem.roles, options, strict=True)
-                if table.stage in stages
-            ),
-            Fraction(0),
-        )
-        slower = sum((one.slower for one in near), Fraction(0))
-        ends.append((sensor_error - less, problem.sync_rate() - slower))
+    rate = problem.sync_rate()
+    ends = []
+    for moves in itertools.product(*(_places(problem, options, one) for one in problem.nearer)):
+        less = sum((error for error, _ in moves), Fraction(0))
+        slower = sum((slow for _, slow in moves), Fraction(0))
+        ends.append((sensor_error - less, rate - slower))
     return min(ends, key=lambda end: end[0] / end[1] if end[1] > 0 else math.inf)
+
+
+def _places(
+    problem: Problem, options: list[Option], near: Nearer
+) -> list[tuple[Fraction, Fraction]]:
+    """How much smaller sensor error [m] and sync rate [m/s] are where a stage's object may be:
+    at the far end, at the near end, and at every bend between."""
+    own = [
+        (table, option)
+        for table, option in zip(problem.roles, options, strict=True)
+        if table.stage == near.stage
+    ]
+    less = sum((option.nearer_m() for _, option in own), Fraction(0))
+    found = [(Fraction(0), Fraction(0)), (less, near.slower)]
+    for table, option in own:
+        for bend in option.bends:
+            assert table.nearest_m is not None
+            share = (table.distance_m - bend.distance_m) / (table.distance_m - table.nearest_m)
+            others = sum((o.nearer_m() for _, o in own if o is not option), Fraction(0))
+            eased = option.error() - bend.error_m
+            found.append((eased + share * others, share * near.slower))
+    return found
 
 
 def _errors(

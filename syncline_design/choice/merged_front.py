@@ -200,10 +200,20 @@ def _hold_sync(tables: Tables, finished: _Finished) -> Bools:
         there, allowed = _at_near_ends(tables, labels, near)
         holds &= there < limit * allowed * (1.0 - MARGIN)
         may &= there <= limit * allowed * (1.0 + MARGIN)
-    close = np.flatnonzero(~holds & may)
+    close = np.flatnonzero(may if _bends(problem) else ~holds & may)
     for row, design in zip(close, _designs(tables, finished, close), strict=True):
         holds[row] = evaluate(problem, design).sync_ratio < limit
     return holds
+
+
+def _bends(problem: Problem) -> bool:
+    """Whether some sensor's noise bends between the ends of the distances, where no sum looks."""
+    return bool(problem.nearer) and any(
+        option.bends
+        for table in problem.roles
+        if table.role == "ranging"
+        for option in table.options.first_of_each(table.options.sensor)
+    )
 
 
 def _at_near_ends(

@@ -47,6 +47,28 @@ class Resources:
 
 
 @dataclass(frozen=True, slots=True)
+class Bend:
+    """Where a sensor's noise by range bends between the ends of the distances.
+
+    error_m: its sensor error there; rate_mps: what its own tau_crit is taken against, None where
+    motion does not matter.
+    """
+
+    distance_m: Fraction
+    error_m: Fraction
+    rate_mps: Fraction | None
+
+    @property
+    def crit_s(self) -> float:
+        """Its own tau_crit there [s]."""
+        return float(self.error_m / self.rate_mps) if self.rate_mps else math.inf
+
+    def scaled(self, ratio: Fraction) -> Bend:
+        """With so many times the error."""
+        return replace(self, error_m=self.error_m * ratio)
+
+
+@dataclass(frozen=True, slots=True)
 class Option:
     """One (sensor, primitive, timestamping method) for a role, every constant resolved."""
 
@@ -67,6 +89,7 @@ class Option:
     own_rate_mps: Fraction | None = None  # what the sensor's own tau_crit is taken against
     near_error_m: Fraction | None = None  # at the near end of the stage's distances, and
     near_rate_mps: Fraction | None = None  # what its tau_crit is taken against there
+    bends: tuple[Bend, ...] = ()  # where its noise by range bends in between
     reach_m: Interval = EVERYWHERE  # distances between which the sensor measures
     rate_hz: Fraction | None = None  # how often it measures; None: not told, or not asked
     sound_mps: Fraction | None = None  # of a sensor that waits for its echo
@@ -119,6 +142,7 @@ def sync_ratio(option: Option) -> float:
         ends = [(option.own_rate_mps, option.error())]
         if option.near_error_m is not None and option.near_rate_mps is not None:
             ends.append((option.near_rate_mps, option.near_error_m))
+        ends += [(one.rate_mps, one.error_m) for one in option.bends if one.rate_mps]
         ratios = [option.tau() * rate / error if error > 0 else None for rate, error in ends]
         return max(float("inf") if ratio is None else float(ratio) for ratio in ratios)
     return option.tau_s / option.tau_crit_s if option.tau_crit_s > 0.0 else float("inf")

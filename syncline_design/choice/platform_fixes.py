@@ -349,4 +349,5 @@ def _better_option(one: Option, other: Option) -> Option:
         own_rate_mps=None,
         near_error_m=None,
         near_rate_mps=None,
+        bends=(),
     )

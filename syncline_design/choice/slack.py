@@ -226,8 +226,11 @@ def _gone(problem: Problem) -> str:
 
 def hangs_on_motion(case: Case, problem: Problem) -> bool:
     """Whether something besides noise and timing changes with how a platform moves."""
-    return bool(case.effects) or any(
-        bool((table.pool().added != table.pool().error).any()) for table in problem.roles
+    tables = (one.entry.tables for s in case.stages for role in s.roles for one in role.sensors)
+    return (
+        bool(case.effects)
+        or any(tables)
+        or any(bool((table.pool().added != table.pool().error).any()) for table in problem.roles)
     )
 
 

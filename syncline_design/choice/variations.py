@@ -14,6 +14,7 @@ from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import IN_PLACE, Case, ends_of
 from syncline_design.spec.catalog import SensorEntry
 from syncline_design.spec.choices import MethodChoice
+from syncline_design.spec.noise_table import NoiseTable
 
 Build = Callable[[Case], Problem]
 PlatformFigure = Literal["v_max", "distance", "omega_max"]
@@ -119,6 +120,8 @@ def _figures(
 ) -> Iterator[SheetFigure]:
     for figure in SIGMA_DIMENSIONS:
         value = getattr(entry, figure)
+        if isinstance(value, NoiseTable):
+            continue  # not one figure
         if isinstance(value, Quantity):
             yield SheetFigure(name, figure, None, value, place)
         elif isinstance(value, tuple):

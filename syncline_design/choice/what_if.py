@@ -73,7 +73,7 @@ def with_sensor_error(
         near = None if option.near_error_m is None else option.near_error_m * ratio
         if near is not None and near_error_m is not None:
             near = near_error_m
-            crit = _crit(option, error_m, near)
+            crit = _crit(option, error_m, near, ratio)
         added = option.systematic() + option.noise_systematic_m * (ratio - 1)
         return replace(
             option,
@@ -81,6 +81,7 @@ def with_sensor_error(
             exact_error_m=error_m,
             tau_crit_s=crit,
             near_error_m=near,
+            bends=tuple(one.scaled(ratio) for one in option.bends),
             systematic_m=float(added),
             exact_systematic_m=added if added else None,
             noise_systematic_m=option.noise_systematic_m * ratio,
@@ -92,10 +93,12 @@ def with_sensor_error(
     return _with_pool(problem, r, pool.changed(rows, grown, **figures))
 
 
-def _crit(option: Option, error: Fraction, near: Fraction) -> float:
+def _crit(option: Option, error: Fraction, near: Fraction, ratio: Fraction) -> float:
     """A sensor's own tau_crit [s] with these errors at both ends of the distances."""
     ends = ((error, option.own_rate_mps), (near, option.near_rate_mps))
-    return min((float(one / rate) for one, rate in ends if rate), default=math.inf)
+    found = [float(one / rate) for one, rate in ends if rate]
+    found += [one.scaled(ratio).crit_s for one in option.bends]
+    return min(found, default=math.inf)
 
 
 def with_method_tau(problem: Problem, r: int, rows: Bools, tau_s: Fraction) -> Problem:

@@ -262,7 +262,10 @@ def _sensor_row(stage: Stage, sensor: Sensor, first: bool, tau: float) -> Sensor
     if _enters(stage, sensor):
         error = syncline.sensor_error_m(sensor.role, sensor.sigma, distance_m(stage))
         tau_crit, with_lever_arm = (
-            min(_own_tau_crit_s(sensor, speed, omega, distance_m(end)) for end in stage_ends(stage))
+            min(
+                _own_tau_crit_s(getattr(end, sensor.role), speed, omega, distance_m(end))
+                for end in stage_ends(stage)
+            )
             for speed in (v, moving)
         )
     return SensorRow(

@@ -10,18 +10,46 @@ import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
-from syncline_design.model.system import Stage, System
+from syncline_design.model.system import Shape, Stage, System
 
 
 def stage_ends(stage: Stage) -> tuple[Stage, ...]:
-    """The stage with its object at the far end of its distances, and at the near end, if any."""
+    """The stage with its object at the far end of its distances, at the near end, and where its
+    ranging noise bends in between, if any."""
     platform = stage.platform
     if stage.ranging is None or platform.nearest_m is None:
         return (stage,)
-    ends = dict.fromkeys((platform.distance_m, platform.nearest_m))
-    return tuple(
-        replace(stage, platform=replace(platform, distance_m=d, nearest_m=None)) for d in ends
-    )
+    near, far = platform.nearest_m, platform.distance_m
+    bends = (place for place, _ in stage.ranging.range_shape if near < place < far)
+    return tuple(at_distance(stage, d) for d in dict.fromkeys((far, near, *bends)))
+
+
+def at_distance(stage: Stage, distance_m: float) -> Stage:
+    """The stage with its object at one distance [m], and its noise as it is there."""
+    moved = replace(stage.platform, distance_m=distance_m, nearest_m=None)
+    ranging = stage.ranging
+    if ranging is None or not ranging.range_shape:
+        return replace(stage, platform=moved)
+    share = share_at(ranging.range_shape, distance_m)
+    first, second, third = ranging.sigma
+    shape = tuple((place, one / share) for place, one in ranging.range_shape)
+    there = replace(ranging, sigma=(first * share, second, third), range_shape=shape)
+    return replace(stage, platform=moved, ranging=there)
+
+
+def share_at(shape: Shape, place: float) -> float:
+    """The share of a shape at a place, a straight line between two; the outermost hold beyond."""
+    before = shape[0]
+    for here in shape:
+        if place <= here[0]:
+            width = here[0] - before[0]
+            return (
+                here[1]
+                if not width
+                else (before[1] + (here[1] - before[1]) * (place - before[0]) / width)
+            )
+        before = here
+    return before[1]
 
 
 def at_ends(system: System) -> Iterator[System]:

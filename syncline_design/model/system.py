@@ -13,6 +13,7 @@ from syncline_design.model.roles import RoleName
 from syncline_design.model.timing import NO_ERROR, TimingError
 
 UTC = "utc"
+Shape = tuple[tuple[float, float], ...]  # place and share, rising in place; straight between
 
 
 class SimulationError(ValueError):
@@ -49,6 +50,8 @@ class Sensor:
     type: the catalog's free type word (gnss, ins, lidar, usbl, mbes ...).
     rate_hz: how often it measures, told where samples are interpolated; sound_mps: speed of sound
     of one that waits for its echo; travels: whether nobody corrects for the way of the sound.
+    range_shape: of noise that hangs on the range, (range [m], share of sigma); range_by_beam,
+    bearing_by_beam: on the angle of sight from the down axis, (angle [rad], share of sigma).
     """
 
     id: str
@@ -61,6 +64,9 @@ class Sensor:
     rate_hz: float | None = None
     sound_mps: float | None = None
     travels: bool = False
+    range_shape: Shape = ()
+    range_by_beam: Shape = ()
+    bearing_by_beam: Shape = ()
 
 
 @dataclass(frozen=True, slots=True)

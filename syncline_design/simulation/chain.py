@@ -158,12 +158,12 @@ class SensorSigma:
     """One-sigma figures of a stage's sensors, zeros for one it does not have.
 
     position_m: north, east, down; attitude_rad: roll, pitch, yaw; ranging: range [m], azimuth
-    [rad], elevation [rad].
+    [rad], elevation [rad], or row by row (n, 1, 3).
     """
 
     position_m: Sigma = (0.0, 0.0, 0.0)
     attitude_rad: Sigma = (0.0, 0.0, 0.0)
-    ranging: Sigma = (0.0, 0.0, 0.0)
+    ranging: Sigma | Array = (0.0, 0.0, 0.0)
 
 
 def stage_error(

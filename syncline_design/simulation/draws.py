@@ -172,6 +172,8 @@ def stage_draw(
     if inside:
         speed, rate = speed * uniform[-2], rate * uniform[-1]
     antenna, ranging = lever_arms(stage, index == 0, found[-2])
+    noise = noise_draw(stage, source)
+    shaped(noise, stage.ranging, np.full(source.count, d), found[0][2])
     return Draw(
         cos_yaw=cos_yaw,
         sin_yaw=sin_yaw,
@@ -181,7 +183,7 @@ def stage_draw(
         bearing=found[0],
         antenna_m=antenna,
         ranging_m=ranging,
-        **noise_draw(stage, source),
+        **noise,
         **stage_shifts(system, index, shifts, source.count),
     )
 
@@ -194,6 +196,29 @@ def lever_arms(stage: Stage, first: bool, direction: Array) -> tuple[Array, Arra
         return antenna, antenna  # no object: the antenna itself is located
     arm = stage.ranging.lever_arm_m
     return antenna, _column((0.0, 0.0, 0.0) if arm is None else arm)
+
+
+def ranging_shares(sensor: Sensor, range_m: Array, beam_rad: Array) -> Array | None:
+    """Shares of sigma of range, azimuth and elevation (3, n) at ranges and at angles of sight from
+    the down axis (n,); None where the noise depends on neither."""
+    shapes = (sensor.range_shape, sensor.range_by_beam, sensor.bearing_by_beam)
+    if not any(shapes):
+        return None
+    by_range, of_range, of_bearing = (
+        np.interp(where, *np.array(shape).T) if shape else np.ones(range_m.shape)
+        for shape, where in zip(shapes, (range_m, beam_rad, beam_rad), strict=True)
+    )
+    return np.stack([by_range * of_range, of_bearing, of_bearing])
+
+
+def shaped(noise: dict[str, Array], sensor: Sensor | None, range_m: Array, down: Array) -> None:
+    """Noise as drawn, in place, as it is at a range and a line of sight of so much down (n,)."""
+    if sensor is None:
+        return
+    shares = ranging_shares(sensor, range_m, np.arccos(np.clip(down, -1.0, 1.0)))
+    if shares is not None:
+        noise["range_noise_m"] *= shares[0]
+        noise["angle_noise_rad"][3:] *= shares[1:]
 
 
 def _column(vector: tuple[float, float, float]) -> Array:

@@ -12,9 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from syncline_design.effects.acting import by_stage
-from syncline_design.effects.record import Array
+from syncline_design.effects.record import Array, StageRows
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.roles import ROLES
+from syncline_design.model.syncline import Sigma
 from syncline_design.model.system import Stage, System
 from syncline_design.model.underway import Cause, underway
 from syncline_design.simulation import kernel
@@ -35,7 +36,14 @@ from syncline_design.simulation.drawn_effects import (
     wanderers,
     wandering,
 )
-from syncline_design.simulation.draws import Shifts, generator, lever_arms, sight, stage_shifts
+from syncline_design.simulation.draws import (
+    Shifts,
+    generator,
+    lever_arms,
+    ranging_shares,
+    sight,
+    stage_shifts,
+)
 from syncline_design.simulation.known_effects import Carried, departed_error
 from syncline_design.simulation.lattice import lattice
 from syncline_design.simulation.surroundings import leaning, moment_at, placed_rows
@@ -143,7 +151,7 @@ class Situations:
             world = departed(self.acting, stage.name, state, shares)
             carried = departed_error(rows, world, carried)
             if slopes is not None:
-                slopes.append(noise_slopes(state, motion, noise, world, _sigma(stage)))
+                slopes.append(noise_slopes(state, motion, noise, world, _sigma(stage, state)))
                 slopes += wandering(self.acting, stage.name, state)
         assert carried is not None
         return carried.error_m.T.reshape(count, each, 3)
@@ -285,9 +293,13 @@ def ranges_m(stage: Stage, picked: dict[str, Array], count: int) -> Array:
     return between
 
 
-def _sigma(stage: Stage) -> SensorSigma:
+def _sigma(stage: Stage, rows: StageRows) -> SensorSigma:
     """The noise that enters a stage's estimate."""
     position = (0.0, 0.0, 0.0) if stage.position is None else stage.position.sigma
     if stage.ranging is None or stage.attitude is None:
         return SensorSigma(position)
-    return SensorSigma(position, stage.attitude.sigma, stage.ranging.sigma)
+    ranging: Sigma | Array = stage.ranging.sigma
+    shares = ranging_shares(stage.ranging, rows.range_m, rows.elevation_rad + 0.5 * np.pi)
+    if shares is not None:
+        ranging = (shares * np.asarray(ranging)[:, None]).T[:, None, :]
+    return SensorSigma(position, stage.attitude.sigma, ranging)

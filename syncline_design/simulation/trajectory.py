@@ -35,6 +35,7 @@ from syncline_design.simulation.draws import (
     directions,
     lever_arms,
     noise_draw,
+    shaped,
     sight,
     stage_shifts,
     time_margin_s,
@@ -90,7 +91,7 @@ def trajectory_errors(
         rows = _rows(stage, index == 0, track, time_s, source)
         if mission is not None and repeated:
             rows = _somewhere(rows, mission)
-        noise = _noise(system, index, shifts, source)
+        noise = _noise(system, index, shifts, source, rows)
         motion = Along(track, time_s)
         effects = acting.get(stage.name, ())
         state = (rows, motion, noise)
@@ -153,8 +154,12 @@ def _rows(
     )
 
 
-def _noise(system: System, index: int, shifts: Shifts, source: RandomSource) -> ChainNoise:
-    drawn = noise_draw(system.stages[index], source)
+def _noise(
+    system: System, index: int, shifts: Shifts, source: RandomSource, rows: StageRows
+) -> ChainNoise:
+    stage = system.stages[index]
+    drawn = noise_draw(stage, source)
+    shaped(drawn, stage.ranging, rows.range_m, -np.sin(rows.elevation_rad))
     angles = drawn["angle_noise_rad"]
     return ChainNoise(
         position_m=drawn["position_noise_m"].T,

@@ -28,7 +28,7 @@ from syncline_design.simulation.ascent import (
     stacked,
 )
 from syncline_design.simulation.bounds import references
-from syncline_design.simulation.draws import generator, lever_arms
+from syncline_design.simulation.draws import generator, lever_arms, shaped
 from syncline_design.simulation.results import WorstCase, worst_case
 from syncline_design.simulation.surroundings import leaning, moment_at
 
@@ -188,6 +188,10 @@ def _bounded_draw(
         np.multiply(chosen["attitude_noise"], math.hypot(*attitude.sigma), out=angles[:3])
         np.multiply(chosen["bearing_noise"], math.hypot(*ranging.sigma[1:]), out=angles[3:])
     antenna, ranging_arm = lever_arms(stage, first, chosen.get("lever_arm", zero3))
+    noise = {"range_noise_m": zero.copy(), "angle_noise_rad": angles}
+    if ranging is not None:
+        noise["range_noise_m"] = chosen["range_noise"][0] * ranging.sigma[0]
+        shaped(noise, ranging, np.full(n, distance), chosen["bearing"][2])
     return kernel.Draw(
         cos_yaw=np.ones(n) if yaw is None else yaw[0],
         sin_yaw=zero if yaw is None else yaw[1],
@@ -200,8 +204,8 @@ def _bounded_draw(
         position_noise_m=(
             zero3 if position is None else chosen["position_noise"] * math.hypot(*position.sigma)
         ),
-        angle_noise_rad=angles,
-        range_noise_m=zero if ranging is None else chosen["range_noise"][0] * ranging.sigma[0],
+        angle_noise_rad=noise["angle_noise_rad"],
+        range_noise_m=noise["range_noise_m"],
         mu_position_s=chosen["position_shift"][0] * tau_s,
         mu_attitude_s=zero if ranging is None else chosen["attitude_shift"][0] * tau_s,
         mu_ranging_s=zero,

@@ -38,6 +38,7 @@ from syncline_design.spec.choices import (
     RoleChoice,
     StageChoice,
 )
+from syncline_design.spec.exact import fraction_of
 from syncline_design.spec.requirement import DistanceLimit
 from syncline_design.spec.spec import Requirement, Spec
 from syncline_design.spec.yaml_text import KeyPath, TextPosition
@@ -203,13 +204,14 @@ def _named(candidates: tuple[Candidate[E], ...], identity: str | None) -> E | No
 
 def _stage(case: Case, index: int) -> StageCase:
     choice, catalog, origins = case.spec.stages[index], case.catalog, case.origins
+    platform = _platform(choice, catalog, origins)
     named = choice.clock.candidates if choice.clock is not None else ()
     return StageCase(
         index,
         choice,
-        _platform(choice, catalog, origins),
+        platform,
         tuple(
-            _role(case, choice, name, role)
+            _role(case, choice, name, role, platform.entry.distance)
             for name in ROLES
             if (role := choice.role(name)) is not None and not role.is_empty
         ),
@@ -236,7 +238,9 @@ def _platform(stage: StageChoice, catalog: Catalog, origins: Origins) -> Candida
     return Candidate(choice.use, entry, origins.get(("platforms", choice.use), ""))
 
 
-def _role(case: Case, stage: StageChoice, name: RoleName, choice: RoleChoice) -> RoleCase:
+def _role(
+    case: Case, stage: StageChoice, name: RoleName, choice: RoleChoice, distance_m: float
+) -> RoleCase:
     """Candidates of a role; timestamping is its own, else the stage's, else the spec's."""
     stamping = choice.timestamping or stage.timestamping or case.spec.timestamping
     inline = stamping if isinstance(stamping, InlineTimestamping) else None
@@ -246,7 +250,10 @@ def _role(case: Case, stage: StageChoice, name: RoleName, choice: RoleChoice) ->
     elif stamping is not None and not isinstance(stamping, InlineTimestamping):
         methods = stamping.candidates
     listed = case.catalog.timestamping
-    sensors = _sensors(case, stage, name, choice)
+    sensors = tuple(
+        replace(one, entry=one.entry.where(fraction_of(distance_m), stage.look))
+        for one in _sensors(case, stage, name, choice)
+    )
     incomplete = _incomplete(case, choice, sensors)
     without = {identity for identity, _ in incomplete}
     return RoleCase(

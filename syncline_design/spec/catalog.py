@@ -39,7 +39,6 @@ from syncline_design.spec.fields import (
     Power,
     Ratio,
     Reader,
-    SigmaLength,
     Speed,
     Text,
     Time,
@@ -53,6 +52,7 @@ from syncline_design.spec.fields import (
     refusals,
 )
 from syncline_design.spec.measured import MeasuredKeys
+from syncline_design.spec.noise_table import NoiseTable, read_table, table_schema, table_where
 from syncline_design.spec.yaml_text import KeyPath
 
 Primitive = Literal["pps", "network", "tov", "trigger", "arrival"]
@@ -194,6 +194,37 @@ class PlatformEntry(Entry):
     height: NonNegativeLength | None = None
 
 
+_RANGE_SCHEMA = quantity_schema(Dimension.LENGTH, tolerance=True)
+
+
+def _read_range_sigma(value: Any) -> Quantity:
+    if isinstance(value, dict):
+        return read_table(value, Dimension.LENGTH, ("range", "angle"))
+    return read_quantity(value, Dimension.LENGTH, 0.0, above=True, tolerance=True)
+
+
+RangeSigma = Annotated[
+    float,
+    Reader(_read_range_sigma, {"anyOf": [_RANGE_SCHEMA, table_schema(Dimension.LENGTH)]}),
+]
+_BEARING = axes(Dimension.ANGLE, ("azimuth", "elevation"))
+
+
+def _read_bearing_sigma(value: Any) -> Any:
+    if isinstance(value, dict):
+        return read_table(value, Dimension.ANGLE, ("angle",))
+    return _BEARING.read(value)
+
+
+BearingSigma = Annotated[
+    Sigma,
+    Reader(
+        _read_bearing_sigma,
+        {"anyOf": [*_BEARING.schema["anyOf"], table_schema(Dimension.ANGLE)]},
+    ),
+]
+
+
 class SensorEntry(Product):
     """A sensor; the sigmas of its modality are due, those of others refused.
 
@@ -206,8 +237,8 @@ class SensorEntry(Product):
         None
     )
     sigma_attitude: Annotated[Sigma, axes(Dimension.ANGLE, ("roll", "pitch", "yaw"))] | None = None
-    sigma_range: SigmaLength | None = None
-    sigma_bearing: Annotated[Sigma, axes(Dimension.ANGLE, ("azimuth", "elevation"))] | None = None
+    sigma_range: RangeSigma | None = None
+    sigma_bearing: BearingSigma | None = None
     primitives: tuple[Primitive, ...]
     reach: Reach | None = None
     medium: Medium | None = None
@@ -232,6 +263,20 @@ class SensorEntry(Product):
         if errors:
             raise refusals(errors)
         return self
+
+    @property
+    def tables(self) -> dict[str, NoiseTable]:
+        """Its deviations that depend on range or angle, by figure."""
+        found = {"sigma_range": self.sigma_range, "sigma_bearing": self.sigma_bearing}
+        return {name: one for name, one in found.items() if isinstance(one, NoiseTable)}
+
+    def where(self, distance: Fraction, look: FieldOfView | None) -> SensorEntry:
+        """The sensor with its deviations where a stage uses it, `distance` [m] away at most."""
+        tables = self.tables
+        if not tables:
+            return self
+        placed = {name: table_where(one, distance, look) for name, one in tables.items()}
+        return self.model_copy(update=placed)
 
     @property
     def serves(self) -> tuple[Primitive, ...]:

@@ -195,6 +195,16 @@ class _SpecJudge:
         kinds = [registry()[one.effect].kind for one in self.case.effects]
         return "stochastic" in kinds
 
+    def _noise_depends(self) -> bool:
+        """Whether some sensor's noise is another in another situation: by range, or by angle."""
+        return any(
+            table.of == "angle" or stage.choice.distance is not None
+            for stage in self.case.stages
+            for role in stage.roles
+            for one in role.sensors
+            for table in one.entry.tables.values()
+        )
+
     def cuts(self, problem: Problem, known: int = 0) -> Sequence[Cut]:
         """Sums of noise that rule designs out, from those that have failed."""
         limits = dict(self.limits)
@@ -260,7 +270,7 @@ class _SpecJudge:
         that change the noise, or turn some designs only, leave the sums of noise without a say.
         """
         known, requirement = self.simulations.learned, self._requirement(name)
-        if requirement.kind not in STATED_KINDS:
+        if requirement.kind not in STATED_KINDS or self._noise_depends():
             return
         wanted, bare, seed = wanted_of(requirement), _nameless(system), self.simulations.seed
         alike = (one for one in known if one.case is self.case and one.requirement == name)

@@ -11,13 +11,17 @@ from syncline_design.spec.barred import path_medium, surroundings
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.catalog import Product, SensorEntry
 from syncline_design.spec.existence import is_acoustic, not_told
+from syncline_design.spec.noise_table import angles_of
 from syncline_design.spec.plausibility import implausible
 from syncline_design.verdict.design_data import UsedEntry
 from syncline_design.verdict.tree import Caution
 from syncline_design.verdict.verified import Verified
 
 # The order in which a wrong guess costs: first what nothing works without.
-FIRST = ("reach", "medium", "field_of_view", "rate", "depth_rating", "temperature")
+FIRST = (
+    "reach", "medium", "field_of_view", "rate", "sigma_range", "sigma_bearing", "depth_rating",
+    "temperature",
+)  # fmt: skip
 Chosen = tuple[StageCase, str, SensorEntry]
 MOST_LOOKED_AT = 100  # candidates of a spec without a design
 
@@ -28,6 +32,7 @@ def fact_cautions(case: Case, verified: Verified) -> tuple[Caution, ...]:
     chosen = list(_chosen(case, verified.system))
     silent = [caution for one in chosen for caution in _silent(case, one)]
     silent += [caution for one in chosen for caution in _pathless(one)]
+    silent += [caution for one in chosen for caution in _untold_noise(one)]
     silent.sort(key=lambda one: FIRST.index((one.key or "").partition(".")[0]))
     names = {name for _, name, _ in chosen}
     doubtful = implausible_cautions(case, names)
@@ -57,6 +62,25 @@ def _silent(case: Case, one: Chosen) -> Iterator[Caution]:
     stage, name, entry = one
     for fact in not_told(name, entry, surroundings(case, stage)):
         yield Caution("unknown-fact", fact.reason, entry=fact.entry, key=fact.key)
+
+
+def _untold_noise(one: Chosen) -> Iterator[Caution]:
+    """Noise that is told by range or angle, and used beyond its rows."""
+    stage, name, entry = one
+    for figure, table in entry.tables.items():
+        told = float(table.is_told_to)
+        if table.of == "range":
+            asked, size = stage.platform.entry.distance, Dimension.LENGTH
+            beyond = "its last line goes on"
+        elif stage.choice.look is None or stage.choice.look.elevation is None:
+            continue
+        else:
+            asked, size = float(angles_of(stage.choice.look)[1]), Dimension.ANGLE
+            beyond = "its last row holds"
+        if asked > told * (1.0 + 1e-12):
+            ends = [format_quantity(value, size) for value in (told, asked)]
+            message = f"{name} tells {figure} up to {ends[0]}, asked are {ends[1]}: {beyond}"
+            yield Caution("unknown-fact", message, entry=name, key=figure)
 
 
 def _pathless(one: Chosen) -> Iterator[Caution]:

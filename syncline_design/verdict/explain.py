@@ -109,7 +109,12 @@ def _sensor_steps(worked: Worked, stage: Stage, first: bool) -> list[ExplainedSt
     if ranging is not None and attitude is not None:
         r, *angles = ranging.sigma
         source = worked.source(ranging.id)
-        found.append(ExplainedStep(_name("sigma_r", stage), "s_range", _n(r), r, "m", source))
+        about = "s_range"
+        if ranging.range_shape:
+            about += f", by range, at {_n(d)} m"
+        elif ranging.range_by_beam:
+            about += ", by beam angle, at the worst that is looked at"
+        found.append(ExplainedStep(_name("sigma_r", stage), about, _n(r), r, "m", source))
         found.append(
             ExplainedStep(
                 _name("sigma_u_d", stage), "|(s_azimuth, s_elevation)| d",

@@ -26,6 +26,7 @@ from syncline_design.spec.case import NOTHING_KNOWN, Case, Known, RoleCase, Stag
 from syncline_design.spec.catalog import SensorEntry
 from syncline_design.spec.selection import RoleSelection, Selection
 from syncline_design.verdict.recheck_facts import impossible, sample_spacing, underway
+from syncline_design.verdict.recheck_noise import bends, sigma_at
 from syncline_design.verdict.recheck_sums import BUDGETS, Bought, money, owned_pieces, sum_of
 
 DIGITS = 60
@@ -94,6 +95,7 @@ class _Chosen:
     method: Any  # None for an error given in place
     timeline: str  # "utc" or the vehicle whose host clock it is
     tau: Decimal = field(default=Decimal(0))
+    look: Any = None  # of its stage
 
 
 def recheck(
@@ -233,8 +235,9 @@ def _chosen(
     listed = given if isinstance(given, SensorEntry) else case.catalog.sensors[picked.sensor]
     bought = Bought(picked.sensor, listed)
     return _Chosen(
-        sensor, bought, error, method, "utc" if timeline == "utc" else f"host {host}", tau
-    )
+        sensor, bought, error, method, "utc" if timeline == "utc" else f"host {host}", tau,
+        stage.choice.look,
+    )  # fmt: skip
 
 
 def _serves(by_method: Sequence[str], by_sensor: Sequence[str], primitive: str) -> bool:
@@ -279,6 +282,8 @@ def _ends(stage: StageCase, chosen: Mapping[tuple[str, RoleName], _Chosen]) -> t
     ends = [_decimal(platform.distance)]
     if stage.choice.distance is not None:
         ends = [_decimal(end) for end in stage.distances]
+        sigma = chosen[stage.choice.name, "ranging"].sensor.sigma_range
+        ends += [one for one in bends(sigma) if min(ends) < one < max(ends)]
     speed, turn = _decimal(platform.v_max), _decimal(platform.omega_max)
     return tuple((speed, end * turn, end) for end in ends)
 
@@ -289,7 +294,12 @@ def _sensor_error(role: RoleName, one: _Chosen, moves: Moves) -> Decimal:
         return _length(sensor.sigma_position, 3)
     if role == "attitude":
         return _length(sensor.sigma_attitude, 3) * distance
-    return _decimal(sensor.sigma_range) + _length(sensor.sigma_bearing, 2) * distance
+    along = sigma_at(sensor.sigma_range, distance, one.look)
+    across = sigma_at(sensor.sigma_bearing, distance, one.look)
+    along = _decimal(sensor.sigma_range) if along is None else along
+    if across is not None:
+        return along + across * Decimal(2).sqrt() * distance
+    return along + _length(sensor.sigma_bearing, 2) * distance
 
 
 def _own_rate(role: RoleName, moves: Moves) -> Decimal:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 from syncline_design.effects.acting import acts
+from syncline_design.model.ends import at_distance
 from syncline_design.model.system import UTC, Sensor, System
 from syncline_design.model.timing import NO_ERROR
 from syncline_design.simulation.figures import worst_case_m
@@ -104,8 +105,7 @@ def _certified(system: System, wanted: Certified) -> Stated:
 def _moved(system: System, distance_m: float) -> System:
     """The system with the last stage's object at a distance."""
     last = system.stages[-1]
-    platform = replace(last.platform, distance_m=distance_m, nearest_m=None)
-    return replace(system, stages=(*system.stages[:-1], replace(last, platform=platform)))
+    return replace(system, stages=(*system.stages[:-1], at_distance(last, distance_m)))
 
 
 def reached_m(system: System, wanted: Wanted | Certified, limit_m: float, seed: int) -> float:

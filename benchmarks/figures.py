@@ -1,0 +1,150 @@
+"""The statistical figures against long Monte Carlo, and how often its intervals hold.
+
+`propagation`: random chains of two stages (tests/test_statistical_figures.py), every second with
+arms of tens of metres and tilts of up to 60 deg, at a random situation each: six figures of the
+budget against as many draws as are asked for of an own chain (SciPy's rotations).  Sampling alone
+scatters a root mean square by 0.5 / sqrt(n) and more and a 95 % quantile by about 1 / sqrt(n), so
+that deviations are shown in standard errors of the sample too.
+
+`coverage`: repetitions of a Monte Carlo with a seed each; the share of 95 % intervals that hold the
+true quantile and the true share within a limit, of a closed form (chi) and of a lidar whose truth
+comes from many more samples.
+
+    python benchmarks/figures.py propagation [SYSTEMS] [DRAWS] [SEED]
+    python benchmarks/figures.py coverage [REPETITIONS] [SAMPLES] [SEED]
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import chi2
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from syncline_design.model.horizon import Horizon
+from syncline_design.model.system import Sensor, System
+from syncline_design.model.timing import TimingError, Uniform
+from syncline_design.simulation.distribution import Values
+from syncline_design.simulation.intervals import proportion_interval
+from syncline_design.simulation.run import quantile_estimates
+from syncline_design.simulation.sampling import error_distribution, sample_errors
+from syncline_design.simulation.settings import SimulationSettings
+from syncline_design.simulation.situations import Situations
+from syncline_design.simulation.statistical import exact
+from test_statistical_figures import ALL, boat, chain, lidar, plain_errors
+
+QUANTILES = (0.5, 0.95, 0.997)
+
+
+def long_armed(seed: int) -> System:
+    """The chain of a seed with arms of tens of metres, on vehicles that lean by up to 60 deg."""
+    rng, system = np.random.default_rng([seed, 7]), chain(seed)
+
+    def arm() -> tuple[float, float, float]:
+        x, y, z = rng.normal(0.0, 25.0, 3).tolist()
+        return x, y, z
+
+    def armed(sensor: Sensor | None) -> Sensor | None:
+        return None if sensor is None else replace(sensor, lever_arm_m=arm())
+
+    stages = tuple(
+        replace(
+            stage,
+            position=armed(stage.position),
+            ranging=armed(stage.ranging),
+            transponder_lever_arm_m=arm() if stage.transponder_lever_arm_m else None,
+        )
+        for stage in system.stages
+    )
+    return replace(system, stages=stages, horizon=Horizon(tilt_rad=math.radians(60.0)))
+
+
+def sampled(length: np.ndarray, p: float | None) -> tuple[float, float]:
+    """(figure of a sample, its standard error)."""
+    n = len(length)
+    if p is None:
+        square = length**2
+        mean = float(np.mean(square))
+        return math.sqrt(mean), float(np.std(square)) / math.sqrt(n) / (2.0 * math.sqrt(mean))
+    spread = math.sqrt(p * (1.0 - p) / n)
+    low, middle, high = np.quantile(length, [p - spread, p, p + spread])
+    return float(middle), 0.5 * float(high - low)
+
+
+def propagation(count: int, draws: int, seed: int) -> None:
+    """Six figures of `count` systems."""
+    found: dict[bool, list[tuple[float, float]]] = {False: [], True: []}
+    for number in range(seed, seed + count):
+        long = number % 2 == 1
+        system = long_armed(number) if long else chain(number)
+        situations = Situations(system)
+        point = situations.starting_points(number, 1)
+        moments = situations.moments(point, situations.nodes(16381))
+        error = plain_errors(system, point[:, 0], draws, number)
+        for wanted in ALL:
+            rows = {"horizontal": error[:2], "vertical": error[2:], "3d": error}[wanted.axis]
+            value, scatter = sampled(np.linalg.norm(rows, axis=0), wanted.p)
+            budget = exact(moments, wanted, situations.dimensions)
+            found[long].append((budget / value - 1.0, scatter / value))
+    for long, pairs in found.items():
+        if not pairs:
+            continue
+        off, scatter = np.array(pairs).T
+        bound = 0.01 if long else 0.005
+        print(
+            f"{'arms of tens of metres, 60 deg' if long else 'arms of metres, 17 deg'}: "
+            f"{len(pairs) // len(ALL)} systems, {len(pairs)} figures, {draws} draws each from seed "
+            f"{seed}: |deviation| median {100 * np.median(np.abs(off)):.3f} %, 95 % "
+            f"{100 * np.quantile(np.abs(off), 0.95):.3f} %, largest {100 * np.max(np.abs(off)):.3f}"
+            f" %; within {100 * bound:g} %: {100 * np.mean(np.abs(off) <= bound):.2f} %; in "
+            f"standard errors of the sample: mean {np.mean(off / scatter):+.2f}, "
+            f"std {np.std(off / scatter):.2f}, largest {np.max(np.abs(off / scatter)):.1f}; "
+            f"beyond {100 * bound:g} % and 4 of them: "
+            f"{int(np.sum((np.abs(off) > bound) & (np.abs(off) > 4 * scatter)))}"
+        )
+
+
+def covered(system: System, truth: dict[float, float], count: int, samples: int, seed: int) -> str:
+    """How often intervals of a system's quantiles and of its share within a limit hold."""
+    held = dict.fromkeys(QUANTILES, 0)
+    within, limit = 0, truth[0.95]
+    for number in range(seed, seed + count):
+        found = error_distribution(system, SimulationSettings(samples=samples, seed=number))
+        for p, one in zip(QUANTILES, quantile_estimates(found, QUANTILES, 0.95), strict=True):
+            high = math.inf if one.high_m is None else one.high_m
+            held[p] += (one.low_m or 0.0) <= truth[p] <= high
+        low, high = proportion_interval(found.within(limit), found.count, 0.95)
+        within += low <= 0.95 <= high
+    shares = ", ".join(f"{p:g}: {100 * held[p] / count:.1f} %" for p in QUANTILES)
+    return f"quantiles {shares}; share within a limit {100 * within / count:.1f} %"
+
+
+def coverage(count: int, samples: int, seed: int) -> None:
+    """A closed form, and a lidar with stamps that matter."""
+    sigma = 0.02
+    truth = {p: sigma * math.sqrt(chi2.ppf(p, 3)) for p in QUANTILES}
+    told = f"{count} repetitions of {samples} samples from seed {seed}"
+    found = covered(boat((sigma,) * 3), truth, count, samples, seed)
+    print(f"three normal axes, {told}: {found}", flush=True)
+    stamp = TimingError(Uniform(-0.01, 0.0))
+    system = lidar(position=(0.02, 0.02, 0.04), attitude=(0.001, 0.001, 0.003),
+                   ranging=(0.03, 0.001, 0.001), t_position=stamp, t_attitude=stamp)  # fmt: skip
+    many = sample_errors(system, SimulationSettings(samples=4_000_000, seed=10**6))
+    whole = Values(np.linalg.norm(many, axis=1))
+    ranks = [math.ceil(p * whole.count) for p in QUANTILES]
+    truth = dict(zip(QUANTILES, whole.order_statistics(ranks), strict=True))
+    found = covered(system, truth, count, samples, seed)
+    print(f"lidar with stamps up to 10 ms late, {told}, truth of 4 000 000: {found}", flush=True)
+
+
+if __name__ == "__main__":
+    numbers = [int(one) for one in sys.argv[2:]]
+    if sys.argv[1:2] == ["coverage"]:
+        coverage(*(*numbers, *(500, 20000, 0)[len(numbers) :]))
+    else:
+        propagation(*(*numbers, *(1000, 200000, 0)[len(numbers) :]))
