@@ -69,7 +69,7 @@ def space_quantile(ratio: float) -> float:
 
         return math.sqrt(2.0 / math.pi) * float(quad(disc, 0.0, min(r / math.sqrt(ratio), 9.0))[0])
 
-    return float(brentq(lambda r: inside(r) - 0.95, 1.9, 30.0))
+    return float(brentq(lambda r: inside(r) - 0.95, 1.9, 3.0 * max(1.0, math.sqrt(ratio))))
 
 
 def variances(raw: Raw, names: Names, elevation: float) -> tuple[float, float, float]:

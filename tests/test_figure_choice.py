@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from figure_problems import Raw, drawn, rmse_3d_m, written
 from syncline_design import api
@@ -18,6 +20,7 @@ from syncline_design.choice.decide import choose
 from syncline_design.choice.enumerate import all_designs
 from syncline_design.choice.outcome import Choice
 from syncline_design.choice.table import Problem
+from syncline_design.cli.app import app
 from syncline_design.model.system import System
 from syncline_design.model.timing import TimingError, Uniform
 from syncline_design.simulation.noise_shares import (
@@ -274,3 +277,18 @@ def test_choices_that_learn_agree_with_judging_all(
                 best = float(sums.cost or 0)
                 break
         assert cost_of(problem, choose(problem)) == best, seed
+
+
+def test_a_front_over_a_figure_is_drawn(tmp_path: Path) -> None:
+    """The page has it as a staircase of its own beside that of the Syncline error."""
+    raw = few(3, "rmse", (2, 2, 1))
+    (tmp_path / "spec.yaml").write_text(written(raw, tmp_path))
+    page = tmp_path / "page.html"
+    command = ["optimize", str(tmp_path / "spec.yaml"), "--pareto", "--against", "rmse",
+               "-o", f"html:{page}"]  # fmt: skip
+    done = CliRunner().invoke(app, command)
+    assert done.exit_code == 0, done.output
+    drawn = page.read_text().split('aria-labelledby="fig-front-figure-title')[1]
+    title = re.search(r"<title[^>]*>([^<]*)<", drawn)
+    assert title is not None
+    assert title[1] == "Pareto front of cost against RMS of 3D errors"

@@ -27,3 +27,12 @@ def arm_lengths(stage: Stage, first: bool) -> tuple[float, float]:
     if given is None:
         return length, length + math.hypot(*ranging)
     return length, math.dist(given, ranging)
+
+
+def arm_difference(stage: Stage, first: bool) -> tuple[float, float, float] | None:
+    """l_L - l_G [m], body; None where l_G is free or nothing ranges."""
+    given = position_lever_arm(stage, first)
+    if given is None or stage.ranging is None:
+        return None
+    x, y, z = stage.ranging.lever_arm_m or (0.0, 0.0, 0.0)
+    return x - given[0], y - given[1], z - given[2]

@@ -197,10 +197,12 @@ def pareto_front(
     name: str = "fig-front",
     beside: tuple[float, float] | None = None,
     cloud: Sequence[FrontMark] = (),
+    over: str = "error",
 ) -> InlineFigure:
     """The exact front of cost against error as a staircase, the chosen design on it.
 
-    beside: cost and error of the design that is nearest to what is asked; cloud: other designs.
+    beside: cost and error of the design that is nearest to what is asked; cloud: other designs;
+    over: which figure of the error it is drawn over, where that is not the Syncline's.
     """
 
     def build(figure: Figure) -> None:
@@ -221,12 +223,12 @@ def pareto_front(
         scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
         _money_ticks(axes)
         axes.set_xlabel(f"cost [{currency}]")
-        axes.set_ylabel("Syncline error")
+        axes.set_ylabel("Syncline error" if over == "error" else over)
         scales.grid(axes)
         if axes.get_legend_handles_labels()[1]:
             figure.legend(loc="outside upper left", ncols=2, handlelength=1.6)
 
-    title = "Pareto front of cost against error"
+    title = f"Pareto front of cost against {over}"
     return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
 
 

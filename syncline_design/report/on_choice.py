@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
+from typing import TYPE_CHECKING
 
 from syncline_design.choice.evaluate import chosen_options, evaluate
 from syncline_design.choice.judged import judgement
@@ -14,6 +15,7 @@ from syncline_design.choice.slack import Slack
 from syncline_design.choice.table import Design, Problem
 from syncline_design.report import numbers
 from syncline_design.report.document import (
+    Chart,
     Document,
     Items,
     Node,
@@ -37,6 +39,9 @@ from syncline_design.verdict.acceptance import MOST_SIMULATED
 from syncline_design.verdict.choice_data import left_out_text
 from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
 from syncline_design.verdict.optimisation import Optimisation, Optimised
+
+if TYPE_CHECKING:
+    from syncline_design.report.svg import InlineFigure
 
 
 def on_choice(found: Optimised) -> Document:
@@ -250,7 +255,8 @@ def _front(found: Optimised) -> list[Section]:
         nodes += show(drawn, silent=True)
         steps = found.result.staircase or ()
         nodes += show(staircase_table(steps, currency, resource, words))
-        nodes += [Text(OVER_FIGURE)] if words is not None else []
+        if words is not None:
+            nodes += [Text(OVER_FIGURE), *_figure_chart(found, words)]
     if found.result.front_left_out:
         nodes.append(Text(left_out_text(found.result.front_left_out, resource)))
     return section(
@@ -264,6 +270,36 @@ OVER_FIGURE = (
     "Every point keeps all requirements but accuracy and those on this figure; each figure is the "
     "largest that a search over the situations found, and gains below 0.1 % are no points."
 )
+
+
+def figure_front(found: Optimised) -> list[Section]:
+    """The front over a figure of the error, for a page that has the Syncline's beside it."""
+    return _front(found) if found.result.front_figure is not None else []
+
+
+def _figure_chart(found: Optimised, words: str) -> list[Node]:
+    """The front over a figure of the error as a staircase, the best design where it is on it."""
+    best = found.designs[0] if found.designs else None
+    points = [
+        (float(point.amount), point.drawn_m, point.design == best)
+        for point in found.points
+        if point.drawn_m
+    ]
+
+    def draw() -> InlineFigure:
+        from syncline_design.report.figures_results import FrontMark, pareto_front
+
+        drawn = [FrontMark(*point) for point in sorted(points)]
+        return pareto_front(
+            drawn, found.case.spec.currency, None, None, "fig-front-figure", over=words
+        )
+
+    caption = (
+        f"Every design on the line is the cheapest with that {words}; nothing that keeps the other "
+        "requirements exists below and left of it."
+    )
+    drawable = found.settings.resource == "cost" and len(points) > 1
+    return [Chart("front-figure", draw, caption)] if drawable else []
 
 
 def front_table(

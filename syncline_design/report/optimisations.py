@@ -6,7 +6,7 @@ from syncline_design.report.choice_csv import optimisation_csv
 from syncline_design.report.document import Document, Heading, Node, Text, strong
 from syncline_design.report.formats import OPTIMIZE_FORMATS as OPTIMIZE_FORMATS
 from syncline_design.report.json_out import json_text
-from syncline_design.report.on_choice import hinges_nodes, incomplete_lines
+from syncline_design.report.on_choice import figure_front, hinges_nodes, incomplete_lines
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.render_html import html
@@ -29,4 +29,6 @@ def on_optimised(found: Optimised) -> Document:
     asked = why_not_nodes(found.result.why_not, found.case.spec.currency)
     if asked:
         more += [Heading("Why not"), *asked]
+    for section in figure_front(found):
+        more += [Heading(section.title), *section.nodes]
     return on_verdict(found.verdict, [*more, *hinges_nodes(found.result)])

@@ -157,7 +157,7 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
 
     caption = (
         "Terms add up to the total. Plain: sensor noise. Hatched: synchronisation. Crossed: known "
-        "effects."
+        "effects. Dotted: between samples."
     )
     return [Chart("ledger", draw, caption)] if entries else []
 

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from syncline_design.effects import acting as acting_effects
 from syncline_design.model.budget import budget
 from syncline_design.model.known import Known
-from syncline_design.model.lever_arms import arm_lengths
+from syncline_design.model.lever_arms import arm_difference, arm_lengths
 from syncline_design.model.pairing import distance_m
 from syncline_design.model.roles import RoleName
-from syncline_design.model.system import Stage, System
+from syncline_design.model.system import Look, Stage, System
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +73,9 @@ def stage_bound(
     a = w tau_a + turn + sigma_Theta sqrt(1 + |sin pitch|) (a path of length s in Euler angles turns
     by at most s sqrt(1 + |sin pitch|)), |pitch| at most tilt + w tau_a + turn + sigma_Theta; the
     measured vector and the true one enclose at most a + sigma_u, and their lengths differ by at
-    most sigma_r, which bounds their distance by the law of cosines.
+    most sigma_r, which bounds their distance by the law of cosines.  Under a bounded `look` a sight
+    near the vertical swings by less, and what is turned as a whole, l_L - l_G + d n, may be shorter
+    than the sum of both; the smaller of the two bounds holds.
     """
     v, omega = float(stage.platform.v_max_mps), float(stage.platform.omega_max_radps)
     sigma_p = 0.0 if stage.position is None else math.hypot(*stage.position.sigma)
@@ -92,14 +94,17 @@ def stage_bound(
     turn_a = omega * (attitude_s + added.attitude_s) + added.turn_rad
     pitch = min(tilt_rad + turn_a + sigma_a, 0.5 * math.pi)
     off = turn_a + sigma_a * math.sqrt(1.0 + math.sin(pitch))
+    swung = turn_a + sigma_a * _euler_growth(stage.look, pitch, tilt_rad + turn_a + sigma_a)
     lever = turn_p * antenna + (turn_a + sigma_a) * difference
     across = d * (turn_a + sigma_a + sigma_u)
     swing = omega * (attitude_s + added.attitude_s)
     return StageBound(
         bound_m=position
         + arms
-        + chord(off) * difference
-        + _vector_distance(d, sigma_r, off + sigma_u),
+        + min(
+            chord(off) * difference + _vector_distance(d, sigma_r, swung + sigma_u),
+            chord(off) * longest_lever_m(stage, first, d) + _vector_distance(d, sigma_r, sigma_u),
+        ),
         triangle_m=position + lever + across + sigma_r,
         lever_arm_m=lever,
         arc_m=d * swing,
@@ -108,6 +113,52 @@ def stage_bound(
         range_m=sigma_r,
         tilt_m=d * sigma_a * (math.sqrt(1.0 + math.sin(min(tilt_rad, 0.5 * math.pi))) - 1.0),
     )
+
+
+def _euler_growth(look: Look | None, pitch_rad: float, leans_rad: float) -> float:
+    """How much farther than its length a path in Euler angles swings a line of sight at most.
+
+    The turn itself grows by sqrt(1 + |sin pitch|).  A yaw angle turns about the vertical and swings
+    a sight at an angle g from it by sin g only, roll and pitch by their own length: together by
+    |(a, b)| + |c| sin g <= sqrt(1 + sin(g)^2) for a unit vector (a, b, c).  leans_rad: how far the
+    body's down axis is from the vertical at most, all along the path but for its own length again.
+    """
+    turned = math.sqrt(1.0 + math.sin(pitch_rad))
+    if look is None or look.elevation is None:
+        return turned
+    low, high = look.elevation
+    steepness = 0.0 if low <= 0.0 <= high else min(abs(low), abs(high))
+    off = 0.5 * math.pi - steepness + math.sqrt(2.0) * leans_rad
+    return min(turned, math.sqrt(1.0 + math.sin(min(off, 0.5 * math.pi)) ** 2))
+
+
+def longest_lever_m(stage: Stage, first: bool, distance_m: float) -> float:
+    """Largest |l_L - l_G + d n| [m] over the lines of sight n: what an attitude error turns.
+
+    At a given elevation the azimuth nearest to that of l_L - l_G is the worst, whatever the
+    elevation; then h cos(el) - z sin(el) is largest at atan2(-z, h) or at an end.
+    """
+    _, length = arm_lengths(stage, first)
+    vectors = arm_difference(stage, first)
+    if stage.look is None or vectors is None:
+        return distance_m + length
+    x, y, z = vectors
+    level = math.hypot(x, y) * math.cos(_azimuth_apart(stage.look, math.atan2(y, x)))
+    low, high = stage.look.elevation or (-0.5 * math.pi, 0.5 * math.pi)
+    best = min(max(math.atan2(-z, level), low), high)
+    along = max(level * math.cos(e) - z * math.sin(e) for e in (low, high, best))
+    return math.sqrt(max(length**2 + distance_m**2 + 2.0 * distance_m * along, 0.0))
+
+
+def _azimuth_apart(look: Look, azimuth_rad: float) -> float:
+    """The least angle [rad] between an azimuth and those that are looked at."""
+    if look.azimuth is None:
+        return 0.0
+    low, high = look.azimuth
+    ahead = (azimuth_rad - low) % (2.0 * math.pi)
+    if ahead <= high - low:
+        return 0.0
+    return min(ahead - (high - low), 2.0 * math.pi - ahead)
 
 
 def _vector_distance(length: float, longer_by: float, angle_rad: float) -> float:

@@ -222,7 +222,7 @@ def _blocks(system: System, held: Sequence[bool]) -> tuple[FreeVector, ...]:
         if position_lever_arm(stage, index == 0) is None:
             kinds.append((index, "lever_arm", "sphere", 3))
         if stage.ranging is not None:
-            kinds += _sights(index, stage)
+            kinds += sights(index, stage)
             if stage.platform.nearest_m is not None:
                 kinds.append((index, "distance", "ball", 1))
     bends: dict[Cause, str] = {"path": "pull", "turn": "twist"}
@@ -261,7 +261,7 @@ def _bending(picked: dict[str, Array], name: str) -> Array | None:
     return picked[name].T if name in picked else None
 
 
-def _sights(index: int, stage: Stage) -> list[tuple[int, str, Kind, int]]:
+def sights(index: int, stage: Stage) -> list[tuple[int, str, Kind, int]]:
     """Blocks of a line of sight: any direction, or the height and azimuth of a `look`."""
     if stage.look is None:
         return [(index, "bearing", "sphere", 3)]

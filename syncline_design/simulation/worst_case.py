@@ -8,7 +8,6 @@ certificate of how much a better direction could still add.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 import numpy as np
 
@@ -30,6 +29,7 @@ from syncline_design.simulation.ascent import (
 from syncline_design.simulation.bounds import references
 from syncline_design.simulation.draws import generator, lever_arms, shaped
 from syncline_design.simulation.results import WorstCase, worst_case
+from syncline_design.simulation.situations import bearings, sights
 from syncline_design.simulation.surroundings import leaning, moment_at
 
 WORST_CASE_STREAM = 2  # first word of the stream key, see draws.generator
@@ -68,7 +68,7 @@ def _stage_blocks(stage: Stage, index: int, placed: bool) -> list[tuple[str, Kin
         found.append(("lever_arm", "sphere", 3))
     if stage.ranging is not None:
         found += [
-            ("bearing", "sphere", 3),
+            *(one[1:] for one in sights(index, stage)),
             ("attitude_noise", "ball", 3),
             ("bearing_noise", "ball", 2),
             ("range_noise", "ball", 1),
@@ -173,9 +173,7 @@ class _Search:
                 column[block.rows] = aligned[block.name]
 
 
-def _bounded_draw(
-    stage: Stage, first: bool, chosen: Mapping[str, Array], tau_s: Array
-) -> kernel.Draw:
+def _bounded_draw(stage: Stage, first: bool, chosen: dict[str, Array], tau_s: Array) -> kernel.Draw:
     """The chosen directions at their Syncline magnitudes, as a draw (n columns)."""
     n = tau_s.shape[0]
     zero, zero3 = np.zeros(n), np.zeros((3, n))
@@ -188,17 +186,18 @@ def _bounded_draw(
         np.multiply(chosen["attitude_noise"], math.hypot(*attitude.sigma), out=angles[:3])
         np.multiply(chosen["bearing_noise"], math.hypot(*ranging.sigma[1:]), out=angles[3:])
     antenna, ranging_arm = lever_arms(stage, first, chosen.get("lever_arm", zero3))
+    looked = zero3 if ranging is None else bearings(stage, chosen, n)
     noise = {"range_noise_m": zero.copy(), "angle_noise_rad": angles}
     if ranging is not None:
         noise["range_noise_m"] = chosen["range_noise"][0] * ranging.sigma[0]
-        shaped(noise, ranging, np.full(n, distance), chosen["bearing"][2])
+        shaped(noise, ranging, np.full(n, distance), looked[2])
     return kernel.Draw(
         cos_yaw=np.ones(n) if yaw is None else yaw[0],
         sin_yaw=zero if yaw is None else yaw[1],
         velocity_mps=chosen["velocity"] * float(stage.platform.v_max_mps),
         rate_radps=chosen["rate"] * float(stage.platform.omega_max_radps),
         range_m=np.full(n, distance),
-        bearing=chosen.get("bearing", zero3),
+        bearing=looked,
         antenna_m=antenna,
         ranging_m=ranging_arm,
         position_noise_m=(

@@ -6,7 +6,9 @@ that of the line of sight and l = |l_L - l_G|,
 where all that is left out is never negative.  chord is concave: on 0 .. A it is at least
 x chord(A) / A.  A root of squares is at least its tangent, (x x0 + y y0) / |(x0, y0)|.  A pair's
 largest shift is at least the sum of both half widths.  What remains is linear in what each role
-adds, so that a search can leave out whole branches by it.  Known effects only ever add.
+adds, so that a search can leave out whole branches by it.  Known effects only ever add.  Where a
+look bounds l' = |l_L - l_G + d n| below d + l the certificate is the smaller of two bounds; of both
+lower ones the smaller slope of each magnitude is taken.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from syncline_design.model import timing
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Stage, System
-from syncline_design.simulation.bounds import chord
+from syncline_design.simulation.bounds import chord, longest_lever_m
 from syncline_design.spec.case import Case
 from syncline_design.verdict.stated import Certified, Stated
 
@@ -121,7 +123,8 @@ class _Slopes:
     turn: float
     next_speed: float
     along: float  # per metre of range noise
-    across: float  # per radian of attitude or sight
+    across: float  # per radian of attitude
+    sight: float  # per radian of the sight in the body
     arm: float  # per radian of attitude
 
     def of(self, role: RoleName, sigma: Floats) -> Floats:
@@ -131,7 +134,7 @@ class _Slopes:
         if role == "attitude":
             return np.asarray(self.k * (self.across + self.arm) * np.linalg.norm(sigma, axis=1))
         sight = np.linalg.norm(sigma[:, 1:], axis=1)
-        return np.asarray(self.k * (self.along * sigma[:, 0] + self.across * sight))
+        return np.asarray(self.k * (self.along * sigma[:, 0] + self.sight * sight))
 
     def by_shift(self, role: RoleName) -> float:
         """What a second of half a timestamp error's width adds [m/s]."""
@@ -148,14 +151,23 @@ def _slopes(case: Case, asked: Problem, system: System, index: int, at: Stated) 
     following = 0.0 if last else float(system.stages[index + 1].platform.v_max_mps)
     v, omega = float(stage.platform.v_max_mps), float(stage.platform.omega_max_radps)
     if stage.ranging is None or stage.attitude is None:
-        return _Slopes(k, v, 0.0, following, 0.0, 0.0, 0.0)
+        return _Slopes(k, v, 0.0, following, 0.0, 0.0, 0.0, 0.0)
     d = at.distance_m if last else float(stage.platform.distance_m)
     widest = _widest_rad(case, asked, index, omega, k)
     secant = chord(widest) / widest if widest > 0.0 else 1.0
     x, y = k * stage.ranging.sigma[0], d * secant * _angle(stage, k)
     length = math.hypot(x, y) or 1.0
     _, arm = arm_lengths(stage, index == 0)
-    return _Slopes(k, v, omega, following, x / length, y / length * d * secant, arm * secant)
+    across, turned = y / length * d * secant, arm * secant
+    whole = longest_lever_m(stage, index == 0, d) * secant
+    if whole >= d * secant + turned:  # the other bound is never the smaller one
+        return _Slopes(k, v, omega, following, x / length, across, across, turned)
+    seen = d * secant * k * math.hypot(*stage.ranging.sigma[1:])
+    other = math.hypot(x, seen) or 1.0
+    return _Slopes(
+        k, v, omega, following, min(x / length, x / other), min(across + turned, whole) - turned,
+        min(across, seen / other * d * secant), turned,
+    )  # fmt: skip
 
 
 def _angle(stage: Stage, k: float) -> float:
