@@ -10,8 +10,11 @@ that deviations are shown in standard errors of the sample too.
 true quantile and the true share within a limit, of a closed form (chi) and of a lidar whose truth
 comes from many more samples.
 
+`published`: a maker's table of lateral offsets by heading error, cell by cell.
+
     python benchmarks/figures.py propagation [SYSTEMS] [DRAWS] [SEED]
     python benchmarks/figures.py coverage [REPETITIONS] [SAMPLES] [SEED]
+    python benchmarks/figures.py published
 """
 
 from __future__ import annotations
@@ -31,14 +34,44 @@ from syncline_design.model.system import Sensor, System
 from syncline_design.model.timing import TimingError, Uniform
 from syncline_design.simulation.distribution import Values
 from syncline_design.simulation.intervals import proportion_interval
-from syncline_design.simulation.run import quantile_estimates
-from syncline_design.simulation.sampling import error_distribution, sample_errors
+from syncline_design.simulation.run import error_distribution, quantile_estimates
+from syncline_design.simulation.sampling import sample_errors
 from syncline_design.simulation.settings import SimulationSettings
 from syncline_design.simulation.situations import Situations
-from syncline_design.simulation.statistical import exact
+from syncline_design.simulation.statistical import Wanted, exact, statistical_figures
 from test_statistical_figures import ALL, boat, chain, lidar, plain_errors
 
 QUANTILES = (0.5, 0.95, 0.997)
+
+
+# https://gocut.tiwri.com/lateralpositionaloffseterrors.htm, read 2026-11-22: lateral offset [m] by
+# horizontal range [m] for heading errors [deg]; as printed, with its misprint at 750 m and 1 deg
+HEADINGS = (0.5, 1.0, 2.0, 3.0, 5.0)
+LATERAL = {
+    150: (1.3, 2.6, 5.2, 7.9, 13.1), 300: (2.6, 5.2, 10.5, 15.7, 26.1),
+    500: (4.4, 8.7, 17.4, 26.2, 43.6), 750: (6.5, 3.1, 26.2, 39.3, 65.4),
+    1000: (8.7, 17.5, 34.9, 52.3, 87.2), 1500: (13.1, 26.2, 52.3, 78.5, 130.7),
+    2000: (17.5, 34.9, 69.8, 104.7, 174.3),
+}  # fmt: skip
+
+
+def published() -> None:
+    """Heading noise alone: the level RMS of an object at a range."""
+    agree = 0
+    for distance, row in LATERAL.items():
+        for heading, printed in zip(HEADINGS, row, strict=True):
+            one = lidar(attitude=(0.0, 0.0, math.radians(heading)))
+            stage = one.stages[0]
+            platform = replace(stage.platform, distance_m=float(distance))
+            system = replace(one, stages=(replace(stage, platform=platform),))
+            (found,) = statistical_figures(system, (Wanted("horizontal"),))
+            a = math.radians(heading)
+            as_sine = found.value_m * math.sin(a) / a  # noise acts to first order
+            same = abs(as_sine - printed) <= 0.1
+            agree += same
+            if not same:
+                print(f"{distance} m, {heading:g} deg: {found.value_m:.2f} m, printed {printed} m")
+    print(f"{agree} of {len(LATERAL) * len(HEADINGS)} cells agree to the printed digit")
 
 
 def long_armed(seed: int) -> System:
@@ -144,7 +177,9 @@ def coverage(count: int, samples: int, seed: int) -> None:
 
 if __name__ == "__main__":
     numbers = [int(one) for one in sys.argv[2:]]
-    if sys.argv[1:2] == ["coverage"]:
+    if sys.argv[1:2] == ["published"]:
+        published()
+    elif sys.argv[1:2] == ["coverage"]:
         coverage(*(*numbers, *(500, 20000, 0)[len(numbers) :]))
     else:
         propagation(*(*numbers, *(1000, 200000, 0)[len(numbers) :]))

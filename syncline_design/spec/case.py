@@ -38,7 +38,6 @@ from syncline_design.spec.choices import (
     RoleChoice,
     StageChoice,
 )
-from syncline_design.spec.exact import fraction_of
 from syncline_design.spec.requirement import DistanceLimit
 from syncline_design.spec.spec import Requirement, Spec
 from syncline_design.spec.yaml_text import KeyPath, TextPosition
@@ -251,7 +250,7 @@ def _role(
         methods = stamping.candidates
     listed = case.catalog.timestamping
     sensors = tuple(
-        replace(one, entry=one.entry.where(fraction_of(distance_m), stage.look))
+        replace(one, entry=one.entry.where(distance_m, stage.look))
         for one in _sensors(case, stage, name, choice)
     )
     incomplete = _incomplete(case, choice, sensors)

@@ -270,7 +270,7 @@ class SensorEntry(Product):
         found = {"sigma_range": self.sigma_range, "sigma_bearing": self.sigma_bearing}
         return {name: one for name, one in found.items() if isinstance(one, NoiseTable)}
 
-    def where(self, distance: Fraction, look: FieldOfView | None) -> SensorEntry:
+    def where(self, distance: float, look: FieldOfView | None) -> SensorEntry:
         """The sensor with its deviations where a stage uses it, `distance` [m] away at most."""
         tables = self.tables
         if not tables:

@@ -87,9 +87,10 @@ def angles_of(look: FieldOfView | None) -> tuple[Fraction, Fraction]:
     return max(low + QUARTER, Fraction(0)), min(high + QUARTER, 2 * QUARTER)
 
 
-def table_where(table: NoiseTable, distance: Fraction, look: FieldOfView | None) -> NoiseTable:
+def table_where(table: NoiseTable, distance: float, look: FieldOfView | None) -> NoiseTable:
     """A table where a stage uses it: at its farthest distance [m], at the worst angle it looks."""
-    value = table.at(distance) if table.of == "range" else table.worst(*angles_of(look))
+    far = distance.exact if isinstance(distance, Quantity) else Fraction(distance)
+    value = table.at(far) if table.of == "range" else table.worst(*angles_of(look))
     return table.placed(value)
 
 
