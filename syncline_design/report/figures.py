@@ -358,5 +358,5 @@ def _length_ticks(axes: Axes) -> None:
         "x",
         [t for t in ticks if 0 <= t <= high],
         lambda value: "0" if value == 0 else scales.short_length(value),
-        room=150.0,
+        room=105.0,
     )

@@ -139,7 +139,7 @@ def stability(points: Sequence[StabilityPoint]) -> InlineFigure:
         _log_times(axes, "x", [p.tau_s for p in points])
         _log_times(axes, "y", drawn)
         axes.set_xlabel("averaging time, or length of the window")
-        axes.legend(loc="upper left")
+        axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.17), ncols=2)
         axes.tick_params(colors=MUTED)
         scales.grid(axes)
 
