@@ -19,6 +19,7 @@ from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, in_words, scatter, seconds, spread
 
 _BESIDE: Final = 12  # messages on each side that tell a level
+_BESIDE_MORE: Final = (_BESIDE, 4 * _BESIDE, 16 * _BESIDE)
 _APART: Final = 6  # messages: receipts in bunches are even from one to the next
 _LEAST: Final = 3
 _MOST: Final = 4000  # intervals that are looked at
@@ -90,7 +91,7 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
     period = pace.period_s
     noise = max(_JITTER * pace.jitter_s, _LEAST_S, _GRAINS * least_s)
     off = np.abs(pace.interval - np.round(pace.interval / period) * period)
-    if float(np.mean(off > _BROKEN * period)) > _MOST_BROKEN:
+    if float(np.mean(off > max(_BROKEN * period, noise))) > _MOST_BROKEN:
         return []  # no such rhythm
     off_here = off > np.maximum(noise, _ALONE * _around(off))
     odd = np.flatnonzero(off_here | (pace.steps != 1.0))[:_MOST]
@@ -118,6 +119,21 @@ def _without_jumps_of_its_own(pace: Cadence) -> Cadence:
     return replace(pace, period_s=float(near.mean()))
 
 
+def _level(before: Array, after: Array, width: float, clear_s: float) -> tuple[float, float]:
+    """(change of the level, its uncertainty) [s] by as many messages as tell whole intervals apart;
+    an uncertainty of 0 where there are too few."""
+    moved = sure = 0.0
+    for many in _BESIDE_MORE:
+        one, other = before[-many:], after[:many]
+        if min(one.size, other.size) < _LEAST:
+            return 0.0, 0.0
+        moved = float(np.median(other) - np.median(one))
+        sure = _SIGMA * width * float(np.sqrt(1.0 / one.size + 1.0 / other.size)) + 1e-12
+        if 3.0 * sure < clear_s:
+            break
+    return moved, sure
+
+
 def _sizes(
     pace: Cadence, late: Array, odd: NDArray[np.intp], edges: NDArray[np.intp],
     limits: tuple[float, float],
@@ -132,11 +148,10 @@ def _sizes(
         begin = int(edges[at - 1]) + 1 if at > 0 else 0
         beyond = at + 1 if at < edges.size and edges[at] == k else at
         end = int(edges[beyond]) + 1 if beyond < edges.size else late.size
-        before, after = late[max(begin, k + 1 - _BESIDE) : k + 1], late[k + 1 : end][:_BESIDE]
-        if min(before.size, after.size) < _LEAST:
+        sides = late[begin : k + 1], late[k + 1 : end]
+        moved, sure = _level(*sides, width, 0.5 * pace.period_s)
+        if sure <= 0.0:
             continue
-        moved = float(np.median(after) - np.median(before))
-        sure = _SIGMA * width * float(np.sqrt(1.0 / before.size + 1.0 / after.size))
         interval = float(pace.interval[k])
         count = max(1, round((interval + moved) / pace.period_s))
         size = interval - count * pace.period_s

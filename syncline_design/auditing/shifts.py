@@ -335,6 +335,13 @@ def _judged(pace: Cadence, shape: Shape, time_s: Array, blocks: Blocks) -> tuple
         shape = replace(shape, begin_s=at, end_s=end)
     if shape.kind == "episode":
         other, at = _broken(pace, shape.end_s, shape.size_s, time_s, blocks)
+        early = shape.begin_s < float(time_s[0]) + 0.05 * float(time_s[-1] - time_s[0])
+        if other == "stamp" and side != "stamp" and early:  # only the other edge is a jump
+            begin = shape.end_s if at is None else at
+            last = float(time_s[-1])
+            return replace(
+                shape, kind="step", size_s=-shape.size_s, begin_s=begin, end_s=last
+            ), other
         shape = shape if at is None else replace(shape, end_s=at)
         side = other if side == "unknown" else side
     return shape, side
