@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 
 from syncline_design.diagnosis import diagnose
 from syncline_design.diagnosis.gross import gross_faults
-from syncline_design.diagnosis.run import expected_size
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.effects.kinematics import euler_to_rotation
 from syncline_design.logs.log import Log
@@ -149,7 +148,7 @@ def true_log() -> Log:
 def searched(fault: Fault) -> tuple[tuple[str, str], str | float, Log]:
     """(effect and sensor, value, mended log) of the one gross fault found."""
     inputs = read(spoilt(fault))
-    (found,), mended = gross_faults(inputs.system, inputs.log, inputs.known, expected_size(inputs))
+    (found,), mended = gross_faults(inputs.system, inputs.log, inputs.known)
     (value,) = found.acting.values.values()
     return (found.acting.effect.name, found.acting.sensor), value, mended
 
@@ -187,7 +186,7 @@ def test_a_clean_log_and_a_large_lever_arm_are_no_convention() -> None:
 
 def gross_of(fault: Fault | None) -> tuple[object, ...]:
     inputs = read(spoilt(fault))
-    return gross_faults(inputs.system, inputs.log, inputs.known, expected_size(inputs))[0]
+    return gross_faults(inputs.system, inputs.log, inputs.known)[0]
 
 
 def test_a_fault_that_no_spec_holds_stays_out_of_it() -> None:
@@ -202,3 +201,19 @@ def test_a_fault_that_no_spec_holds_stays_out_of_it() -> None:
     )
     assert found.verdict == "explained"
     assert found.effects_entries() == ()
+
+
+def test_two_faults_are_found_of_which_the_greater_hides_the_unit() -> None:
+    """East-north-up places and ranges in mm: in cm, the ranges would leave less than in mm."""
+
+    def both(log: Columns) -> None:
+        held(names("position"), SWAP)(log)
+        log["range_m"] = 1e3 * log["range_m"]
+
+    inputs = read(spoilt(both))
+    found, mended = gross_faults(inputs.system, inputs.log, inputs.known)
+    said = {(one.acting.sensor, *one.acting.values.values()) for one in found}
+    assert said == {("position", "enu"), ("ranging", "range in mm")}
+    true, other = true_log(), mended.stages[0]
+    assert other.range_m == pytest.approx(true.stages[0].range_m, abs=1e-3)
+    assert other.antenna_m == pytest.approx(true.stages[0].antenna_m, abs=1e-3)

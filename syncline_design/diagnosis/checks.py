@@ -105,14 +105,15 @@ def _columns(
 ) -> Iterator[Check]:
     """Velocity columns against the positions' motion, rates against the attitudes' turns."""
     rows = view.rows[index]
-    place = rows.position_m if logged.follows_position else rows.position_m - displaced_m
+    place = rows.position_m - displaced_m
     if view.log.kind == "position" and bool(np.all(np.isfinite(view.log.truth_m))):
         place = view.log.truth_m  # the velocity is that of the better system
     sigma_m = _place_sigma_m(view, index)
     angle_rad = 0.0 if stage.attitude is None else float(np.max(stage.attitude.sigma))
     time_s = view.log.time_s
     moved = None
-    for arm_m in _arms(view, index):
+    derived = logged.follows_position or logged.follows_reference
+    for arm_m in () if derived else _arms(view, index):  # derived ones say nothing of their own
         other = disagreement(
             time_s, place - arm_m, logged.velocity_mps, rows.rotation, sigma_m,
             TOLERANCE["velocity"],

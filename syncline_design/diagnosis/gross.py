@@ -15,6 +15,7 @@ from functools import partial
 import numpy as np
 
 from syncline_design.diagnosis.conventions import best_conventions
+from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.slips import Shift, attitude_restamped, best_shifts
 from syncline_design.effects import plain_delay, registry
@@ -28,6 +29,9 @@ from syncline_design.model.system import System
 FALLS_TO = 1.0 / 3.0
 FAR_FROM_NOISE = 4.0  # times the expected size
 MOST = 3  # gross faults at once
+HUGE = 40.0  # times the expected size, from which two faults at once are looked for
+NO_WORSE = 1.1  # times the error, that the first of them may leave
+BEAM = 8  # first faults behind which another one is looked for
 ROWS = 3000
 LEAST_LEFT = 10  # rows
 WHOLE_S = 0.002  # a latency this near to whole seconds is a slip between time scales
@@ -130,39 +134,105 @@ def gross_faults(
     system: System,
     log: Log,
     known: Sequence[Acting],
-    expected_m: float,
     exclude: Sequence[str] = (),
     reread: Reread | None = None,
 ) -> tuple[tuple[Gross, ...], Log]:
     """Gross faults of a log, and the log with them undone.
 
-    expected_m: usual length of the error vector that the spec's noise makes.  reread: gives the
-    log anew with the positions' stamps set back by so many seconds; None where one file holds it.
+    reread: gives the log anew with the positions' stamps set back by so many seconds; None where
+    one file holds it.
     """
-    found: list[Gross] = []
-    while len(found) < MOST:
+    look = _Looking(system, known, exclude, reread)
+    found, left, over = look.down(log)
+    if over > FAR_FROM_NOISE and look.over(log) > HUGE:
+        return look.pair(log) or (found, left)
+    return found, left
+
+
+def expected_size(view: Scene) -> float:
+    """Usual length of the error vector [m] that the spec's noise makes on the log as it is.
+
+    A range in millimetres makes the noise of its bearing a thousand times as large.
+    """
+    structure = structure_of(view)
+    variance = sum(np.einsum("nii->ni", w.covariance) for w in structure.white)
+    visible = np.isfinite(view.log.truth_m)
+    return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
+
+
+@dataclass(frozen=True, slots=True)
+class _Looking:
+    """What gross faults are looked for with; see `gross_faults`."""
+
+    system: System
+    known: Sequence[Acting]
+    exclude: Sequence[str]
+    reread: Reread | None
+
+    def base(self, log: Log) -> Scene:
+        """The log on some of its rows beside the system."""
         thin = log.rows(slice(None, None, max(1, len(log) // ROWS)))
-        base = scene(system, thin, known)
-        size = usual_size(base.error())
-        if not size > FAR_FROM_NOISE * expected_m:
-            break
-        taken = [g.acting.label for g in found]
-        listed = _best(_trials(system, log, base, taken, exclude, reread))
+        return scene(self.system, thin, self.known)
+
+    def over(self, log: Log) -> float:
+        """The usual error of a log over what the spec's noise makes."""
+        base = self.base(log)
+        return usual_size(base.error()) / max(expected_size(base), 1e-300)
+
+    def down(self, log: Log, first: Sequence[Gross] = ()) -> tuple[tuple[Gross, ...], Log, float]:
+        """The best fault, one after the other; the log without them, its error over its noise."""
+        found = list(first)
+        while True:
+            base = self.base(log)
+            size, expected_m = usual_size(base.error()), expected_size(base)
+            best = None
+            if len(found) < MOST and size > FAR_FROM_NOISE * expected_m:
+                taken = [g.acting.label for g in found]
+                best = self._best_of(log, base, (size, expected_m), taken)
+            if best is None:
+                return tuple(found), log, size / max(expected_m, 1e-300)
+            found.append(Gross(best.acting, size / max(best.size_m, 1e-300)))
+            log = best.mend(log)
+
+    def _best_of(
+        self,
+        log: Log,
+        base: Scene,
+        sizes_m: tuple[float, float],
+        taken: Sequence[tuple[str, str, int]],
+    ) -> _Tried | None:
+        """The fault that helps most, if one helps enough; sizes of the error and of its noise."""
+        size, expected_m = sizes_m
+        listed = _best(self._listed(log, base, taken))
         if not _clear(listed, size, expected_m):
             listed = None
-        wide = _best(_searched(system, log, base, exclude))
-        shift = _best(_shifts(system, log, base, exclude, reread))
+        wide = _best(_searched(self.system, log, base, self.exclude))
+        shift = _best(_shifts(self.system, log, base, self.exclude, self.reread))
         if wide is not None and not _far_down(wide.size_m, size, expected_m):
             wide = None
         if not _clear(shift, size, expected_m):
             shift = None
-        listed, shift = (_unless_smoothed(one, base, exclude) for one in (listed, shift))
-        best = _preferred(_preferred(listed, shift), wide)
-        if best is None:
-            break
-        found.append(Gross(best.acting, size / max(best.size_m, 1e-300)))
-        log = best.mend(log)
-    return tuple(found), log
+        listed, shift = (_unless_smoothed(one, base, self.exclude) for one in (listed, shift))
+        return _preferred(_preferred(listed, shift), wide)
+
+    def _listed(self, log: Log, base: Scene, taken: Sequence[tuple[str, str, int]]) -> list[Trial]:
+        return _trials(self.system, log, base, taken, self.exclude, self.reread)
+
+    def pair(self, log: Log) -> tuple[tuple[Gross, ...], Log] | None:
+        """Faults of which the first helps little alone, where all together leave nothing but noise.
+
+        What leaves least alone is undone, and what is best then is looked for behind it.
+        """
+        base = self.base(log)
+        size = usual_size(base.error())
+        trials = [*self._listed(log, base, ()), *_searched(self.system, log, base, self.exclude)]
+        tried = sorted((_tried_out(t) for t in trials), key=lambda one: one.size_m)
+        for one in [t for t in tried[:BEAM] if t.size_m < NO_WORSE * size]:
+            first = Gross(one.acting, size / max(one.size_m, 1e-300))
+            found, left, over = self.down(one.mend(log), (first,))
+            if len(found) > 1 and over < NEARLY_FREE:
+                return found, left
+        return None
 
 
 def _unless_smoothed(tried: _Tried | None, base: Scene, exclude: Sequence[str]) -> _Tried | None:
@@ -213,8 +283,11 @@ def _clear(best: _Tried | None, size_m: float, expected_m: float) -> bool:
 
 def _best(trials: Sequence[Trial]) -> _Tried | None:
     """The trial of least error, the first of equals."""
-    tried = [_Tried(t.acting, t.mend, usual_size(t.error())) for t in trials]
-    return min(tried, key=lambda one: one.size_m, default=None)
+    return min(map(_tried_out, trials), key=lambda one: one.size_m, default=None)
+
+
+def _tried_out(trial: Trial) -> _Tried:
+    return _Tried(trial.acting, trial.mend, usual_size(trial.error()))
 
 
 def _is_short_slip(one: Acting) -> bool:

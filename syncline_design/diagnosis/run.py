@@ -126,7 +126,6 @@ def examined(
         inputs.system,
         inputs.log,
         inputs.known,
-        expected_size(inputs),
         settings.exclude_effects,
         inputs.reread,
     )
@@ -332,15 +331,6 @@ def _slip(result: SearchResult) -> Acting | None:
                 return slip
         at += len(one.effect.slopes())
     return None
-
-
-def expected_size(inputs: Measured) -> float:
-    """Usual length of the error vector [m] that the spec's noise makes."""
-    view = scene(inputs.system, inputs.log.rows(slice(0, None, max(1, len(inputs.log) // 500))))
-    structure = structure_of(view)
-    variance = sum(np.einsum("nii->ni", w.covariance) for w in structure.white)
-    visible = np.isfinite(view.log.truth_m)
-    return float(np.sqrt(np.median(np.sum(variance * visible, axis=1))))
 
 
 def _unseen(

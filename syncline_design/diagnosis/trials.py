@@ -15,11 +15,18 @@ import numpy as np
 from syncline_design.diagnosis.candidates import EDGE, STEP_TIMES, Candidate, Signature, zero_values
 from syncline_design.diagnosis.fitting import Data, Model, Opened, adjusted, fit
 from syncline_design.diagnosis.motion_scatter import grows_with_motion
-from syncline_design.diagnosis.noise import NoiseLevel, precision, with_size
+from syncline_design.diagnosis.noise import (
+    TIME_LEAST_S,
+    TIME_LEAST_STAMPS,
+    NoiseLevel,
+    precision,
+    with_size,
+)
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 
+QUICK = 1.25  # times the least time constant, up to which noise is as good as white
 AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it
 
 
@@ -61,7 +68,27 @@ def plausible(data: Data, model: Model) -> bool:
                 return False
     if not all(_mean_and_scatter_agree(model, one) for one in model.opened):
         return False
+    if not all(_lasts(data, model, one) for one in model.opened):
+        return False
     return all(seen_in_motion(data, model, one) for one in model.opened)
+
+
+def _lasts(data: Data, model: Model, opened: Opened) -> bool:
+    """Whether slow noise, if it is some, is slower than what is as good as white in the log.
+
+    White noise of one axis that is larger than the others' passes for the quickest there is.
+    """
+    if opened.what not in ("slow", "down"):
+        return True
+    sensor = (data.view.system.stages[opened.candidate.stage].name, opened.candidate.sensor)
+    stamps = np.unique(data.structure.time_s)
+    usual_s = float(np.median(np.diff(stamps))) if stamps.size > 1 else 0.0
+    least_s = max(TIME_LEAST_S, TIME_LEAST_STAMPS * usual_s)
+    return all(
+        max(times) > QUICK * least_s
+        for part, times in zip(data.structure.slow, model.level.time_constant_s, strict=True)
+        if part.sensor == sensor
+    )
 
 
 def seen_in_motion(data: Data, model: Model, opened: Opened) -> bool:
