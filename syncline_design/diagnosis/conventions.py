@@ -46,6 +46,11 @@ ENU_WORDS = "enu: yaw from east to north, pitch up negative"
 Mend = Callable[[Log], Log]
 
 
+def is_of_unit(convention: str) -> bool:
+    """Whether a convention is a unit of length; no column is in two."""
+    return any(convention.endswith(words) for words in UNITS.values())
+
+
 @dataclass(frozen=True, slots=True)
 class Convention:
     """One way in which columns may be written: what they hold, and the log mended.

@@ -14,7 +14,7 @@ from functools import partial
 
 import numpy as np
 
-from syncline_design.diagnosis.conventions import best_conventions
+from syncline_design.diagnosis.conventions import best_conventions, is_of_unit
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.diagnosis.slips import Shift, attitude_restamped, best_shifts
@@ -187,7 +187,7 @@ class _Looking:
             size, expected_m = usual_size(base.error()), expected_size(base)
             best = None
             if len(found) < MOST and size > FAR_FROM_NOISE * expected_m:
-                taken = [g.acting.label for g in found]
+                taken = [g.acting for g in found]
                 best = self._best_of(log, base, (size, expected_m), taken)
             if best is None:
                 return tuple(found), log, size / max(expected_m, 1e-300)
@@ -199,14 +199,15 @@ class _Looking:
         log: Log,
         base: Scene,
         sizes_m: tuple[float, float],
-        taken: Sequence[tuple[str, str, int]],
+        taken: Sequence[Acting],
     ) -> _Tried | None:
         """The fault that helps most, if one helps enough; sizes of the error and of its noise."""
         size, expected_m = sizes_m
-        listed = _best(self._listed(log, base, taken))
+        listed = _best(self._listed(log, base, [one.label for one in taken]))
         if not _clear(listed, size, expected_m):
             listed = None
-        wide = _best(_searched(self.system, log, base, self.exclude))
+        searched = _searched(self.system, log, base, self.exclude)
+        wide = _best([t for t in searched if not _again(t.acting, taken)])
         shift = _best(_shifts(self.system, log, base, self.exclude, self.reread))
         if wide is not None and not _far_down(wide.size_m, size, expected_m):
             wide = None
@@ -284,6 +285,13 @@ def _clear(best: _Tried | None, size_m: float, expected_m: float) -> bool:
 def _best(trials: Sequence[Trial]) -> _Tried | None:
     """The trial of least error, the first of equals."""
     return min(map(_tried_out, trials), key=lambda one: one.size_m, default=None)
+
+
+def _again(one: Acting, taken: Sequence[Acting]) -> bool:
+    """Whether a convention was undone already, or another unit of the same column."""
+    value = str(_value(one))
+    before = [str(_value(other)) for other in taken if other.label == one.label]
+    return value in before or (is_of_unit(value) and any(map(is_of_unit, before)))
 
 
 def _tried_out(trial: Trial) -> _Tried:
