@@ -35,12 +35,15 @@ def path(run: PlanRun) -> InlineFigure:
                 rows = np.unique(np.r_[own[::step], own[-1], min(own[-1] + 1, len(leg) - 1)])
                 axes.plot(east[rows], north[rows], color=SERIES[k % len(SERIES)], linewidth=1.4)
                 tell(axes, float(east[own[0]]), float(north[own[0]]), [
-                    ("Leg", str(k + 1)), ("Begins at", f"{east[own[0]]:.1f} m east, "
+                    ("Leg", str(k + 1)), ("Place", f"{east[own[0]]:.1f} m east, "
                                           f"{north[own[0]]:.1f} m north"),
                 ])  # fmt: skip
                 axes.text(east[own[0]], north[own[0]], f" {k + 1}")
         axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
                   "x", color=MUTED, markersize=4)  # fmt: skip
+        for k, one in enumerate(run.result.targets, 1):
+            place = f"{one.east_m:.1f} m east, {one.north_m:.1f} m north"
+            tell(axes, one.east_m, one.north_m, [("Target", str(k)), ("Place", place)])
         axes.plot(east[:1], north[:1], "o", color=SERIES[0], markersize=4.5)
         axes.set_aspect("equal", adjustable="datalim")
         axes.set_xlabel("east, m")
