@@ -89,3 +89,31 @@ def test_a_step_as_early_as_is_looked_for_stands_for_a_delay(tmp_path: Path) -> 
     assert found.verdict == "unexplained"
     assert all(one.kind == "stand_in" for one in found.findings if one.effect == "timestamp_step")
     assert found.effects_entries() == ()
+
+
+def test_a_drift_that_may_not_be_named_is_no_step_of_the_clock(tmp_path: Path) -> None:
+    """A clock that runs away is half a step off at both ends: the step says something else."""
+    drift = hidden("clock_drift", "position", rate=3e-4)
+    log = make_log(scenario("car_stops", 6, 60.0, 8.0), (drift,))
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    without = DiagnosisSettings(exclude_effects=("clock_drift",), unseen_block=False)
+    found = diagnose(spec, [log.to_csv(tmp_path / "log.csv")], without)
+    steps = [one for one in found.findings if one.effect == "timestamp_step"]
+    assert steps
+    assert {one.kind for one in steps} == {"stand_in"}
+    assert found.verdict == "unexplained"
+
+
+def test_a_step_of_the_clock_keeps_its_name(tmp_path: Path) -> None:
+    step = hidden("timestamp_step", "position", step_s=0.04, time_s=33.0)
+    log = make_log(scenario("car_stops", 6, 60.0, 8.0), (step,))
+    spec = tmp_path / "spec.yaml"
+    spec.write_text(log.spec_yaml(), encoding="utf-8")
+    settings = DiagnosisSettings(unseen_block=False)
+    (one,) = diagnose(spec, [log.to_csv(tmp_path / "log.csv")], settings).findings
+    assert (one.effect, one.sensor, one.kind) == ("timestamp_step", "position", "cause")
+    assert one.parameters["step_s"].value == pytest.approx(0.04, rel=0.1)
+    assert one.parameters["time_s"].value == pytest.approx(
+        33.0, abs=2.0
+    )  # it stands still around then

@@ -195,7 +195,7 @@ def _deterministic(final: Settled, index: int, weights: Weights) -> Finding:
     others = tuple(a for a in model.acting if a.label != one.label)
     size_m = rms_m(final.data, final.data.error(others) - model.error)
     named = _finding(final, one.effect, one.label, found, size_m, weights)
-    if _at_the_edge(final, one):
+    if _at_the_edge(final, one) or one.label in final.refuted:
         named = replace(named, kind="stand_in")
     return replace(_in_its_part(named, one.effect), varying=_varying(final, one))
 

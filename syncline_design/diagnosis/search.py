@@ -30,7 +30,7 @@ from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
 from syncline_design.diagnosis.parts import cut_down, in_a_part, refined
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
-from syncline_design.diagnosis.settling import Settled, settle
+from syncline_design.diagnosis.settling import Settled, borne_out, settle
 from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, slow_states
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import (
@@ -130,7 +130,19 @@ class Search:
     def searched(self) -> tuple[Model, Model]:
         """The model without effects, and with all that beat chance, one after the other."""
         base = fit(self.data)
-        model = base
+        return self.grown(base, base)
+
+    def confirmed(self, found: Model) -> Model:
+        """The effects of a model of other rows as far as these rows bear them out, and what else.
+
+        Each is fitted and tested here; those that do not stand go, then the search goes on.
+        """
+        model = fit(self.data, found.acting, found.opened, start=found.level)
+        model = borne_out(self.data, model, self.states, self.threshold_at, self.stands)
+        return self.grown(model, model)[1]
+
+    def grown(self, base: Model, model: Model) -> tuple[Model, Model]:
+        """The two models, the second with all that beats chance, one after the other."""
         while len(model.labels) < self.settings.max_effects:
             scores = gram(self.data, model, self.free_signatures(model), model.level)
             threshold = self.threshold(scores)
@@ -155,12 +167,16 @@ class Search:
         def threshold(less: Model) -> float:
             return self.threshold(gram(fine, less, self.free_signatures(less), less.level))
 
-        def standing(one: Judged, effect: Effect) -> bool:
-            charge = math.log(STEP_TIMES) if any(p.located for p in effect.parameters) else 0.0
-            return one.log_p + charge < self.chance(len(labels))
+        return settle(fine, start, self.signatures, threshold, self.states, self.stands)
 
-        labels = {s.candidate.label for s in self.signatures}
-        return settle(fine, start, self.signatures, threshold, self.states, standing)
+    def stands(self, one: Judged, effect: Effect) -> bool:
+        """Whether noise of another kind would not show as much of an effect by chance."""
+        charge = math.log(STEP_TIMES) if any(p.located for p in effect.parameters) else 0.0
+        return one.log_p + charge < self.chance(len({s.candidate.label for s in self.signatures}))
+
+    def threshold_at(self, model: Model) -> float:
+        """log p that the best of what a model does not hold falls below in a clean log."""
+        return self.threshold(gram(self.data, model, self.free_signatures(model), model.level))
 
     def threshold(self, scores: Gram) -> float:
         """log p that the best candidate of a clean log falls below at the stated rate."""

@@ -16,6 +16,7 @@ from syncline_design.diagnosis.identify import Comparison, competed
 from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.noise import as_specified
 from syncline_design.diagnosis.slow_states import Course, Judged, States, fitted_of, names_of
+from syncline_design.diagnosis.step_form import refuted_steps
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance, seen_in_motion
 from syncline_design.effects.record import Effect
@@ -43,7 +44,7 @@ class Settled:
 
     judged: what noise that is not the model's lets be said of each effect that moves the mean.
     courses: how it runs along the log.  stairs: the model with the strongest effect alone, the
-    strongest two, ... , all of them.
+    strongest two, ... , all of them.  refuted: steps that the data want to be ramps.
     """
 
     data: Data
@@ -53,6 +54,7 @@ class Settled:
     judged: Mapping[Label, Judged]
     courses: Mapping[Label, Course | None]
     stairs: tuple[tuple[Label, Model], ...]
+    refuted: frozenset[Label] = frozenset()
 
 
 def settle(
@@ -88,7 +90,8 @@ def settle(
     judged = dict(zip((a.label for a in model.acting), own, strict=True))
     ran = zip((a.label for a in model.acting), states.courses_of(model), strict=True)
     stairs = _stairs(data, model, evidence)
-    return Settled(data, model, evidence, classes, judged, dict(ran), stairs)
+    refuted = refuted_steps(states, model)
+    return Settled(data, model, evidence, classes, judged, dict(ran), stairs, refuted)
 
 
 def _valued(data: Data, model: Model, states: States) -> tuple[Model, list[Judged]]:
@@ -174,6 +177,36 @@ def _needless(data: Data, model: Model, label: Label) -> Model | None:
         return None
     less = refitted_without(data, model, label)
     return less if _evidence(data, model, label, less).log_p > math.log(NEEDLESS) else None
+
+
+def borne_out(
+    data: Data,
+    model: Model,
+    states: States,
+    threshold: Callable[[Model], float],
+    standing: Callable[[Judged, Effect], bool],
+) -> Model:
+    """The model without what these rows do not bear out, weakest first.
+
+    What moves the mean is weighed by its values and their covariance, not refitted without.
+    """
+    model = _standing(data, model, states, standing)
+    while model.labels:
+        weighed = [_weighed(data, model, label) for label in model.labels]
+        log_p, label, less = max(weighed, key=lambda one: one[:2])
+        if log_p <= threshold(model):
+            break
+        model = less or refitted_without(data, model, label)
+    return model
+
+
+def _weighed(data: Data, model: Model, label: Label) -> tuple[float, Label, Model | None]:
+    """log of the chance that noise alone gains as much; the model without, where it was made."""
+    if any(one.label == label for one in model.acting):
+        effect = effect_of(model, label)
+        return log_chance(effect, told_nats(model, label), freedom_of(effect)), label, None
+    less = refitted_without(data, model, label)
+    return _evidence(data, model, label, less).log_p, label, less
 
 
 def refitted_without(data: Data, model: Model, label: Label) -> Model:
