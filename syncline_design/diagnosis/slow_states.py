@@ -57,6 +57,8 @@ LOST = 1e-7  # share of a column's information below which others hold it all
 RIDGE = 1e-9  # of scaled columns that hold one another
 SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
 LEAST_LOG_P = -700.0
+# Readings of one sensor that do not wander alike: yaw beside roll and pitch, ranges beside bearings.
+KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
 NORMAL_95 = 1.959963984540054
 
 
@@ -374,18 +376,19 @@ class States:
         return size2
 
     def _pooled(self, normal: Array, size2: Array) -> Array:
-        """Variances of the channels, none below the mean of its sensor's.
+        """Variances of the channels, none below the mean of its kin's.
 
-        Axes of one sensor share what makes them wander; what effects can make of one axis leaves
-        too little there to tell by itself.  A channel has the weight of the waves that it tells.
+        Kin share what makes them wander; what effects can make of one of them may leave too little
+        there to tell by itself.  A channel has the weight of the waves that it tells.
         """
         _, inverse = self._values(normal, np.zeros(len(normal)), 0, size2)
         prior = size2[self.channel] / np.maximum(self.wave, 1)
         told = np.clip(1.0 - np.diag(inverse) / prior, LEAST, 1.0) * (self.wave > 0)
         weight = np.bincount(self.channel, told, len(self.roles))
         found = size2.copy()
-        for sensor in {one for one, _ in self.roles}:
-            own = np.array([c for c, (one, _) in enumerate(self.roles) if one == sensor])
+        kin = [(sensor, KIN.get((sensor[1], k), 0)) for sensor, k in self.roles]
+        for one in set(kin):
+            own = np.array([c for c, other in enumerate(kin) if other == one])
             found[own] = np.maximum(size2[own], np.average(size2[own], weights=weight[own]))
         return found
 
