@@ -57,7 +57,7 @@ LOST = 1e-7  # share of a column's information below which others hold it all
 RIDGE = 1e-9  # of scaled columns that hold one another
 SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
 LEAST_LOG_P = -700.0
-# Readings of one sensor that do not wander alike: yaw beside roll and pitch, ranges beside bearings.
+# Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
 KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
 NORMAL_95 = 1.959963984540054
 
