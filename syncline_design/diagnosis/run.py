@@ -24,6 +24,7 @@ from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, wind
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
+from syncline_design.diagnosis.noise import SLOW_LEAST, SLOW_LIMIT, as_specified
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import covariates, first_disagreement_s, strongest, where_map
 from syncline_design.diagnosis.remainder import remainder
@@ -50,9 +51,9 @@ from syncline_design.diagnosis.search import (
     silent,
     start_search,
 )
-from syncline_design.diagnosis.shown_noise import with_shown_noise
 from syncline_design.diagnosis.sight import informative, smallest_seen
-from syncline_design.diagnosis.survey import survey_m
+from syncline_design.diagnosis.slow_states import slow_states
+from syncline_design.diagnosis.survey import survey_m, with_shown_survey
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.system_delay import with_system_delay
 from syncline_design.diagnosis.unseen_block import unseen_block
@@ -300,7 +301,23 @@ def prepared(inputs: Measured, log: Log, exclude: Sequence[str] = ()) -> Data:
     parts = directed_parts(view, found)
     structure = structure_of(view, parts)
     structure = still_axes_apart(structure, varying_axes(view.error(), structure))
-    return with_shown_noise(data_of(view, structure), signatures(view, found))
+    data = with_shown_ranging(data_of(view, structure))
+    return with_shown_survey(data, signatures(view, found))
+
+
+def with_shown_ranging(data: Data) -> Data:
+    """The data with slow ranging noise as far as the log's own slow courses show it, within sigma.
+
+    A sensor that shows none has none that could pass for a bias.
+    """
+    shown = slow_states(data).sizes(as_specified(data.structure), data.error(()))
+    found = []
+    for part in data.structure.slow:
+        own = [COURSES * shown.get((part.sensor, k), 0.0) for k in range(part.columns)]
+        limits = tuple(float(np.clip(v, 10.0 * SLOW_LEAST, SLOW_LIMIT)) for v in own)
+        found.append(replace(part, limits=limits) if part.sensor[1] == "ranging" else part)
+    slow = tuple(found)
+    return data_of(data.view, replace(data.structure, slow=slow))
 
 
 def _slip(result: SearchResult) -> Acting | None:

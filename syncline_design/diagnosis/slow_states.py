@@ -27,7 +27,7 @@ from scipy.stats import t
 
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
-from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled
+from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import NoiseLevel, Sensor, white_covariance
 from syncline_design.diagnosis.positive import inverse as inverse_of
 from syncline_design.diagnosis.positive import solution
@@ -47,7 +47,6 @@ LEAST_ROWS = 8  # of a block
 HUBER = 1.345  # standard deviations from where on a component counts less
 REWEIGHTED = 3
 STEPS = 15  # of expectation and maximisation
-STEADY_SIZE = 1e-3  # relative step of a size below which it has settled
 LEAST = 1e-2  # of the spec's sigma: slow courses smaller than this do not matter
 MATTERS = 1e-3  # of a row's white standard deviation: channels below have no say
 FLAT = 1e6  # prior variance of a constant while the sizes are found
@@ -57,8 +56,6 @@ LOST = 1e-7  # share of a column's information below which others hold it all
 RIDGE = 1e-9  # of scaled columns that hold one another
 SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
 LEAST_LOG_P = -700.0
-# Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
-KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
 NORMAL_95 = 1.959963984540054
 
 
@@ -177,7 +174,6 @@ class States:
     block: NDArray[np.int64]  # (n,) stretch of every row
     seen: NDArray[np.int64] | None  # (n,) group of targets of every row, where they are few
     roles: tuple[Channel, ...]  # sensor of every channel, and which of its readings
-    explained: Array | None = None  # (n, 3, f) what effects could make of the error
 
     @property
     def count(self) -> int:
@@ -287,7 +283,7 @@ class States:
         fixed = width + self.courses.shape[2]
         normal, score = total[:fixed, :fixed], total[:fixed, -1]
         start, limit = np.full(len(self.roles), 0.1), self._limits(level)
-        size2 = self._sized(normal, score, width, start, limit)
+        size2, _, _ = self._sized(normal, score, width, start, limit)
         evidence = self._evidence(normal, score, width, size2)
         while np.any(size2 > LEAST**2):
             less = []
@@ -326,21 +322,12 @@ class States:
         q = self.courses.shape[2]
         fixed = np.r_[np.arange(width), np.arange(white.shape[1] - q, white.shape[1])]
         part, weight, scale2 = white[:, fixed], known.ravel().astype(float), 1.0
-        free = part[:, :width]  # what is no slow course
-        if self.explained is not None:
-            free = np.column_stack([free, (root @ self.explained[:, axes]).reshape(len(part), -1)])
         size2 = np.full(len(self.roles), 0.1)
         limit = self._limits(level)
         for _ in range(REWEIGHTED):
             normal = part.T @ (weight[:, None] * part) / scale2
             score = part.T @ (weight * error) / scale2
-            if free.shape[1] > width:
-                sized = _beside(free, part[:, width:], weight / scale2, error)
-                size2 = self._pooled(sized[0], self._sized(*sized, 0, size2, limit))
-            else:
-                size2 = self._sized(normal, score, width, size2, limit)
-            values, inverse = self._values(normal, score, width, size2)
-            freedom = float(np.sum(inverse * normal))
+            size2, values, freedom = self._sized(normal, score, width, size2, limit)
             left = error - part @ values
             scale2 = _scale2(left[judged.ravel()], freedom)
             far = np.abs(left) / math.sqrt(scale2)
@@ -361,56 +348,27 @@ class States:
             most[part.sensor] *= max(1.0, *slow)
         return np.array([most[sensor] for sensor, _ in self.roles])
 
-    def _sized(self, normal: Array, score: Array, width: int, size2: Array, limit: Array) -> Array:
-        """Variances of the channels by expectation and maximisation, from size2 on."""
+    def _sized(
+        self, normal: Array, score: Array, width: int, size2: Array, limit: Array
+    ) -> tuple[Array, Array, float]:
+        """Variances of the channels, the states' values, and the freedom they take."""
+        keep = np.diag(normal) > 0.0
         share = 1.0 / np.maximum(self.wave, 1)
         moving = self.wave > 0
-        members = [np.flatnonzero((self.channel == c) & moving) for c in range(size2.shape[0])]
+        values = np.zeros(score.shape[0])
+        inverse = np.zeros_like(normal)
         for _ in range(STEPS):
-            values, inverse = self._values(normal, score, width, size2)
+            variance = np.where(moving, size2[self.channel] * share, FLAT)
+            prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
+            scale = np.sqrt(np.diag(normal) + prior)
+            whole = (normal + np.diag(prior)) / scale[:, None] / scale
+            inverse = inverse_of(whole, 1e-12) / scale[:, None] / scale
+            values = inverse @ score
             energy = (values[width:] ** 2 + np.diag(inverse)[width:]) / share
-            sized: Array = np.clip([np.mean(energy[own]) for own in members], LEAST**2, limit)
-            if np.all(np.abs(sized - size2) < STEADY_SIZE * size2):
-                return sized
-            size2 = sized
-        return size2
-
-    def _pooled(self, normal: Array, size2: Array) -> Array:
-        """Variances of the channels, none below the mean of its kin's.
-
-        Kin share what makes them wander; what effects can make of one of them may leave too little
-        there to tell by itself.  A channel has the weight of the waves that it tells.
-        """
-        _, inverse = self._values(normal, np.zeros(len(normal)), 0, size2)
-        prior = size2[self.channel] / np.maximum(self.wave, 1)
-        told = np.clip(1.0 - np.diag(inverse) / prior, LEAST, 1.0) * (self.wave > 0)
-        weight = np.bincount(self.channel, told, len(self.roles))
-        found = size2.copy()
-        kin = [(sensor, KIN.get((sensor[1], k), 0)) for sensor, k in self.roles]
-        for one in set(kin):
-            own = np.array([c for c, other in enumerate(kin) if other == one])
-            found[own] = np.maximum(size2[own], np.average(size2[own], weights=weight[own]))
-        return found
-
-    def _values(self, normal: Array, score: Array, width: int, size2: Array) -> tuple[Array, Array]:
-        """Free columns and states at these variances, constants free as well, and covariance."""
-        share = 1.0 / np.maximum(self.wave, 1)
-        variance = np.where(self.wave > 0, size2[self.channel] * share, FLAT)
-        prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
-        scale = np.sqrt(np.diag(normal) + prior)
-        whole = (normal + np.diag(prior)) / scale[:, None] / scale
-        inverse = inverse_of(whole, 1e-12) / scale[:, None] / scale
-        return inverse @ score, inverse
-
-
-def _beside(free: Array, part: Array, weight: Array, error: Array) -> tuple[Array, Array]:
-    """Normal matrix and score of some columns, freed of others that are no slow course."""
-    root = np.sqrt(weight)[:, None]
-    both, taken = root * np.column_stack([part, error]), root * free
-    before = np.sum(both**2, axis=0)
-    both = both - taken @ (inverse_scaled(taken.T @ taken) @ (taken.T @ both))
-    both = both * (np.sum(both**2, axis=0) > LOST * before)
-    return both[:, :-1].T @ both[:, :-1], both[:, :-1].T @ both[:, -1]
+            for c in range(size2.shape[0]):
+                own = (self.channel == c) & moving
+                size2[c] = np.clip(np.mean(energy[own]), LEAST**2, limit[c])
+        return size2, values * keep, float(np.sum(inverse * normal))
 
 
 def _parted(part: NDArray[np.int64], columns: Array, weight: Array, error: Array) -> _Sums:
@@ -507,9 +465,7 @@ def slow_states(data: Data) -> States:
     block = np.minimum(np.arange(len(view)) * count // max(len(view), 1), count - 1)
     whole = np.concatenate(courses, axis=2) if courses else np.zeros((len(view), 3, 0))
     channels_of, waves_of = np.array(channel, int), np.array(wave, int)
-    return States(
-        data, whole, channels_of, waves_of, block, _dealt(data), tuple(roles), data.explained
-    )
+    return States(data, whole, channels_of, waves_of, block, _dealt(data), tuple(roles))
 
 
 def _scale2(left: Array, freedom: float) -> float:
