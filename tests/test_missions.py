@@ -250,6 +250,27 @@ def test_missions_that_cannot_share_a_payload_are_named(
         assert found.exit_code == 1
 
 
+def test_what_helps_a_mission_is_told_by_every_command(tmp_path: Path) -> None:
+    """A mission that misses two limits: the changes that do so together are lost in no output."""
+    example = Path(__file__).parent.parent / "examples/uav_three_heights.yaml"
+    text = example.read_text("utf-8").replace("60000 EUR", "1000 EUR")
+    path = tmp_path / "three.yaml"
+    path.write_text(text.replace("{ACC-1: 0.20 m}", "{ACC-1: 1 mm}"), "utf-8")
+    found = check_file(path, QUICK)
+    why = found.infeasibility
+    assert why is not None
+    assert len(why.joint_fixes) > 1
+    outputs = (
+        "\n".join(why.text),
+        render_checks("markdown", [found]),
+        run("optimize", str(path), cwd=tmp_path, environment={"COLUMNS": "500"}).stdout,
+    )
+    for told in (" ".join(one.replace("\\", "").split()) for one in outputs):
+        assert "Mission powerline alone" in told
+        for fix in (fix for together in why.joint_fixes for fix in together):
+            assert fix.text in told
+
+
 # What is written instead of what, the word that the message leads to, and what it says.
 REFUSED = [
     ("name: far", "name: near", "near, stages: {uav: {distance: 120", "used twice: near"),

@@ -34,14 +34,18 @@ from syncline_design.spec.case import Case
 Found = TypeVar("Found")
 
 
-def _text(found: Explanation, each_suffices: bool) -> Iterator[str]:
-    """each_suffices: whether the spec has a design without any one requirement of the conflict."""
-    yield "No design meets this spec."
+def told(found: Explanation) -> Explanation:
+    """The explanation with its text, which says what its other fields hold."""
+    return replace(found, text=tuple(_lines(found)))
+
+
+def _lines(found: Explanation) -> Iterator[str]:
+    yield found.about or "No design meets this spec."
     yield from (f"  {gap.text}" for gap in found.roles_without_options)
     if found.conflict.requirements:
-        yield f"  {_conflict_text(found.conflict, each_suffices)}"
+        yield f"  {_conflict_text(found.conflict)}"
     for members in found.further_conflicts:
-        yield f"  Apart from that, {_conflict_text(Conflict(members, True), False)}"
+        yield f"  Apart from that, {_conflict_text(Conflict(members, True))}"
     if found.fixes:
         yield "Any one of these changes makes it feasible (each solved again):"
         yield from (f"  - {fix.text}" for fix in found.fixes)
@@ -54,13 +58,13 @@ def _text(found: Explanation, each_suffices: bool) -> Iterator[str]:
         yield cut_short_words(found)
 
 
-def _conflict_text(conflict: Conflict, each_suffices: bool) -> str:
+def _conflict_text(conflict: Conflict) -> str:
     names = [member.words for member in conflict.requirements]
     if len(names) == 1:
         return f"{names[0]} alone cannot be met by any combination of the candidates."
     if not conflict.minimal:
         return f"{listed(names)} cannot all hold together (a smaller set was not ruled out)."
-    ending = "; without any one of them a design exists" if each_suffices else ""
+    ending = "; without any one of them a design exists" if conflict.each_suffices else ""
     return f"{listed(names)} cannot hold together{ending}."
 
 
@@ -88,16 +92,16 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
     fixes += _proven(lambda: platform_fixes(case, build))
     fixes = by_size(fixes)
     joint = tuple(sorted((tuple(map(_measured, some)) for some in joint), key=_largest))
-    each_suffices = _each_suffices(case, problem, build, conflict)
+    each_suffices = _each_suffices(case, problem, build, conflict) or None
     found = Explanation(
         gaps,
-        Conflict(_members(case, conflict), minimal),
+        Conflict(_members(case, conflict), minimal, each_suffices),
         tuple(_members(case, parts) for parts in further),
         tuple(fixes),
         joint,
         cut_short=in_force().is_over,  # once over, every search after it ended without an answer
     )
-    return replace(found, text=tuple(_text(found, each_suffices)))
+    return told(found)
 
 
 def _measured(fix: Fix) -> Fix:

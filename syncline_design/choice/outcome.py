@@ -31,7 +31,7 @@ FixKind = Literal[
     "quantile",
     "missions",
 ]
-NO_SINGLE_CHANGE = "No single change of a requirement, platform or method was found to help."
+NO_SINGLE_CHANGE = "No single change was found to help."
 METHODS: tuple[Road, ...] = ("auto", "front", "milp", "enumerate")
 # The roads in words, for every text that says how a design was proven best.
 ROADS: dict[str, str] = {
@@ -195,10 +195,14 @@ Members = tuple[ConflictMember, ...]
 
 @dataclass(frozen=True, slots=True)
 class Conflict(Record):
-    """Requirements that cannot hold together.  minimal: proven that any one left out helps."""
+    """Requirements that cannot hold together.  minimal: proven that any one left out helps.
+
+    each_suffices: true where the whole spec, too, has a design without any one of them.
+    """
 
     requirements: Members
     minimal: bool
+    each_suffices: bool | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,7 +213,8 @@ class Explanation(Record):
     requirement alone can be moved far enough.  joint_fixes: changes that help together.  cut_short:
     the time limit ended the search for reasons and remedies, so what is not there may still exist.
     text: the whole in words, line by line.  missions: of a family those that cannot be met by one
-    payload; one alone has the reasons of its own.
+    payload; one alone has the reasons of its own.  about: what it speaks of, in words, where that
+    is not the spec as it stands.
     """
 
     roles_without_options: tuple[RoleGap, ...]
@@ -220,6 +225,7 @@ class Explanation(Record):
     cut_short: bool
     text: tuple[str, ...] = ()
     missions: tuple[str, ...] | None = optional()
+    about: str | None = optional()
 
     @property
     def conflicts(self) -> tuple[Members, ...]:

@@ -30,6 +30,7 @@ from syncline_design.report.on_alternatives import (
     bargain_nodes,
     ways_cell,
 )
+from syncline_design.report.on_infeasibility import infeasibility_nodes
 from syncline_design.report.on_nearest import nearest_nodes
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.table import Cell, Table, table
@@ -135,14 +136,11 @@ def incomplete_lines(result: Optimisation) -> list[str]:
 
 
 def _why_not(result: Optimisation, currency: str) -> list[Section]:
-    """The explanation's own lines: those with a dash are a list."""
     if result.infeasibility is None:
         return []
-    nodes: list[Node] = []
-    for line in result.infeasibility.text[1:]:
-        text = line.strip()
-        nodes.append(Items((text[2:],)) if text.startswith("- ") else Text(text))
-    nodes += nearest_nodes(result.nearest, currency)
+    nodes = [
+        *infeasibility_nodes(result.infeasibility), *nearest_nodes(result.nearest, currency)
+    ]  # fmt: skip
     return section("infeasibility", "Why no design meets the requirements", nodes)
 
 

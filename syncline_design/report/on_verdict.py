@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from syncline_design.choice.outcome import NO_SINGLE_CHANGE, ROADS, cut_short_words
+from syncline_design.choice.outcome import ROADS
 from syncline_design.report import (
     choice_tables,
     errata,
@@ -25,19 +25,17 @@ from syncline_design.report.document import (
     Items,
     Node,
     Section,
-    Span,
     Text,
     code,
     given,
-    muted,
     provenance,
     section,
     show,
-    strong,
 )
 from syncline_design.report.error_figures import error_figures
 from syncline_design.report.explained import explained
 from syncline_design.report.on_alternatives import bargain_nodes
+from syncline_design.report.on_infeasibility import infeasibility_nodes
 from syncline_design.report.on_missions import missions, robustness
 from syncline_design.report.on_nearest import nearest_nodes
 from syncline_design.report.simulated import (
@@ -49,15 +47,12 @@ from syncline_design.report.simulated import (
     simulation_facts,
 )
 from syncline_design.report.table import Table
-from syncline_design.verdict.obstacle import requirement_name
 
 if TYPE_CHECKING:
-    from syncline_design.choice.outcome import Conflict, Fix, Members
     from syncline_design.verdict.tree import Checked, Refused, Verdict
 
 OPEN = ("infeasibility", "requirements", "missions", "baseline", "explained", "warnings")
 MOST_OPEN = 12  # rows of a table of the choice that is not folded away
-_PROVEN = muted(" (solved again to prove it)")
 
 
 def on_verdict(verdict: Checked, more: Sequence[Node] = ()) -> Document:
@@ -185,55 +180,9 @@ def _why_not(verdict: Verdict) -> list[Node]:
     why = verdict.infeasibility
     if why is None:
         return []
-    told = [line.strip() for line in why.text]
-    gaps = tuple(line for line in told if line.startswith(("No option for", "No clock for")))
-    nodes: list[Node] = [Heading("Roles without any option"), Items(gaps)] if gaps else []
-    nodes += _conflict(why.conflict)
-    for members in why.further_conflicts:
-        ending = " cannot hold together." if len(members) > 1 else " cannot be met either."
-        nodes.append(Text(("Apart from that: ", *_members(members), ending)))
-    together = tuple(_joint(fixes) for fixes in why.joint_fixes)
-    if together:
-        nodes += [Heading("What would make it feasible together"), Items(together)]
-    alone = tuple((given(fix.text), *([_PROVEN] if fix.proven else [])) for fix in why.fixes)
-    if alone:
-        nodes += [Heading("What would make it feasible, each alone"), Items(alone)]
-    elif not why.cut_short and nodes:
-        nodes.append(Text(NO_SINGLE_CHANGE))
-    if why.cut_short:
-        nodes.append(Text(cut_short_words(why)))
     limits = (verdict_figures.lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
     currency = verdict_tables.currency_of(verdict)
-    return [*nodes, *nearest_nodes(verdict.nearest, currency, *limits)]
-
-
-def _conflict(conflict: Conflict) -> list[Node]:
-    if not conflict.requirements:
-        return []
-    several = len(conflict.requirements) > 1
-    title = "Requirements that cannot hold together" if several else (
-        "Requirement that no candidate meets"
-    )  # fmt: skip
-    proven = " Proven minimal: without any one of them the rest can be met."
-    minimal = proven if conflict.minimal and several else ""
-    return [Heading(title), Text((*_members(conflict.requirements), f".{minimal}"))]
-
-
-def _members(members: Members) -> list[str | Span]:
-    """`ACC-1 (line 15), COST-1 (line 17)`, the names strong."""
-    found: list[str | Span] = []
-    for entry in members:
-        line = f" (line {entry.line})" if entry.line else ""
-        comma = ", " if found else ""
-        found += [comma, strong(requirement_name(entry)), line]
-    return found
-
-
-def _joint(fixes: Sequence[Fix]) -> tuple[str | Span, ...]:
-    told: list[str | Span] = []
-    for fix in fixes:
-        told += [" and " if told else "", given(fix.text)]
-    return (*told, _PROVEN)
+    return [*infeasibility_nodes(why), *nearest_nodes(verdict.nearest, currency, *limits)]
 
 
 def _payload(verdict: Verdict) -> list[Node]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from syncline_design.choice.explain import listed
+from syncline_design.choice.explain import listed, told
 from syncline_design.choice.outcome import Explanation, Fix
 from syncline_design.machine.deadline import Pieces
 from syncline_design.spec.case import Mission
@@ -73,21 +73,20 @@ def _of_one(
     if fixes:
         fixes += pieces.listed("fixes", lambda: sharing_fixes(work, build, settings.seed))
     else:
-        fixes = [
-            replace(fix, mission=name, text=f"for mission {name} by itself, {fix.text}")
-            for fix in why.fixes
-        ]
-    cut = why.cut_short or bool(pieces.cut_short)
-    reasons = [line for line in why.text if not line.startswith("  - ")]
-    reasons = [line for line in reasons if not line.startswith("Any one of these")]
-    text = (f"Mission {name} alone:", *reasons, *_fix_lines(fixes))
-    return replace(why, text=text, missions=(name,), fixes=tuple(fixes), cut_short=cut)
+        fixes = [_alone(name, fix) for fix in why.fixes]
+    alone = [
+        (_alone(name, first), *(replace(fix, mission=name) for fix in others))
+        for first, *others in why.joint_fixes
+    ]
+    return told(replace(
+        why, about=f"Mission {name} alone:", missions=(name,), fixes=tuple(fixes),
+        joint_fixes=tuple(alone), cut_short=why.cut_short or bool(pieces.cut_short),
+    ))  # fmt: skip
 
 
-def _fix_lines(fixes: Sequence[Fix]) -> Iterator[str]:
-    if fixes:
-        yield "Any one of these changes makes it feasible (each solved again):"
-    yield from (f"  - {fix.text}" for fix in fixes)
+def _alone(mission: str, fix: Fix) -> Fix:
+    """A change that helps a mission by itself; whether it helps the family was not tried."""
+    return replace(fix, mission=mission, text=f"for mission {mission} by itself, {fix.text}")
 
 
 def _explained(work: Work, settings: CheckSettings, build: Callable[[], Build]) -> Explanation:
@@ -100,32 +99,22 @@ def _explained(work: Work, settings: CheckSettings, build: Callable[[], Build]) 
     found = pieces.made("the conflict", lambda: conflict_of(work), nothing)
     fixes = pieces.listed("fixes", lambda: limit_fixes(work, build, settings.seed))
     fixes += pieces.listed("fixes", lambda: sharing_fixes(work, build, settings.seed))
-    why = Explanation(
-        (), conflict(work, found), (), tuple(fixes), (), bool(pieces.cut_short), (), names or None
-    )
-    return replace(why, text=tuple(_text(work, why)))
+    return told(Explanation(
+        (), conflict(work, found), (), tuple(fixes), (), bool(pieces.cut_short),
+        missions=names or None, about=_about(work, names),
+    ))  # fmt: skip
 
 
-def _text(work: Work, why: Explanation) -> Iterator[str]:
-    """In words, line by line."""
+def _about(work: Work, missions: Sequence[str]) -> str:
+    """What no payload does."""
     wanted = work.case.spec.choose_for
-    if why.missions:
-        yield f"Each mission can be met alone, but {listed(why.missions)} not with one payload."
-    elif wanted != "nominal":
-        how = "at both ends of every datasheet interval"
-        how = how if isinstance(wanted, str) else f"with probability {wanted}"
-        yield f"No payload holds {how}."
-    else:
-        yield "No payload meets every mission."
-    if why.conflict.requirements:
-        names = listed([one.words for one in why.conflict.requirements])
-        ending = "" if why.conflict.minimal else " (a smaller set was not ruled out)"
-        yield f"  {names} cannot all hold{ending}."
-    yield from _fix_lines(why.fixes)
-    if not why.fixes and not why.cut_short:
-        yield "No single change of a limit was found to help."
-    if why.cut_short:
-        yield "The time limit ended the search for reasons and remedies."
+    if missions:
+        return f"Each mission can be met alone, but {listed(missions)} not with one payload."
+    if wanted == "nominal":
+        return "No payload meets every mission."
+    how = "at both ends of every datasheet interval"
+    how = how if isinstance(wanted, str) else f"with probability {wanted}"
+    return f"No payload holds {how}."
 
 
 def _rows_without_design(mission: Mission, found: Verdict) -> tuple[RequirementResult, ...]:
