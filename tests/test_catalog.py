@@ -7,7 +7,6 @@ from typing import Any
 import pytest
 from pydantic import ValidationError
 
-from syncline_design.report.catalogs import is_assumed
 from syncline_design.spec.case import usable_primitives
 from syncline_design.spec.catalog import (
     Catalog,
@@ -155,11 +154,11 @@ def test_a_clock_has_drift_and_holdover_or_neither() -> None:
 
 
 def test_basis_marks_all_or_single_figures() -> None:
-    assert is_assumed(entry(SensorEntry, SENSOR + ", basis: assumption"), "cost")
+    assert entry(SensorEntry, SENSOR + ", basis: assumption").basis_of("cost") == "assumption"
     part = entry(SensorEntry, SENSOR + ", basis: {cost: assumption}")
-    assert is_assumed(part, "cost")
-    assert not is_assumed(part, "mass")
-    assert not is_assumed(entry(SensorEntry, SENSOR), "cost")
+    assert part.basis_of("cost") == "assumption"
+    assert part.basis_of("mass") != "assumption"
+    assert entry(SensorEntry, SENSOR).basis_of("cost") != "assumption"
     assert (
         "did you mean cost?" in complaints(SensorEntry, SENSOR + ", basis: {costs: assumption}")[0]
     )

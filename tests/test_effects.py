@@ -19,7 +19,6 @@ from syncline_design.diagnosis import DiagnosisSettings, diagnose
 from syncline_design.effects import NOT_EFFECTS, registry
 from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_euler
 from syncline_design.effects.record import (
-    OPENED,
     SELDOM,
     Basis,
     Departures,
@@ -216,6 +215,10 @@ def test_acoustic_effects_ask_for_acoustic_sensors() -> None:
     assert applies["sound_speed"](stage("mbes"), "ranging")
     assert not applies["turnaround_delay"](stage("mbes"), "ranging")
     assert not any(a(stage("lidar"), "ranging") for a in applies.values())
+
+
+# Figures that each opening fits.
+OPENED = {"factor": 1, "slow": 2, "down": 2, "size": 1, "tails": 2, "episode": 3}
 
 
 @pytest.mark.parametrize("effect", registry().values(), ids=registry())

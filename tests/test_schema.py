@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import jsonschema
 import pytest
@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from syncline_design.cli.app import app
 from syncline_design.report.key_glossary import KEYS, STUDY_KEYS
-from syncline_design.report.result_schemas import RESULT_NAMES, result_schema_text
+from syncline_design.report.result_schemas import ResultName, result_schema_text
 from syncline_design.report.scaffold import (
     SCHEMA_NAME,
     SPEC_NAME,
@@ -187,7 +187,7 @@ def test_init_leaves_nothing_when_it_cannot_write(tmp_path: Path) -> None:
     assert not os.path.lexists(tmp_path / SCHEMA_NAME)
 
 
-@pytest.mark.parametrize("name", RESULT_NAMES)
+@pytest.mark.parametrize("name", get_args(ResultName))
 def test_the_schema_of_every_result_is_valid_and_printed(name: Any) -> None:
     """What real results satisfy is tested beside each of them."""
     text = result_schema_text(name)

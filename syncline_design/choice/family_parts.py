@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from syncline_design.choice.family import Family, FamilyDesign
-from syncline_design.choice.holding import EntryKind, hold, holds
+from syncline_design.choice.holding import EntryKind, hold
 from syncline_design.choice.options import Bools, Indices, ResourceName
 
 Whole = Callable[[FamilyDesign], FamilyDesign]
@@ -33,35 +33,12 @@ def narrowed_family(
     return replace(family, roles=roles, clocks=left), whole
 
 
-def all_ways(family: Family) -> list[Indices]:
-    """The places of all ways of every role."""
-    return [np.arange(len(role)) for role in family.roles]
-
-
 def ways_with(family: Family, r: int, kind: EntryKind, identity: str) -> Bools:
     """Which ways of a role hold an entry in some mission."""
     found = np.zeros(len(family.roles[r]), dtype=bool)
     for problem, places in zip(family.problems, family.roles[r].places, strict=True):
         found |= hold(problem.roles[r].options, kind, identity)[places]
     return found
-
-
-def parts_holding(family: Family, kind: EntryKind, identity: str) -> Iterator[Family]:
-    """For each role and vehicle that may hold an entry: the designs in which it does."""
-    for r in range(len(family.roles)):
-        rows = np.flatnonzero(ways_with(family, r, kind, identity))
-        if len(rows):
-            ways = all_ways(family)
-            yield narrowed_family(family, [*ways[:r], rows, *ways[r + 1 :]])[0]
-    vehicles = family.problems[0].vehicles
-    clocks = [np.arange(own.shape[1]) for own in family.clocks]
-    for v, (vehicle, own) in enumerate(zip(vehicles, family.clocks, strict=True)):
-        mine = [
-            p for p, i in enumerate(own[0].tolist()) if holds(vehicle.clocks[i], kind, identity)
-        ]
-        if mine:
-            some = [*clocks[:v], np.array(mine, dtype=np.intp), *clocks[v + 1 :]]
-            yield narrowed_family(family, all_ways(family), some)[0]
 
 
 def without_sensor(family: Family, sensor: str) -> Family:

@@ -1,16 +1,14 @@
 """Scores of whole effects against what is left of a log, and how far clean logs go by chance.
 
-Two ways.  Scores of a right model are normal with a known covariance, so their least p over all
-(correlated) candidates is drawn directly; that takes the noise as known.  Near the threshold clean
-logs are simulated from the current model on this very trajectory, their noise fitted anew before
-and after each one's best candidate, and the threshold is moved by what that adds.
+Scores of a right model are normal with a known covariance, so their least p over all (correlated)
+candidates is drawn directly; that takes the noise as known.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -21,7 +19,6 @@ from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
 from syncline_design.diagnosis.noise import (
     NoiseLevel,
     common_loading,
-    fit_noise,
     loadings,
     precision,
     row_covariance,
@@ -32,14 +29,9 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import groups
 
 DRAWS = 3000  # clean scores drawn for the distribution of the largest
-LOGS = 16  # clean logs simulated
 MOST_ROWS = 6000  # of a longer log the noise is known well enough
-ITERATIONS = 6
 RIDGE = 1e-8
 LOST = 1e-7  # share of a signature's information below which the model's own effects hold it all
-
-LogP = Callable[[float, int], float]
-Gains = Callable[[Model], list[float]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,44 +149,3 @@ def clean_errors(data: Data, model: Model, rng: np.random.Generator, count: int)
             drawn = rng.standard_normal((count, int(group[-1]) + 1))[:, group]
             draws += drawn[:, :, None] * common[None, :, :, k]
     return np.asarray(draws)
-
-
-def _least_log_p(
-    data: Data,
-    model: Model,
-    free: Sequence[Signature],
-    own: Array,
-    error: Array,
-    gains: Gains,
-    log_p: LogP,
-) -> float:
-    """log p of one clean log's best candidate, with the noise fitted before and after it."""
-    clean = _refitted(data, model, _without(model, own, error))
-    found = gains(clean)
-    freedoms = [s.columns.shape[2] for s in free]
-    scored = [log_p(2.0 * g, f) for g, f in zip(found, freedoms, strict=True)]
-    best = int(np.argmin(scored))
-    columns = np.concatenate([own, np.nan_to_num(free[best].columns)], axis=2)
-    after = _refitted(data, clean, _without(clean, columns, error))
-    gain = max(clean.nll - after.nll, 0.0)
-    return log_p(2.0 * gain, freedoms[best])
-
-
-def _without(model: Model, columns: Array, error: Array) -> Array:
-    """The error with columns fitted and taken out."""
-    if columns.shape[2] == 0:
-        return error
-    weighted = model.precision.solve(columns)
-    values = solve_scaled(inner(columns, weighted), inner(weighted, error[:, :, None])[:, 0])
-    left: Array = error - columns @ values
-    return left
-
-
-def _refitted(data: Data, model: Model, error: Array) -> Model:
-    rows = data.noise_rows
-    level, _ = fit_noise(
-        data.noise_structure, error[rows], model.bounds, model.level, model.free_sizes, ITERATIONS
-    )
-    known = precision(data.structure, level)
-    nll = known.negative_log_likelihood(error)
-    return replace(model, level=level, error=error, precision=known, nll=nll)

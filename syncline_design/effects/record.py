@@ -256,10 +256,6 @@ def on_vessels(stage: Stage, sensor: Target) -> bool:
 Promise = Literal["timing", "latency", "clock", "lever_arm", "mounting", "noise"]
 Origin = Literal["stamps", "sensor", "build"]
 Opening = Literal["", "factor", "slow", "down", "size", "tails", "episode"]
-# Figures that each opening fits, in the order of the effect's parameters.
-OPENED: Mapping[Opening, int] = {
-    "factor": 1, "slow": 2, "down": 2, "size": 1, "tails": 2, "episode": 3,
-}  # fmt: skip
 OUTLIER_FACTOR = 10.0  # what opens tails has outliers of so many times the spec's deviation
 SELDOM = 1000
 

@@ -326,11 +326,6 @@ def _printed_lines(one: Printed) -> Iterator[str]:
         yield visible(f"      {one.note}")
 
 
-def is_assumed(entry: Entry, figure: str) -> bool:
-    """Whether the catalog has no public source for a figure."""
-    return _basis(entry, figure) == "assumption"
-
-
 def suggestion(catalog: Catalog, identity: str) -> str:
     """`; did you mean X?`, or where to look."""
     known = [name for section in SECTIONS for name in getattr(catalog, section)]

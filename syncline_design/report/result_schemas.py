@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, Final, get_args
+from typing import Any, Final
 
 from syncline_design.auditing import result as auditing
 from syncline_design.campaign import watch_result
@@ -42,7 +42,6 @@ RESULTS: Final[Mapping[ResultName, tuple[Any, str]]] = {
     "verdicts": (verdict.Verdicts, verdict.SEVERAL_SCHEMA),
     "watch": (watch_result.Watch, watch_result.SCHEMA),
 }
-RESULT_NAMES: Final[tuple[ResultName, ...]] = get_args(ResultName)
 
 
 def result_schema(name: ResultName) -> dict[str, Any]:

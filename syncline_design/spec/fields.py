@@ -220,7 +220,6 @@ Power = Annotated[Quantity, figure_of(Dimension.POWER, 0.0)]
 Money = Annotated[Quantity, figure_of(Dimension.MONEY, 0.0)]
 PositiveMoney = Annotated[Quantity, figure_of(Dimension.MONEY, 0.0, above=True)]
 Ratio = Annotated[float, figure_of(Dimension.RATIO, 0.0)]
-SigmaLength = Annotated[float, figure_of(Dimension.LENGTH, 0.0, above=True, tolerance=True)]
 
 
 def _number(lowest: float) -> Reader:

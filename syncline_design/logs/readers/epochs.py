@@ -24,7 +24,6 @@ ADJUSTED_S = 1_000_000_000  # what LAS takes off GPS seconds
 TAI_MINUS_GPS_S = 19  # both atomic, fixed
 WEEK_SECONDS = "seconds of the GPS week"  # name of a stamp that lacks its week
 DAY_SECONDS = "time of day (UTC)"  # name of a stamp that lacks its date
-HOUR_SECONDS = "time of the hour"  # name of a stamp that lacks its hour
 
 # When UTC fell behind GPS time by one more second; IERS Bulletin C, RINEX and ICD-GPS-200 agree.
 LEAPS = (
