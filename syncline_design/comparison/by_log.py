@@ -123,7 +123,8 @@ def _whose_noise(one: Assumed, log: LogEvidence, breaking: Sequence[Finding]) ->
     figure = _noise_figure(one, log)
     if one.name != "noise" or figure is None or figure.low is None or figure.high is None:
         return None
-    if not breaking or any(f.effect != "noise_understated" for f in breaking) or figure.low > 1.0:
+    whole = all(registry()[f.effect].opens == "factor" for f in breaking)
+    if not breaking or not whole or figure.low > 1.0:
         return None
     others = [name.split("/")[1] for name, f in (log.sight.factors if log.sight else {}).items()
               if name.startswith(f"{one.stage}/") and name != f"{one.stage}/{one.role}"

@@ -46,9 +46,7 @@ NEARLY_ALL: Final = 1.6449  # standard deviations below which 5 % lie
 NEARLY_ALL_PLACES: Final = 0.05  # of the windows show less than is told
 AS_GOOD_NATS: Final = 4.5  # within which candidates of a window are not told apart
 LOUDER: Final = 1.5  # variance in a window over the usual one, up to which it is usual
-RIVALS: Final = ("range_bias", "datum_offset")  # what else may act in a stretch, and be no row's
 ASKED: Final = ("latency", "lever_arm", "mounting")  # kinds of assumptions
-LEFT_OUT: Final = ("echo_delay", "turnaround_delay", "flexure")  # as good as another of its kind
 Label = tuple[str, str, int]
 
 
@@ -165,9 +163,7 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int = 
 
 def _asked(s: Signature) -> bool:
     effect = s.candidate.effect
-    if not s.plain or effect.name in LEFT_OUT or not (cuttable(effect)):
-        return False
-    return effect.breaks in ASKED or effect.name in RIVALS
+    return s.plain and effect.asked_in_stretches and cuttable(effect)
 
 
 def _whitened(data: Data, drawn: Array, model: Model) -> tuple[Array, Array]:

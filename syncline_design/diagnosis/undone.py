@@ -22,7 +22,6 @@ from syncline_design.diagnosis.fitting import Data, Model, inner
 from syncline_design.effects.record import Array
 
 BUILD: Final = {"s": 0.2, "m": 1.0, "rad": 0.1}  # what a build can be wrong by, by unit
-FREE: Final = ("latency", "lever_arm", "mounting", "boresight", "range_bias")
 HELD: Final = 1e8  # of the prior's weight, along what moves no object
 NEARLY_ALL: Final = 1.6449  # standard deviations below which 95 % lie
 LARGER: Final = 1.5  # times the uncertainty alone, from which others count
@@ -51,7 +50,7 @@ def left_open(data: Data, model: Model, found: Sequence[Signature]) -> tuple[Lef
     found: signatures of all effects, those that the model holds as well: a delay that was found may
     be a part of one that all sensors share.
     """
-    asked = [s for s in found if s.plain and s.candidate.effect.name in FREE]
+    asked = [s for s in found if s.plain and s.candidate.effect.asked_jointly]
     if len(asked) < 2:
         return ()
     return tuple(_left_open(data, model, asked))
@@ -158,7 +157,7 @@ def _joint(data: Data, model: Model, asked: Sequence[Signature]) -> _Joint:
 
 def _held(normal: Array, asked: Sequence[Signature], owner: Sequence[int]) -> tuple[_Held, ...]:
     """Directions that move no object on any drive, as far as all of one are asked."""
-    names = [s.candidate.label for s in asked]
+    names = [(s.candidate.effect.breaks, *s.candidate.label[1:]) for s in asked]
     found = []
     delays = [k for k, (name, *_) in enumerate(names) if name == "latency"]
     if {names[k][1] for k in delays} == {"position", "attitude", "ranging"}:
@@ -166,7 +165,7 @@ def _held(normal: Array, asked: Sequence[Signature], owner: Sequence[int]) -> tu
     for stage in sorted({stage for *_, stage in names}):
         for pair in (
             (("lever_arm", "position", stage), ("lever_arm", "ranging", stage)),
-            (("mounting", "attitude", stage), ("boresight", "ranging", stage)),
+            (("mounting", "attitude", stage), ("mounting", "ranging", stage)),
         ):
             if all(label in names for label in pair):
                 first, second = (_places(owner, names.index(one)) for one in pair)

@@ -51,4 +51,5 @@ EFFECT = Effect(
     rarity=90,
     breaks="mounting",
     comes_with="sensor",
+    asked_in_stretches=True,
 )

@@ -53,4 +53,6 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=30,
     breaks="mounting",
+    asked_in_stretches=True,
+    asked_jointly=True,
 )

@@ -54,4 +54,5 @@ EFFECT = Effect(
     sensitivity=_sensitivity,
     contribute=_contribute,
     rarity=60,
+    asked_in_stretches=True,
 )

@@ -59,4 +59,5 @@ EFFECT = Effect(
     rarity=100,
     breaks="mounting",
     comes_with="sensor",
+    asked_in_stretches=True,
 )

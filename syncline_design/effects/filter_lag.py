@@ -91,4 +91,5 @@ EFFECT = Effect(
     breaks="latency",
     memory="time_constant_s",
     comes_with="sensor",
+    asked_in_stretches=True,
 )

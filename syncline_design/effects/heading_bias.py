@@ -48,4 +48,5 @@ EFFECT = Effect(
     rarity=50,
     breaks="mounting",
     comes_with="sensor",
+    asked_in_stretches=True,
 )

@@ -61,4 +61,6 @@ EFFECT = Effect(
     breaks="latency",
     passing=True,
     comes_with="stamps",
+    asked_in_stretches=True,
+    asked_jointly=True,
 )

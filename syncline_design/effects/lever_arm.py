@@ -58,4 +58,6 @@ EFFECT = Effect(
     transponder=True,
     rarity=20,
     breaks="lever_arm",
+    asked_in_stretches=True,
+    asked_jointly=True,
 )

@@ -47,4 +47,6 @@ EFFECT = Effect(
     contribute=_contribute,
     rarity=40,
     comes_with="sensor",
+    asked_in_stretches=True,
+    asked_jointly=True,
 )

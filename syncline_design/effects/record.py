@@ -308,6 +308,9 @@ class Effect:
     comes_with: what it goes away with: another way of stamping, another sensor, or neither, where
     it hangs on the mounting, the site or the processing.
     grows: with the time since the start, so that a longer log shows a smaller one.
+    asked_in_stretches: a built system's log is asked for it from any stamp to any other.
+    asked_jointly: it is left free where a built system's log is asked for what undoes another; of
+    those that break one assumption, one a sensor.
     sentence: for people, a format string over {sensor} and the parameters.
     brief: of noise, the same in a few words, in parts; one whose parameter is 0 falls away.
     implied: no spec lists it; it follows from how often and by what a system measures.
@@ -340,6 +343,8 @@ class Effect:
     breaks: Promise = "noise"
     comes_with: Origin = "build"
     grows: bool = False
+    asked_in_stretches: bool = False
+    asked_jointly: bool = False
     brief: tuple[str, ...] = ()
     implied: bool = False
 
