@@ -82,6 +82,7 @@ class Standing(Record):
     quantile: float | None = optional()
     axis: str | None = optional()
     waived: bool | None = optional()
+    limit_written: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -212,5 +213,5 @@ def _standing(row: RequirementResult | None) -> Standing | None:
         return None
     return Standing(
         row.status, row.value, row.limit, row.margin, row.unit, row.line, row.column,
-        row.quantile, row.axis, row.is_waived or None,
+        row.quantile, row.axis, row.is_waived or None, row.limit_written,
     )  # fmt: skip

@@ -13,6 +13,7 @@ from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
 from syncline_design.model.quantity import Dimension, format_duration, format_quantity
+from syncline_design.model.written import beside, limit_as_written
 from syncline_design.simulation.results import QuantileEstimate
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
@@ -212,8 +213,7 @@ def _lines(before: _Checked, after: _Checked) -> Iterator[str]:
     yield from after.refusal or before.refusal
     for row in after.verdict.requirements:
         if row.status == "fail" and row.value is not None:
-            value, limit = _figure(row.value, row.unit), _figure(row.limit, row.unit)
-            yield f"{row.id}: {value} against a limit of {limit}."
+            yield f"{row.id}: {_against_limit(row, row.value)}."
     if before.verdict.spec.open_roles and not (before.refusal or after.refusal):
         yield from _payload_lines(before.verdict, after.verdict)
     elif after.verdict.verdict == "fails":
@@ -221,6 +221,13 @@ def _lines(before: _Checked, after: _Checked) -> Iterator[str]:
             "The design is pinned; with candidates in the spec, the cheapest design that still "
             "meets the requirements would be named here."
         )
+
+
+def _against_limit(row: RequirementResult, value: float) -> str:
+    written = limit_as_written(row.limit_written, row.limit, row.unit)
+    if written is not None:
+        return f"{beside(written, value, row.unit)} against a limit of {written}"
+    return f"{_figure(value, row.unit)} against a limit of {_figure(row.limit, row.unit)}"
 
 
 def _figure(value: float, unit: str) -> str:

@@ -120,7 +120,7 @@ def _conflict_of(row: RequirementResult, verdict: Verdict) -> list[str]:
 
 
 def _conflict_text(row: RequirementResult, others: list[str], verdict: Verdict) -> str:
-    limit = f"{row.id}: {kind_text(row)} limited to {numbers.in_unit(row.limit, row.unit)}"
+    limit = f"{row.id}: {kind_text(row)} limited to {numbers.limit(row)}"
     with_others = f" together with {sentence_list(others)}" if others else ""
     return f"{limit} cannot be met{with_others}.{_fixes(verdict)}"
 
@@ -139,14 +139,14 @@ def _fixes(verdict: Verdict) -> str:
 
 def requirement_sentence(row: RequirementResult) -> str:
     """`ACC-1: Syncline error 93.9 mm exceeds its limit 50 mm (87.8 % over)`."""
-    limit = numbers.in_unit(row.limit, row.unit)
+    limit = numbers.limit(row)
     if row.kind == "feasible" and row.status == "fail":
         return f"{row.id}: this payload cannot exist; {row.note}"
     if row.value is None:
         text = f"{row.id}: {kind_text(row)} limited to {limit}; no value"
     else:
         verbs = {"pass": "keeps", "fail": "does not keep", "indeterminate": "is undecided against"}
-        value = numbers.in_unit(row.value, row.unit)
+        value = numbers.held(row.value, row)
         text = (
             f"{row.id}: {kind_text(row)} {value} {verbs[row.status]} its limit {limit} "
             f"({margin_text(row)})"

@@ -22,8 +22,7 @@ def explained(verdict: Verdict) -> list[Node]:
     found = verdict.explained or ()
     nodes: list[Node] = [Text(LEAD)] if found else []
     for one in found:
-        limit = numbers.in_unit(one.limit, one.unit)
-        nodes.append(Heading(f"{one.id}, limit {limit}"))
+        nodes.append(Heading(f"{one.id}, limit {numbers.limit(one)}"))
         nodes.append(Items(tuple(_line(step) for step in one.steps)))
         nodes += _sources(one)
     return nodes

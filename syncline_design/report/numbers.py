@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 from syncline_design.model.quantity import (
     Dimension,
@@ -12,6 +12,7 @@ from syncline_design.model.quantity import (
     format_estimate,
     format_quantity,
 )
+from syncline_design.model.written import beside, limit_as_written
 
 if TYPE_CHECKING:
     from syncline_design.verdict.tree import MissionHorizon
@@ -24,6 +25,17 @@ _TYPOGRAPHIC = (
     ("m/s^2", "m/s\N{SUPERSCRIPT TWO}"),
     ("-", "\N{MINUS SIGN}"),
 )
+
+
+class Limited(Protocol):
+    """What holds a requirement's limit: in SI, and as the spec has it where it has a unit."""
+
+    @property
+    def limit(self) -> float: ...
+    @property
+    def unit(self) -> str: ...
+    @property
+    def limit_written(self) -> str | None: ...
 
 
 def finite(value: Any) -> float | None:
@@ -139,6 +151,20 @@ def in_unit(value: Any, unit: str, digits: int = 4) -> str:
             return number(value, digits)
         case _:
             return money(value, unit)
+
+
+def limit(row: Limited) -> str:
+    """A requirement's limit as the spec has it, `0.30 m`; by its ladder where it has no unit."""
+    written = limit_as_written(row.limit_written, row.limit, row.unit)
+    return in_unit(row.limit, row.unit) if written is None else typeset(written)
+
+
+def held(value: Any, row: Limited, digits: int = 4) -> str:
+    """A figure that stands beside a requirement's limit, in the unit of that limit."""
+    written, amount = limit_as_written(row.limit_written, row.limit, row.unit), finite(value)
+    if written is None or amount is None:
+        return in_unit(value, row.unit, digits)
+    return typeset(beside(written, amount, row.unit, digits))
 
 
 _DIMENSIONS: Final = {

@@ -180,5 +180,5 @@ def _standing(row: Standing | None) -> Cell:
     if row is None:
         return Cell("not required")
     state = status_word(row.status, waived=bool(row.waived))
-    shown = f"{numbers.in_unit(row.value, row.unit)} of {numbers.in_unit(row.limit, row.unit)}"
+    shown = f"{numbers.held(row.value, row)} of {numbers.limit(row)}"
     return Cell(f"{shown}, {state.word}", row.value, state.tone, state.mark)

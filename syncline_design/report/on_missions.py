@@ -54,8 +54,7 @@ def _kept(row: RequirementResult | None) -> Cell:
     state = status_of(row)
     if row.value is None:
         return Cell(state.word, tone=state.tone, mark=state.mark)
-    value, limit = (numbers.in_unit(one, row.unit) for one in (row.value, row.limit))
-    text = f"{value} of {limit}"
+    text = f"{numbers.held(row.value, row)} of {numbers.limit(row)}"
     return Cell(text, row.value, state.tone, state.mark, sub=margin_text(row))
 
 

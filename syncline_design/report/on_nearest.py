@@ -25,21 +25,14 @@ def nearest_nodes(
     )
     cost = "a price that is not told" if found.cost is None else numbers.money(found.cost, currency)
     error = numbers.length(found.error_m)
-    missed = " and ".join(_missed(one, currency) for one in found.misses)
+    missed = " and ".join(_missed(one) for one in found.misses)
     text = f"{sensors}. It costs {cost} and errs by {error}; it misses {missed}."
     return [Heading("The nearest design"), Text(text), *_chart(found, currency, target_m, price)]
 
 
-def _missed(one: MissedLimit, currency: str) -> str:
+def _missed(one: MissedLimit) -> str:
     name = one.requirement or f"the implied limit of {KINDS.get(one.kind, one.kind)}"
-    value, limit = (_shown(figure, one.unit, currency) for figure in (one.value, one.limit))
-    return f"{name}: {value} where {limit} is asked"
-
-
-def _shown(value: float, unit: str, currency: str) -> str:
-    if unit == currency:
-        return numbers.money(value, currency)
-    return numbers.si_quantity(value, "" if unit == "1" else unit)
+    return f"{name}: {numbers.held(one.value, one)} where {numbers.limit(one)} is asked"
 
 
 def _chart(

@@ -143,10 +143,12 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     if design is not None and design.cost is not None:
         currency = verdict_tables.currency_of(verdict)
         facts.append(("Price", numbers.money(design.cost, currency)))
-    target = verdict_figures.lowest_limit(verdict, "accuracy")
+    target = verdict_figures.tightest_limit(verdict, "accuracy")
     if verdict.syncline is not None:
-        of = f" of {numbers.length(target)}" if target else ""
-        facts.append(("Syncline error", numbers.length(verdict.syncline.total_m) + of))
+        error = verdict.syncline.total_m
+        if target is not None:
+            shown = f"{numbers.held(error, target)} of {numbers.limit(target)}"
+        facts.append(("Syncline error", numbers.length(error) if target is None else shown))
     figures = verdict.figures
     if figures is not None and figures.quantile95_3d_m is not None:
         facts.append(("95 % of errors within", numbers.length(figures.quantile95_3d_m)))
@@ -248,8 +250,9 @@ def _simulation(verdict: Verdict) -> list[Node]:
     if monte_carlo is None:
         return []
     told = (certificate(monte_carlo), ensemble(monte_carlo), BEYOND)
+    target = verdict_figures.tightest_limit(verdict, "accuracy")
     return [
-        Facts(tuple(simulation_facts(monte_carlo))),
+        Facts(tuple(simulation_facts(monte_carlo, target))),
         *(Text(text, quiet=True) for text in told),
         *show(quantiles(monte_carlo)),
     ]

@@ -19,8 +19,13 @@ BEYOND: Final = (
 )
 
 
-def simulation_facts(found: MonteCarlo) -> list[tuple[str, str]]:
-    """Samples, envelope, probability and worst case of a Monte Carlo part."""
+def simulation_facts(
+    found: MonteCarlo, asked: numbers.Limited | None = None
+) -> list[tuple[str, str]]:
+    """Samples, envelope, probability and worst case of a Monte Carlo part.
+
+    asked: the requirement whose limit is the target.
+    """
     facts = [
         ("Samples", numbers.count(found.samples)),
         ("Motion", ENVELOPES[found.envelope]),
@@ -32,7 +37,9 @@ def simulation_facts(found: MonteCarlo) -> list[tuple[str, str]]:
     within, worst = found.probability_within_target, found.worst_case
     if within is not None:
         low, high = (numbers.percent(end, 5) for end in (within.low, within.high))
-        label = f"Within the target of {numbers.length(within.target_m)}"
+        is_its = asked is not None and asked.limit == within.target_m
+        target = numbers.limit(asked) if asked and is_its else numbers.length(within.target_m)
+        label = f"Within the target of {target}"
         facts.append((label, f"{numbers.percent(within.value, 5)} (95 %: {low} to {high})"))
     ratio = numbers.percent(worst.ratio_to_syncline)
     return [

@@ -14,14 +14,21 @@ from syncline_design.report.words import PRIMITIVES
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
     from syncline_design.verdict.named import CloudDesign
-    from syncline_design.verdict.tree import SynclineFigures, Verdict
+    from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
 # What draws is imported where it draws: ElementTree and matplotlib hide behind it.
 
 
+def tightest_limit(verdict: Verdict, kind: str) -> RequirementResult | None:
+    """The requirement with the tightest limit of a kind."""
+    rows = (row for row in verdict.requirements if row.kind == kind)
+    return min(rows, key=lambda row: row.limit, default=None)
+
+
 def lowest_limit(verdict: Verdict, kind: str) -> float | None:
     """The tightest limit of a kind."""
-    return min((row.limit for row in verdict.requirements if row.kind == kind), default=None)
+    row = tightest_limit(verdict, kind)
+    return None if row is None else row.limit
 
 
 def syncline_chart(verdict: Verdict) -> list[Node]:

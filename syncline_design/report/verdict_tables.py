@@ -38,8 +38,8 @@ def requirements(verdict: Verdict) -> Table:
             Cell(row.id),
             Cell(state.word, tone=state.tone, mark=state.mark),
             kind_text(row),
-            Cell(numbers.in_unit(row.value, row.unit), row.value),
-            Cell(numbers.in_unit(row.limit, row.unit), row.limit),
+            Cell(numbers.held(row.value, row), row.value),
+            Cell(numbers.limit(row), row.limit),
             Cell(margin_text(row), relative_margin(row)),
             f"line {row.line}" if row.line and not row.implied else "implied",
             "; ".join(note for note in notes if note),
@@ -76,7 +76,7 @@ def since(verdict: Verdict) -> Table | None:
 def _both(row: RequirementResult | Earlier | None) -> str:
     if row is None:
         return "-"
-    return f"{numbers.in_unit(row.value, row.unit)} / {numbers.in_unit(row.limit, row.unit)}"
+    return f"{numbers.held(row.value, row)} / {numbers.limit(row)}"
 
 
 def _interval(row: RequirementResult, verdict: Verdict) -> str:
@@ -85,7 +85,7 @@ def _interval(row: RequirementResult, verdict: Verdict) -> str:
     if numbers.finite(row.high) is None:
         return ""
     confidence = numbers.percent(verdict.monte_carlo.confidence)
-    ends = f"{numbers.in_unit(row.low, row.unit)} to {numbers.in_unit(row.high, row.unit)}"
+    ends = f"{numbers.held(row.low, row)} to {numbers.held(row.high, row)}"
     return f"{confidence} interval, over all looks at the decision, {ends}"
 
 

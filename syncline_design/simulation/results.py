@@ -14,6 +14,7 @@ from syncline_design import __version__
 from syncline_design.effects.record import Array
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.records import Named, Record, Unbounded, optional
+from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.simulation.distribution import Binned, Values
 from syncline_design.simulation.settings import Envelope
 
@@ -203,8 +204,9 @@ def worst_case(
     of_nothing = 1.0 if value_m == 0.0 else math.inf
     ratio = value_m / syncline_m if syncline_m > 0.0 else of_nothing
     gap = 1.0 - value_m / bound_m if bound_m > 0.0 else 0.0
+    shift = format_quantity(tau_s, Dimension.TIME)
     text = (
-        f"With every sensor at one sigma, relative time shifts up to {tau_s:.4g} s (and what known "
+        f"With every sensor at one sigma, relative time shifts up to {shift} (and what known "
         f"effects add), tilt up to {math.degrees(tilt_rad):.3g} deg, and known effects at what "
         f"they are charged, nothing exceeds the bound; what was found is {100 * gap:.2g} % below it"
     )

@@ -159,6 +159,17 @@ class Requirement(FileRecord):
             raise refusal("out of range", "between 0 and 1, such as 0.95", number.text)
         return number
 
+    @property
+    def limit_written(self) -> str | None:
+        """The limit as it was written, `0.30 m`.
+
+        None of an amount of money, of a bare number, and where it varies with the distance.
+        """
+        limit = self.limit
+        if self.kind in ("sync", "cost") or type(limit) is not Quantity or not limit.text:
+            return None
+        return " ".join(limit.text.split())
+
     @model_validator(mode="after")
     def _keys_fit_kind(self) -> Requirement:
         own = KEYS_OF.get(self.kind, ())

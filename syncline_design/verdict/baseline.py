@@ -63,7 +63,7 @@ def _rows(verdict: Verdict, before: Verdict) -> Iterator[RequirementSince]:
 
 
 def _earlier(row: RequirementResult) -> Earlier:
-    return Earlier(row.status, row.value, row.limit, row.unit)
+    return Earlier(row.status, row.value, row.limit, row.unit, row.limit_written)
 
 
 def _without_design(verdict: Verdict, before: Verdict, row: RequirementResult) -> Since:

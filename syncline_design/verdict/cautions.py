@@ -12,6 +12,7 @@ from syncline_design.model.budget import differs
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
+from syncline_design.model.written import beside, limit_as_written
 from syncline_design.simulation.ensemble import outside_words
 from syncline_design.spec.case import Case, figures_due
 from syncline_design.spec.gnss import has_gnss
@@ -71,6 +72,17 @@ def _length(value: float) -> str:
     return format_quantity(value, Dimension.LENGTH)
 
 
+def _limit(row: RequirementResult) -> str:
+    written = limit_as_written(row.limit_written, row.limit, row.unit)
+    return _length(row.limit) if written is None else written
+
+
+def _held(value: float, row: RequirementResult) -> str:
+    """A length in the unit of the limit beside it."""
+    written = limit_as_written(row.limit_written, row.limit, row.unit)
+    return _length(value) if written is None else beside(written, value, row.unit)
+
+
 def _tightest_kept(verified: Verified) -> RequirementResult | None:
     """The tightest accuracy limit that is kept: a failed one says enough itself."""
     kept = (r for r in verified.requirements if r.kind == "accuracy" and r.status == "pass")
@@ -83,9 +95,10 @@ def _worst_case(verified: Verified) -> Iterator[Caution]:
     if worst is not None and tightest is not None and not worst <= tightest.limit:
         yield Caution(
             "worst-case-above-limit",
-            f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet with every sensor "
+            f"{tightest.id}: the Syncline keeps {_limit(tightest)}, yet with every sensor "
             "at one sigma and every timestamp within its own bound the certified worst case is "
-            f"{_length(worst)}: the Syncline leaves out what lever arms, tilt and scatter add",
+            f"{_held(worst, tightest)}: the Syncline leaves out what lever arms, tilt and scatter "
+            "add",
             requirement=tightest.id,
         )
 
@@ -96,9 +109,9 @@ def _quantile(verified: Verified, figures: ErrorFigures) -> Iterator[Caution]:
     if quantile is not None and tightest is not None and not quantile <= tightest.limit:
         yield Caution(
             "quantile-above-limit",
-            f"{tightest.id}: the Syncline keeps {_length(tightest.limit)}, yet in the worst "
-            f"situation only errors up to {_length(quantile)} make up 95 %: the Syncline adds "
-            "one-sigma figures, which normal noise exceeds",
+            f"{tightest.id}: the Syncline keeps {_limit(tightest)}, yet in the worst "
+            f"situation only errors up to {_held(quantile, tightest)} make up 95 %: the Syncline "
+            "adds one-sigma figures, which normal noise exceeds",
             requirement=tightest.id,
         )
 

@@ -47,7 +47,9 @@ def explained(
 ) -> tuple[ExplainedRequirement, ...]:
     """Requirements worked out by hand."""
     return tuple(
-        ExplainedRequirement(row.id, row.kind, row.limit, row.unit, tuple(_steps(worked, row)))
+        ExplainedRequirement(
+            row.id, row.kind, row.limit, row.unit, tuple(_steps(worked, row)), row.limit_written
+        )
         for row in rows
     )
 

@@ -140,4 +140,7 @@ def placed(
         today = settings.today or date.today()
         given = requirement.waiver
         waiver = WaiverResult(given.reason, given.expires, not given.holds_on(today))
-    return replace(result, line=line, column=column, note=note, waiver=waiver)
+    return replace(
+        result, line=line, column=column, note=note, waiver=waiver,
+        limit_written=requirement.limit_written,
+    )  # fmt: skip

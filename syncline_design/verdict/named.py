@@ -219,6 +219,7 @@ class MissedLimit(Record):
     value: float
     limit: float
     unit: str
+    limit_written: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -305,3 +306,4 @@ class ExplainedRequirement(Record):
     limit: float
     unit: str
     steps: tuple[ExplainedStep, ...]
+    limit_written: str | None = optional()

@@ -45,7 +45,8 @@ def _of(case: Case, problem: Problem, fixes: Sequence[Fix], build: Build) -> Nea
     cost, mass, power = (
         None if a is None else float(a) for a in (sums.cost, sums.mass, sums.power)
     )
-    misses = tuple(_missed(fix, sums) for fix in fixes)
+    written = {one.id: one.limit_written for one in case.spec.requirements}
+    misses = tuple(_missed(fix, sums, written.get(fix.requirement or "")) for fix in fixes)
     shown = full_design(moved, eased, design)
     return Nearest(cost, mass, power, sums.error_m, misses, shown, _front(problem))
 
@@ -58,12 +59,12 @@ def _move(case: Case, fix: Fix) -> Move:
     return found, fix.from_ or 0.0, Quantity(to, "", None, currency)
 
 
-def _missed(fix: Fix, sums: Evaluation) -> MissedLimit:
+def _missed(fix: Fix, sums: Evaluation, written: str | None) -> MissedLimit:
     """What the design reaches; of what is no sum, the limit that was shown to do."""
     reached = {"accuracy": sums.error_m, "cost": sums.cost, "mass": sums.mass, "power": sums.power}
     value = reached.get(fix.kind)
     shown = (fix.to or 0.0) if value is None else float(value)
-    return MissedLimit(fix.requirement, fix.kind, shown, fix.from_ or 0.0, fix.unit or "")
+    return MissedLimit(fix.requirement, fix.kind, shown, fix.from_ or 0.0, fix.unit or "", written)
 
 
 def _front(problem: Problem) -> tuple[PricedError, ...]:

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
-from syncline_design.machine.records import Record
-
-if TYPE_CHECKING:
-    pass
+from syncline_design.machine.records import Record, optional
 
 Since = Literal["worse", "better", "same", "new", "gone"]
 
@@ -21,6 +18,7 @@ class Earlier(Record):
     value: float | None
     limit: float
     unit: str
+    limit_written: str | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,7 +71,8 @@ class RequirementResult(Record):
 
     line, column: its place in the spec, None of one that no one wrote; quantile, low, high: of a
     simulated one, with the interval of its value; axis: of the error that an rmse or a quantile
-    limits; at_distance_m: range of the last stage that the value is for.
+    limits; at_distance_m: range of the last stage that the value is for; limit_written: the limit
+    in the unit and with the decimals that the spec has, where it has a unit of its own.
     """
 
     id: str
@@ -91,6 +92,7 @@ class RequirementResult(Record):
     axis: str | None = optional()
     at_distance_m: float | None = optional()
     waiver: WaiverResult | None = optional()
+    limit_written: str | None = optional()
 
     @property
     def is_waived(self) -> bool:
