@@ -171,7 +171,7 @@ def test_check_takes_a_baseline_in_every_format(tmp_path: Path) -> None:
         "-o", f"sarif:{tmp_path / 's.json'}", "-o", f"html:{tmp_path / 'p.html'}",
     )  # fmt: skip
     assert code == 0
-    assert "447.4 mm / 250 mm" in said
+    assert "0.4474 m / 0.25 m" in said
     assert "nothing got worse" in said
     suite = ElementTree.parse(tmp_path / "j.xml").getroot()
     assert (suite.get("failures"), suite.get("skipped")) == ("0", "2")

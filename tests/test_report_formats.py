@@ -151,7 +151,7 @@ def test_junit_fails_where_the_verdict_fails() -> None:
     assert failure is not None
     value = samples.failing().requirements[0].value
     assert value is not None
-    assert f"{1000.0 * value:.4g}\u00a0mm" in failure.attrib["message"]
+    assert f"{100.0 * value:.4g}\u00a0cm" in failure.attrib["message"]
     assert f"specs/uav_corridor.yaml:{line}:5" in (failure.text or "")
 
 
