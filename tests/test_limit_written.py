@@ -35,7 +35,7 @@ def accuracy(verdict: Verdict) -> RequirementResult:
 
 
 def plain(text: str) -> str:
-    return text.replace("\N{NO-BREAK SPACE}", " ")
+    return text.replace("\N{NO-BREAK SPACE}", " ").replace("\\u00a0", " ")
 
 
 @pytest.mark.parametrize("limit", ["0.250 m", "25.0 cm", "2500 mm"])
