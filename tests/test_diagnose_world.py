@@ -16,7 +16,6 @@ from tests.world import CHAIN, Hidden, Noise, WorldLog, hidden, make_log, scenar
 from tests.world.streams import write_streams
 
 Document = dict[str, Any]
-EXAMPLES = Path(__file__).parents[1] / "examples"
 PLATFORMS = ("multirotor_lines", "fixed_wing_circuits", "car_stops", "vessel_figure_eights")
 
 
@@ -117,15 +116,3 @@ def test_a_chain_names_the_stage(tmp_path: Path) -> None:
     first = document["findings"][0]
     assert ("latency", "attitude") in named(first)
     assert first["stage"] == "auv"
-
-
-def test_the_example_tells_its_story() -> None:
-    files = [EXAMPLES / "hidden_latency.csv"]
-    document = diagnose(EXAMPLES / "hidden_latency.yaml", files, DiagnosisSettings()).to_json()
-    assert document["verdict"] == "explained"
-    (finding,) = document["findings"]
-    assert (finding["effect"], finding["sensor"]) == ("latency", "position")
-    found = finding["parameters"]["latency_s"]
-    assert abs(found["value"] - 0.087) < 5.0 * found["standard_uncertainty"]
-    assert found["standard_uncertainty"] < 0.5e-3
-    assert document["gap"]["closed_fraction"] > 0.95

@@ -8,6 +8,7 @@ from tests.world import hidden, make_log, scenario
 from tests.world.worldlog import spec_text
 
 SEED = 20
+REPAIRED_SEED = 21
 FOLDER = Path(__file__).parents[2] / "examples"
 COMMENT = """\
 # A multirotor that surveys along lines over ground targets: RTK GNSS, INS and laser scanner.
@@ -25,6 +26,9 @@ def write(folder: Path = FOLDER) -> None:
     (folder / "hidden_latency.yaml").write_text(
         COMMENT + spec_text(run, limit_m=0.30), encoding="utf-8"
     )
+    # the same vehicle on another day, with nothing hidden
+    repaired = scenario("multirotor_lines", REPAIRED_SEED, 300.0, 5.0)
+    make_log(repaired).to_csv(folder / "hidden_latency_repaired.csv", coarser=1)
 
 
 if __name__ == "__main__":
