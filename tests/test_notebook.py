@@ -87,6 +87,25 @@ def test_what_a_user_wrote_stays_text(tmp_path: Path) -> None:
     Words(drawn)
 
 
+def test_a_simulation_is_drawn_with_its_figures() -> None:
+    found = sd.simulate(ROOT / "specs" / "position_track.yaml", samples=2000)
+    drawn = Words(found._repr_html_() or "")
+    # the ratio by hand from the figures themselves
+    worst = found.monte_carlo.worst_case
+    assert f"{100 * worst.value_m / worst.syncline_m:.4g} % of the Syncline" in drawn.text
+    assert "known effects of the spec, if any" in drawn.text
+    assert drawn.tags >= {"table", "svg"}
+    assert "script" not in drawn.tags
+
+
+def test_whatever_a_function_of_the_package_returns_can_be_drawn() -> None:
+    """By what the functions say they return, except for a spec that was only read."""
+    functions = [getattr(sd, name) for name in sd.__all__ if name[0].islower()]
+    returned = {f.__annotations__["return"] for f in functions if f.__name__ != "load"}
+    assert len(returned) >= 12
+    assert returned <= set(notebook._MAKERS)
+
+
 def test_results_without_a_picture_fall_back_to_their_repr() -> None:
     case = sd.load(ROOT / "specs" / "position_track.yaml")
     assert notebook.shown(case) is None

@@ -15,6 +15,7 @@ from jsonschema import Draft202012Validator
 from scipy.stats import multivariate_normal
 from typer.testing import CliRunner, Result
 
+import syncline_design as sd
 from syncline_design.campaign.changes import REACH, Changes, weight_of
 from syncline_design.campaign.kept import Named, Run, date_of, statistics_of
 from syncline_design.campaign.pool import pool_of
@@ -227,6 +228,11 @@ def test_two_changes_are_two_alarms(spec: Path, tmp_path: Path) -> None:
     store = kept(spec, tmp_path, [run_of(one, day) for day, one in enumerate(found)])
     alarms = {a["effect"]: a["since"]["run"] for a in told(spec, store, tmp_path, 1)["alarms"]}
     assert alarms == {"latency": 7, "range_bias": 10}
+    drawn = sd.watch(store, spec)._repr_html_() or ""  # as a notebook asks
+    named = [drawn.count(f"day{day}.csv") for day in range(12)]
+    assert min(named[6], named[9]) > max(named[:6])  # where the changes began is told besides
+    assert "<svg" in drawn
+    assert "<script" not in drawn
 
 
 def test_what_differs_from_run_to_run_does_not_ring_for_ever(spec: Path, tmp_path: Path) -> None:

@@ -28,9 +28,11 @@ _MAKERS: Final = {
     "Optimisation": (_HERE, "on_optimisation"),
     "PlanRun": (f"{_REPORT}.on_plan", "on_plan"),
     "Reproduction": (f"{_REPORT}.on_paper", "on_paper"),
+    "Simulation": (f"{_REPORT}.on_simulation", "on_simulation"),
     "StudyResult": (f"{_REPORT}.on_study", "on_study"),
     "TimingAndSpec": (f"{_REPORT}.on_timing", "on_timing"),
     "Verdict": (f"{_REPORT}.on_verdict", "on_verdict"),
+    "Watch": (f"{_REPORT}.on_watch", "on_watch"),
 }
 
 

@@ -43,8 +43,11 @@ if TYPE_CHECKING:
 GRID_COLUMNS: Final = ("tau_s", "worst_case_m", "syncline_m", "ratio", "bound_m", "gap", "reason")
 
 
-def on_simulation(result: Simulation, system: System) -> Document:
-    """A simulated system as a document; no verdict is due here."""
+def on_simulation(result: Simulation, system: System | None = None) -> Document:
+    """A simulated system as a document; no verdict is due here.
+
+    system: what was simulated; without it the known effects that acted are not listed.
+    """
     name = result.spec.name if result.spec is not None else "Simulated system"
     file = result.spec.file if result.spec is not None else ""
     where = f", along {result.trajectory}" if result.trajectory else ""
@@ -78,16 +81,20 @@ def _outcome(grid: tuple[ComparisonRow, ...]) -> Outcome:
     return Outcome("muted", "\u2192", f"Worst case {ends} of the Syncline")
 
 
-def _grid(result: Simulation, system: System) -> list[Node]:
-    worst = result.monte_carlo.worst_case
+def _own_tau(system: System | None) -> str:
+    """Where the worst case beside the grid stands; known effects act there where there are any."""
+    if system is None:
+        return "At the \u03c4 of the timestamps, known effects of the spec, if any, besides"
     # a known latency is no timestamp error here, while it is part of the tau that `check` tells
-    own = (
-        "At the \u03c4 of the timestamps, known effects besides"
-        if system.effects
-        else ("At the system's own \u03c4")
-    )
+    if system.effects:
+        return "At the \u03c4 of the timestamps, known effects besides"
+    return "At the system's own \u03c4"
+
+
+def _grid(result: Simulation, system: System | None) -> list[Node]:
+    worst = result.monte_carlo.worst_case
     said = (
-        f"{own}, {numbers.time(worst.tau_s)}: "
+        f"{_own_tau(system)}, {numbers.time(worst.tau_s)}: "
         f"{numbers.length(worst.value_m)}, {numbers.percent(worst.ratio_to_syncline, 4)} of the "
         f"Syncline's {numbers.length(worst.syncline_m)}. " + certificate(result.monte_carlo)
     )
@@ -157,8 +164,9 @@ def _errors(result: Simulation) -> list[Node]:
     ]  # fmt: skip
 
 
-def _effects(system: System) -> list[Node]:
-    entries = [(code(e.effect), " of the ", given(e.sensor), " sensor") for e in system.effects]
+def _effects(system: System | None) -> list[Node]:
+    known = () if system is None else system.effects
+    entries = [(code(e.effect), " of the ", given(e.sensor), " sensor") for e in known]
     return [Items(tuple(entries))] if entries else []
 
 
