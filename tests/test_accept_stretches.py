@@ -16,6 +16,7 @@ import pytest
 from syncline_design.comparison.accept import AcceptSettings, accept
 from syncline_design.comparison.acceptance import AssumptionResult
 from syncline_design.diagnosis.candidates import Signature, candidates, signatures
+from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.limits import beyond_limits
 from syncline_design.diagnosis.noise import first_guess
@@ -266,3 +267,72 @@ def test_speed_beyond_the_limit_for_a_while_is_broken(tmp_path: Path) -> None:
     assert found.least > 1.01 * limit
     assert found.low <= float(np.max(speed)) * 1.001
     assert 0.0 < found.share(1.01 * limit) <= float(np.mean(speed > limit)) + 0.05
+
+
+def louder(folder: Path, run: Scenario, factor: float, part: tuple[float, float]) -> Path:
+    """A log whose positions scatter so many times as much in a part of it; nothing else."""
+    spec, log = files(folder, run)
+    sound = log.read_text("utf-8").splitlines()
+    noisy = make_log(run, (hidden("noise_understated", "position", factor=factor),))
+    other = noisy.to_csv(folder / "noisy.csv").read_text("utf-8").splitlines()
+    first, last = (1 + int(share * (len(sound) - 1)) for share in part)
+    log.write_text("\n".join([*sound[:first], *other[first:last], *sound[last:]]) + "\n", "utf-8")
+    return spec
+
+
+@pytest.mark.parametrize(
+    ("seed", "factor", "part"), [(202, 6.0, (0.17, 0.67)), (205, 8.0, (0.5, 0.6))]
+)
+def test_a_noisy_while_is_no_delay_and_no_arm(
+    seed: int, factor: float, part: tuple[float, float], tmp_path: Path
+) -> None:
+    """Nobody has told the scan where the positions scatter more: what is beside a window does."""
+    run = world("multirotor_lines", seed)
+    spec = louder(tmp_path, run, factor, part)
+    assert not [one for one in seen(spec, tmp_path / "log.csv").stands if one.sure]
+
+
+def test_a_known_noisy_while_is_weighed_as_noisy_as_it_is(tmp_path: Path) -> None:
+    """Everything six times as noisy for half of the log: what shows is as much larger."""
+    run = world("multirotor_lines", 202)
+    spec, log = files(tmp_path, run)
+    lines = log.read_text("utf-8").splitlines()
+    noisy = make_log(run, (), Noise(scale=6.0)).to_csv(tmp_path / "noisy.csv")
+    first, last = len(lines) // 6, 2 * len(lines) // 3
+    lines[first:last] = noisy.read_text("utf-8").splitlines()[first:last]
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n", "utf-8")
+    data, _, found = settled(spec, tmp_path / "log.csv")
+    while_s = float(data.structure.time_s[first - 1]), float(data.structure.time_s[last - 2])
+    whose = [white.sensor for white in data.structure.white]
+    known = with_episodes(data, tuple(Episode(w, *while_s, 6.0, 0.1, 100.0) for w in whose))
+    fitted = fit(known, start=first_guess(known.structure))
+    seen_there = stretches(known, fitted, found)
+    assert not seen_there.stands
+    sound = seen(*files(tmp_path, run)).reaches
+    sizes = [
+        {(r.label, r.parameter): r.sizes[2] for r in one} for one in (sound, seen_there.reaches)
+    ]
+    key = (("lever_arm", "position", 0), "x_m")
+    assert sizes[1][key] == pytest.approx(6.0 * sizes[0][key], rel=0.25)
+
+
+@pytest.mark.parametrize("seed", [209])
+def test_long_tails_are_no_fault_of_a_stretch(seed: int, tmp_path: Path) -> None:
+    """Student's t of 5 degrees of freedom, of the spec's standard deviation: a sound log."""
+    run = world("multirotor_lines", seed)
+    assert not seen(*files(tmp_path, run, (), Noise(family="student"))).stands
+
+
+def test_stamps_that_run_away_break_the_delay_they_make(tmp_path: Path) -> None:
+    """400 ppm over 40 s are 16 ms, at some metres a second; whether timing is asked or not."""
+    run = world("multirotor_lines", 5, 40.0, 4.0)
+    spec, log = files(tmp_path, run, (hidden("clock_drift", "position", rate=4e-4),))
+    answer = accept(load(spec), [log], AcceptSettings(("latency",)))
+    rows = {(row.role, row.assumption): row for row in answer.assumptions}
+    row = rows["position", "latency"]
+    assert row.status == "broken", row
+    assert row.measured is not None
+    assert row.measured.low is not None
+    assert row.measured.high is not None
+    assert row.measured.low < -4e-4 * 40.0 * 39.75 / 40.0 < row.measured.high
+    assert [key for key, one in rows.items() if one.status == "broken"] == [("position", "latency")]

@@ -9,6 +9,7 @@ from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.by_shift import by_shifts, shifts, widened
 from syncline_design.comparison.by_stretch import SPOKEN_OF, InStretches, amount
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper, size_of
@@ -82,11 +83,14 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     standing = log.parts.standing(one)
     if breaking or (standing is not None and standing.status == "broken"):
         return _broken(one, breaking, standing, _noise_figure(one, log))
+    shifted = by_shifts(one, shifts(one, log.found), log.paper)
+    if shifted is not None and shifted.status == "broken":
+        return shifted
     doubt = _doubt(one, log)
     if doubt:
         return Judgement("not_shown", doubt)
-    if standing is not None:
-        return standing
+    if (unclear := standing or shifted) is not None:
+        return unclear
     undone = list(log.parts.undone(one))
     if undone:
         return Judgement("not_shown", f"not told apart on this log: {'; '.join(undone)}")
@@ -219,6 +223,8 @@ def _nothing_found(one: Assumed, log: LogEvidence) -> Judgement:
 def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
     """Holds, and says how long what turns the verdict would have had to act to show."""
     alone = _ALONE[one.name]
+    if moved := shifts(one, log.found):
+        figure = widened(figure, moved)
     least = log.parts.least_s(one)
     if least is None:
         words = f"not found, and this log would have shown what turns the verdict{alone}"

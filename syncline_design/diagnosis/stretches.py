@@ -2,12 +2,14 @@
 
 Every candidate is asked in windows of several lengths, at every place:
     e = X b + w inside the window,   b = (X' W X)^-1 X' W e,
-W the inverse of the spec's white noise, and its square b' (X' W X) b is held against the noise that
-the log itself has at that length: the median of the squares of short windows over that of
-chi-square, which a fault of a stretch does not raise, grown with the length as in logs drawn from
-the fitted noise, and at least what the median of such windows shows beyond chance; and against
-what the candidate leaves in the window, which outliers raise.  A window pays for the lengths and
-for the places of its length (Bonferroni).
+W the inverse of the spec's white noise, as loud as the episodes found in the log make it, and its
+square b' (X' W X) b is held against the noise that the log itself has at that length: the median of
+the squares of short windows over that of chi-square, which a fault of a stretch does not raise,
+grown with the length as in logs drawn from the fitted noise, and at least what the median of such
+windows shows beyond chance; and against what the candidate leaves in the window, which outliers
+raise, and what is left beside it, which a louder while raises.  No window stands out by one of its
+blocks alone: the square is the least that is left without any one of them, so that the tails of a
+sensor are no fault.  A window pays for the lengths and for the places of its length (Bonferroni).
 Sources: median of squares as a robust variance: Huber, Robust Statistics (1981), ch. 5; windows of
 all lengths, each paying for its own number: Duembgen and Spokoiny, Ann. Statist. 29 (2001).
 """
@@ -16,36 +18,44 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
-from scipy.stats import chi2, f
+from scipy.stats import chi2
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, commonness, zero_values
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.diagnosis.fitting import Data, Model, adjusted
-from syncline_design.diagnosis.noise import as_specified, precision, white_covariance
+from syncline_design.diagnosis.noise import (
+    NoiseLevel,
+    Structure,
+    as_specified,
+    precision,
+    white_covariance,
+)
 from syncline_design.diagnosis.scores import clean_errors
 from syncline_design.diagnosis.spans import Span, cut_to, cuttable
+from syncline_design.diagnosis.stretch_windows import (
+    ALONE,
+    DOUBT,
+    LEAST_ROWS,
+    PLACES,
+    Sums,
+    Windows,
+    cumulated,
+    scanned,
+)
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 
 MOST_BLOCKS: Final = 1200  # that windows are made of; of a longer log several rows each
-LEAST_ROWS: Final = 3  # of a window
-GROWTH: Final = math.sqrt(2.0)  # from one length to the next
-LONGEST: Final = 0.5  # of the log; what acts longer than that is looked for by the search
 DRAWS: Final = 6  # logs drawn from the fitted noise
 STREAM: Final = 23  # key of their draws
-FEW: Final = 8.0  # windows side by side, below which their median says nothing
-MEDIAN_SPREAD: Final = 2.33  # of the median of m squares of a normal, relative: over root m
-PLACES: Final = 3.0  # windows that differ, for one that does not overlap
-DOUBT: Final = 0.005  # chance that a sound log has such a window, of one candidate: a doubt
 SURE: Final = 1e-4  # the same: it acts there
 NEARLY_ALL: Final = 1.6449  # standard deviations below which 5 % lie
 NEARLY_ALL_PLACES: Final = 0.05  # of the windows show less than is told
 AS_GOOD_NATS: Final = 4.5  # within which candidates of a window are not told apart
-LOUDER: Final = 1.5  # variance in a window over the usual one, up to which it is usual
 ASKED: Final = ("latency", "lever_arm", "mounting")  # kinds of assumptions
 Label = tuple[str, str, int]
 
@@ -95,16 +105,6 @@ class Stretches:
 
 
 @dataclass(frozen=True, slots=True)
-class _Windows:
-    """Windows of one length in blocks: their log p, and what is needed to tell more of the best."""
-
-    length: int
-    log_p: Array  # (k,) paid for
-    scale2: float
-    alone: Array  # (k, p) information on each parameter alone
-
-
-@dataclass(frozen=True, slots=True)
 class _Hit:
     """A window in which something stands out, and the noise at its length."""
 
@@ -124,25 +124,6 @@ class _Fit:
     spreads: tuple[float, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Sums:
-    """Sums up to each block (B + 1, ...): X'WX, X'We of the remainder and of drawn ones, e'We and
-    components compared; blocks' ends."""
-
-    normal: Array
-    score: Array
-    square: Array
-    count: Array
-    first: Array
-    time_s: Array
-
-    def inside(self, length: int) -> tuple[Array, Array, Array, Array]:
-        """The same of every window of so many blocks."""
-        parts = (self.normal, self.score, self.square, self.count)
-        found = tuple(part[length:] - part[:-length] for part in parts)
-        return found[0], found[1], found[2], found[3]
-
-
 def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int = 0) -> Stretches:
     """Every candidate of a settled model's log in every window."""
     asked = [s for s in found if _asked(s)]
@@ -154,7 +135,7 @@ def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int = 
     reaches: list[ShownSize] = []
     for s in asked:
         sums = _summed(data, whitened, s)
-        windows = list(_scanned(sums, s.columns.shape[2]))
+        windows = list(scanned(sums, s.columns.shape[2]))
         hits += _hits(sums, windows)
         if s.candidate.effect.breaks in ASKED:
             reaches += _reaches(data, s, sums, windows)
@@ -166,12 +147,17 @@ def _asked(s: Signature) -> bool:
     return s.plain and effect.asked_in_stretches and cuttable(effect)
 
 
+def _as_loud(structure: Structure, model: Model) -> NoiseLevel:
+    """The spec's white noise, larger where the log has episodes of it, and along the motion."""
+    return replace(as_specified(structure), episodes=True, size=model.level.size)
+
+
 def _whitened(data: Data, drawn: Array, model: Model) -> tuple[Array, Array]:
     """Root of W (n, 3, 3), zero where nothing is compared; the whitened remainder and drawn ones
     (1 + draws, n, 3)."""
     axes = np.isin(np.arange(3), list(data.axes))
     known = np.isfinite(data.view.log.truth_m) & axes
-    covariance = white_covariance(data.structure, as_specified(data.structure))
+    covariance = white_covariance(data.structure, _as_loud(data.structure, model))
     hidden = ~known
     covariance = np.where(hidden[:, :, None] | hidden[:, None, :], 0.0, covariance)
     covariance += np.eye(3) * hidden[:, None, :]
@@ -180,7 +166,7 @@ def _whitened(data: Data, drawn: Array, model: Model) -> tuple[Array, Array]:
     return root, np.einsum("nij,dnj->dni", root, every)
 
 
-def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> _Sums:
+def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> Sums:
     root, error = whitened
     columns = root @ np.nan_to_num(s.columns)
     n = error.shape[1]
@@ -192,90 +178,22 @@ def _summed(data: Data, whitened: tuple[Array, Array], s: Signature) -> _Sums:
         np.sum(error[0] ** 2, axis=1),
         np.sum(np.any(root != 0.0, axis=2), axis=1).astype(float),
     )
-    normal, score, square, rows = (_cumulated(part, edges) for part in parts)
-    return _Sums(normal, score, square, rows, edges, data.view.log.time_s)
+    normal, score, square, rows = (cumulated(part, edges) for part in parts)
+    return Sums(normal, score, square, rows, edges, data.view.log.time_s)
 
 
-def _cumulated(part: Array, edges: Array) -> Array:
-    total = np.concatenate([np.zeros((1, *part.shape[1:])), np.cumsum(part, axis=0)])
-    found: Array = total[edges]
-    return found
-
-
-def _lengths(sums: _Sums) -> list[int]:
-    blocks = len(sums.first) - 1
-    least = max(1, math.ceil(LEAST_ROWS * blocks / sums.first[-1]))
-    found, length = [], float(least)
-    while length <= LONGEST * blocks:
-        found.append(round(length))
-        length *= GROWTH
-    return sorted(set(found))
-
-
-def _scanned(sums: _Sums, width: int) -> Iterator[_Windows]:
-    """All windows, length by length; the noise of a length is at least that of the shorter ones."""
-    lengths = _lengths(sums)
-    blocks = len(sums.first) - 1
-    middle = float(chi2.median(width))
-    base = floor2 = 0.0
-    for length in lengths:
-        normal, score, square, rows = sums.inside(length)
-        gains, seen = _gains(normal, score, width)
-        own = gains[:, 0]
-        shown = float(np.median(own[seen])) / middle if np.any(seen) else 1.0
-        drawn = float(np.mean(gains[seen, 1:])) / width if np.any(seen) else 1.0
-        base = base or shown / max(drawn, 1e-300)
-        count = blocks / length
-        doubt = 1.0 + 2.0 * MEDIAN_SPREAD / math.sqrt(width * count)
-        beyond = shown / doubt if count >= FEW else 0.0
-        floor2 = max(floor2, base * drawn, beyond)
-        freedom = np.maximum(rows - width, 1.0)
-        left = np.maximum(square - own, 0.0) / freedom
-        usual = float(np.median(left[seen])) if np.any(seen) else 1.0
-        louder = np.maximum(left / max(LOUDER * usual, 1e-300), 1.0)
-        log_p = _log_chi2(own / (floor2 * louder), width)
-        by_left = _log_f(own / (width * np.maximum(left, 1e-300)), width, freedom)
-        log_p = np.where(louder > 1.0, np.maximum(log_p, by_left), log_p)
-        charge = math.log(len(lengths) * PLACES * count)
-        log_p = np.where(seen, np.minimum(log_p + charge, 0.0), 0.0)
-        yield _Windows(length, log_p, floor2, np.einsum("kpp->kp", normal))
-
-
-def _log_chi2(square: Array, freedom: int) -> Array:
-    """log of the upper tail of chi-square, by its leading term where the library's underflows."""
-    found: Array = chi2.logsf(square, freedom)
-    return np.where(np.isfinite(found), found, -0.5 * square)
-
-
-def _log_f(share: Array, first: int, second: Array) -> Array:
-    """The same of F: -(n2 / 2) log(1 + n1 F / n2)."""
-    found: Array = f.logsf(share, first, second)
-    return np.where(np.isfinite(found), found, -0.5 * second * np.log1p(first * share / second))
-
-
-def _gains(normal: Array, score: Array, width: int) -> tuple[Array, Array]:
-    """b' M b of every window and log (k, 1 + draws), and whether all parameters are seen in it."""
-    diagonal = np.einsum("kpp->kp", normal)
-    scale = np.sqrt(np.maximum(diagonal, 1e-300))
-    scaled = normal / scale[:, :, None] / scale[:, None, :]
-    scaled = scaled + 1e-9 * np.eye(width)
-    right = np.swapaxes(score / scale[:, None, :], 1, 2)
-    values = np.linalg.solve(scaled, right)
-    typical = np.median(diagonal, axis=0)
-    seen = np.all(diagonal > 1e-6 * np.maximum(typical, 1e-300), axis=1)
-    return np.sum(values * right, axis=1), seen
-
-
-def _hits(sums: _Sums, windows: Sequence[_Windows]) -> Iterator[_Hit]:
+def _hits(sums: Sums, windows: Sequence[Windows]) -> Iterator[_Hit]:
     """The window in which a candidate is clearest, if that is at least a doubt."""
-    best = min(windows, key=lambda one: float(np.min(one.log_p)), default=None)
-    if best is None:
+    least = min((float(np.min(one.log_p)) for one in windows), default=0.0)
+    if least >= math.log(DOUBT):
         return
-    at = int(np.argmin(best.log_p))
-    log_p = float(best.log_p[at])
-    if log_p < math.log(DOUBT):
-        first, last = sums.first[at], sums.first[at + best.length] - 1
-        yield _Hit(float(sums.time_s[first]), float(sums.time_s[last]), log_p, best.scale2)
+    enough = math.log(SURE) if least < math.log(SURE) else math.log(DOUBT)
+    clear = [np.where(one.log_p < enough, one.clear, math.inf) for one in windows]
+    best, where = min(zip(windows, clear, strict=True), key=lambda pair: float(np.min(pair[1])))
+    at = int(np.argmin(where))
+    first, last = sums.first[at], sums.first[at + best.length] - 1
+    times = float(sums.time_s[first]), float(sums.time_s[last])
+    yield _Hit(*times, float(best.log_p[at]), best.scale2)
 
 
 def _stands(
@@ -297,7 +215,7 @@ def _named(data: Data, model: Model, asked: Sequence[Signature], hit: _Hit) -> S
     Each figure costs half of log N nat.  Of those within AS_GOOD_NATS the commonest is named,
     what comes and goes before what is built in.
     """
-    white = precision(data.structure, as_specified(data.structure))
+    white = precision(data.structure, _as_loud(data.structure, model))
     tried = (_fitted(data, model, white, s, hit) for s in asked)
     fits = [each for each in tried if each is not None]
     if not fits:
@@ -347,7 +265,7 @@ def _usual_gap_s(time_s: Array) -> float:
 
 
 def _reaches(
-    data: Data, s: Signature, sums: _Sums, windows: Sequence[_Windows]
+    data: Data, s: Signature, sums: Sums, windows: Sequence[Windows]
 ) -> Iterator[ShownSize]:
     """Size by length: sqrt(T) + 1.645 standard uncertainties, where nearly all places show it."""
     blocks = len(sums.first) - 1
@@ -358,7 +276,8 @@ def _reaches(
     for one in windows:
         charge = math.log(DOUBT) - math.log(len(windows) * PLACES * blocks / one.length)
         root = math.sqrt(float(chi2.isf(math.exp(charge), width))) + NEARLY_ALL
-        known = np.quantile(one.alone, NEARLY_ALL_PLACES, axis=0)
+        alone = 1.0 - 1.0 / one.length if one.length <= ALONE else 1.0
+        known = alone * np.quantile(one.alone, NEARLY_ALL_PLACES, axis=0)
         size = root * np.sqrt(one.scale2 / np.maximum(known, 1e-300))
         long_enough = duration_s * one.length / blocks > 2.0 * gap_s or one.length == 1
         sizes.append(np.where((known > 0.0) & long_enough, size, math.inf))

@@ -1,0 +1,100 @@
+"""What stamps that run away or step make of a sensor's delay.
+
+A clock that stamps a sensor's data and drifts by r makes them seem younger by r (t - t0), a step of
+s by s from then on: as long as it acts that is a delay, though the assumption it breaks first is
+that of the stamps or of the clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from syncline_design.comparison.acceptance import MeasuredFigure
+from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.by_stretch import amount
+from syncline_design.comparison.judgement import Judgement
+from syncline_design.comparison.on_paper import OnPaper
+from syncline_design.diagnosis.result import Diagnosis, Estimate, Finding
+from syncline_design.effects import registry
+
+OF_STAMPS: Final = ("timing", "clock")  # promises whose effects move the stamps themselves
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """The largest delay that one finding of stamps made on this log [s]; None: it says no size."""
+
+    finding: Finding
+    delay: MeasuredFigure | None
+
+
+def shifts(one: Assumed, found: Diagnosis) -> list[Shift]:
+    """Findings that move a sensor's stamps by what is no scatter; of `latency` rows alone."""
+    if one.name != "latency":
+        return []
+    own = [f for f in found.findings if f.stage == one.stage and _moves(f)]
+    whose = [f for f in own if one.role in (f.sensor, *(f.also or ()))]
+    return [Shift(f, _delay(f, found.log.duration_s)) for f in whose]
+
+
+def _moves(finding: Finding) -> bool:
+    effect = registry()[finding.effect]
+    known = effect.breaks in OF_STAMPS and effect.kind == "deterministic"
+    return known and finding.kind != "stand_in"
+
+
+def _delay(finding: Finding, duration_s: float) -> MeasuredFigure | None:
+    """stamp = true + rate (t - t0), or + step: the delay is less than none by as much."""
+    for name, lasts in (("rate", duration_s), ("step_s", 1.0)):
+        part = finding.parameters.get(name)
+        if part is not None:
+            return _scaled(part, -lasts)
+    return None
+
+
+def _scaled(part: Estimate, times: float) -> MeasuredFigure:
+    low, high = part.interval95 or (None, None)
+    ends = sorted(times * float(end) for end in (low, high) if end is not None)
+    return MeasuredFigure(times * float(part.value), *(ends if len(ends) == 2 else (None, None)))
+
+
+def by_shifts(one: Assumed, moved: Sequence[Shift], paper: OnPaper) -> Judgement | None:
+    """Broken by a delay that turns the verdict; not shown beside other material faults of stamps.
+
+    None where no stamps were found to run away or step, or that does not matter to the delay.
+    """
+    said = [j for each in moved if (j := _judged(one, each, paper)) is not None]
+    return next((j for j in said if j.status == "broken"), said[0] if said else None)
+
+
+def _judged(one: Assumed, shift: Shift, paper: OnPaper) -> Judgement | None:
+    finding, delay = shift.finding, shift.delay
+    if delay is not None and delay.value is not None:
+        words = (f"{finding.sentence}: on this log that is a delay of up to "
+                 f"{amount(delay.value, 's')}")  # fmt: skip
+        values = {"latency_s": delay.value}
+        if paper.turned("latency", one.role, one.stage, values):
+            return Judgement("broken", words, delay, finding.from_s, finding.to_s)
+        if finding.material:
+            words += ", which does not turn the verdict yet; what else may come is not shown"
+            return Judgement("not_shown", words, delay)
+        return None
+    if finding.material:
+        words = f"no delay is told apart from what its stamps do: {finding.sentence}"
+        return Judgement("not_shown", words)
+    return None
+
+
+def widened(figure: MeasuredFigure, moved: Sequence[Shift]) -> MeasuredFigure:
+    """An interval of a delay, with what slight drifts and steps of the stamps add to it."""
+    ends = [figure.low or 0.0, figure.high or 0.0, *_ends(moved)]
+    return MeasuredFigure(figure.value, min(ends), max(ends))
+
+
+def _ends(moved: Sequence[Shift]) -> Iterator[float]:
+    for each in moved:
+        if each.delay is not None:
+            yield from (end for end in (each.delay.value, each.delay.low, each.delay.high)
+                        if end is not None)  # fmt: skip
