@@ -9,18 +9,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
 from syncline_design.comparison.accept import AcceptSettings, accept
-from syncline_design.comparison.acceptance import AssumptionResult
+from syncline_design.comparison.acceptance import AssumptionResult, MeasuredFigure
+from syncline_design.comparison.assumptions import Assumed
+from syncline_design.comparison.by_shift import by_shifts, shifts, widened
+from syncline_design.comparison.judgement import Judgement
+from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.candidates import Signature, candidates, signatures
 from syncline_design.diagnosis.episodes import Episode, with_episodes
 from syncline_design.diagnosis.fitting import Data, Model, fit
 from syncline_design.diagnosis.limits import beyond_limits
 from syncline_design.diagnosis.noise import first_guess
 from syncline_design.diagnosis.noise_split import factors
+from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.diagnosis.run import prepared
 from syncline_design.diagnosis.stretches import Stretches, stretches
 from syncline_design.diagnosis.system import measured
@@ -336,3 +343,40 @@ def test_stamps_that_run_away_break_the_delay_they_make(tmp_path: Path) -> None:
     assert row.measured.high is not None
     assert row.measured.low < -4e-4 * 40.0 * 39.75 / 40.0 < row.measured.high
     assert [key for key, one in rows.items() if one.status == "broken"] == [("position", "latency")]
+
+
+def test_faults_of_stamps_speak_of_the_delay_they_make(tmp_path: Path) -> None:
+    """A step breaks or holds by its size, packets leave it open, jitter says nothing of it."""
+    spec, _ = files(tmp_path, world("multirotor_lines", 5, 40.0, 4.0))
+    case = load(spec)
+    stage = case.stages[-1].choice.name
+    one = Assumed(stage, "position", "latency", 0.0, ())
+    paper = OnPaper(case, ())
+
+    def found(effect: str, name: str, value: float, material: bool) -> Diagnosis:
+        part = SimpleNamespace(value=value, interval95=(0.9 * value, 1.1 * value))
+        finding = SimpleNamespace(
+            effect=effect, sensor="position", stage=stage, also=(), kind="cause", sentence="so",
+            parameters={name: part}, material=material, from_s=None, to_s=None,
+        )  # fmt: skip
+        log = SimpleNamespace(duration_s=100.0)
+        return cast(Diagnosis, SimpleNamespace(findings=(finding,), log=log))
+
+    def said(*what: str | float, material: bool = True) -> Judgement | None:
+        effect, name, value = what
+        own = shifts(one, found(str(effect), str(name), float(value), material))
+        return by_shifts(one, own, paper)
+
+    large, small = said("timestamp_step", "step_s", 0.5), said("clock_drift", "rate", 1e-12)
+    assert large is not None
+    assert (large.status, large.measured) == ("broken", MeasuredFigure(-0.5, -0.55, -0.45))
+    assert small is not None
+    assert small.status == "not_shown"
+    packets = said("packetised_timestamps", "interval_s", 0.02)
+    assert packets is not None
+    assert packets.status == "not_shown"
+    assert said("timestamp_jitter", "sigma_s", 0.02) is None
+    assert said("clock_drift", "rate", 1e-12, material=False) is None
+    slight = shifts(one, found("clock_drift", "rate", 1e-5, False))
+    wide = widened(MeasuredFigure(0.0, -1e-4, 1e-4), slight)
+    assert (wide.low, wide.high) == (pytest.approx(-1.1e-3), 1e-4)

@@ -41,8 +41,8 @@ def shifts(one: Assumed, found: Diagnosis) -> list[Shift]:
 
 def _moves(finding: Finding) -> bool:
     effect = registry()[finding.effect]
-    known = effect.breaks in OF_STAMPS and effect.kind == "deterministic"
-    return known and finding.kind != "stand_in"
+    moves = effect.breaks in OF_STAMPS and effect.sensitivity is not None  # not jitter: mean zero
+    return moves and finding.kind != "stand_in"
 
 
 def _delay(finding: Finding, duration_s: float) -> MeasuredFigure | None:
