@@ -20,6 +20,7 @@ from syncline_design.diagnosis.result import Diagnosis, Estimate, Finding
 from syncline_design.effects import registry
 
 OF_STAMPS: Final = ("timing", "clock")  # promises whose effects move the stamps themselves
+LASTING: Final = "latency_s"  # parameter of the effect that is a constant delay
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +75,10 @@ def _judged(one: Assumed, shift: Shift, paper: OnPaper) -> Judgement | None:
     if delay is not None and delay.value is not None:
         words = (f"{finding.sentence}: on this log that is a delay of up to "
                  f"{amount(delay.value, 's')}")  # fmt: skip
-        values = {"latency_s": delay.value}
-        if paper.turned("latency", one.role, one.stage, values):
+        constant = next(
+            e.name for e in registry().values() if any(p.name == LASTING for p in e.parameters)
+        )
+        if paper.turned(constant, one.role, one.stage, {LASTING: delay.value}):
             return Judgement("broken", words, delay, finding.from_s, finding.to_s)
         if finding.material:
             words += ", which does not turn the verdict yet; what else may come is not shown"
