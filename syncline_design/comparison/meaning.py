@@ -21,7 +21,7 @@ from syncline_design.spec.effects_listed import EffectChoice
 from syncline_design.verdict.named import NamedDesign
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
-from syncline_design.verdict.verified import frame
+from syncline_design.verdict.verified import framed
 from syncline_design.verdict.verify import check_loaded
 
 WORDS = {
@@ -139,8 +139,7 @@ def _checked(case: Case, settings: CheckSettings) -> _Checked:
         return _Checked(check_loaded(case, settings))
     except NoBudget as refused:
         words = tuple(f"{one.message}; {one.hint}" for one in refused.problems)
-        parts = frame(case, build_problem(case), settings.seed)
-        return _Checked(Verdict(verdict="indeterminate", **parts), words)
+        return _Checked(framed("indeterminate", case, build_problem(case), settings.seed), words)
 
 
 def _summary(verdict: Verdict) -> Summary:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from syncline_design.machine.result_files import OutputError, write_files
 from syncline_design.report.schema import schema_text
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw
@@ -92,16 +93,13 @@ def init_project(directory: str | Path) -> tuple[Path, ...]:
     taken = [path for path in contents if os.path.lexists(path)]
     if taken:
         raise BadInput(tuple(_refused(path, "this file is there already") for path in taken))
-    written: list[Path] = []
     try:
-        for path, text in contents.items():
+        for path in contents:
             path.parent.mkdir(parents=True, exist_ok=True)
-            with path.open("x", encoding="utf-8", newline="\n") as stream:
-                written.append(path)
-                stream.write(text)
+        write_files([(path, text.encode("utf-8")) for path, text in contents.items()])
+    except OutputError as error:
+        raise BadInput((_refused(folder, str(error)),)) from None
     except OSError as error:
-        for path in written:
-            path.unlink(missing_ok=True)
         reason = (error.strerror or str(error)).lower()
         raise BadInput((_refused(folder, f"cannot write here: {reason}"),)) from None
     return tuple(contents)

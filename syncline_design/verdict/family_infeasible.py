@@ -23,7 +23,7 @@ from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.no_design import infeasible_verdict, unmet
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, MissionVerdict, RequirementResult, Verdict
-from syncline_design.verdict.verified import frame
+from syncline_design.verdict.verified import framed
 
 
 def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], Build]) -> Verdict:
@@ -36,8 +36,10 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
             why = found.infeasibility
             if mission.name != ALL and why is not None:
                 why = _of_one(work, mission, why, settings, build)
+            made = framed(found.verdict, work.case, problem, settings.seed)
             return replace(
-                found, **frame(work.case, problem, settings.seed), infeasibility=why,
+                found, spec=made.spec, horizon=made.horizon, provenance=made.provenance,
+                infeasibility=why,
                 requirements=_rows_without_design(mission, found),
                 missions=_without_design(work, mission.name),
             )  # fmt: skip
@@ -46,9 +48,8 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
     ids = {member.id for member in why.conflict.requirements}
     excluded, count = ruled_out_of(work)
     late = Caution("time-limit", "the time limit ended the search for reasons and remedies")
-    return Verdict(
-        verdict="infeasible",
-        **frame(work.case, work.scenarios[0].problem, settings.seed),
+    return replace(
+        framed("infeasible", work.case, work.scenarios[0].problem, settings.seed),
         requirements=tuple(
             replace(unmet(first, one, one.id in ids, why.conflict.minimal), line=None, column=None)
             for one in first.spec.requirements

@@ -52,7 +52,7 @@ from syncline_design.verdict.tree import (
     finite,
     word_of,
 )
-from syncline_design.verdict.verified import frame
+from syncline_design.verdict.verified import framed
 
 _WORST_FIRST: dict[str, int] = {"fails": 0, "infeasible": 0, "indeterminate": 1, "meets": 2}
 SHARE = "CHOOSE_FOR"  # the implied requirement of a choice for a probability
@@ -338,16 +338,15 @@ def _assembled(
     design = shown.verdict.design
     assert design is not None
     several = bool(work.case.missions)
-    made = frame(work.case, work.scenarios[0].problem, settings.seed)
-    made["spec"] = replace(
-        made["spec"],
-        combinations=str(work.family.combinations),
-        open_roles=_open_roles(work),
-    )
+    made = framed(word, work.case, work.scenarios[0].problem, settings.seed)
     return replace(
         shown.verdict,
         verdict=word,
-        **made,
+        spec=replace(
+            made.spec, combinations=str(work.family.combinations), open_roles=_open_roles(work)
+        ),
+        horizon=made.horizon,
+        provenance=made.provenance,
         requirements=_family_rows(judged) if several else shown.rows,
         design=bought(design, [one.verdict.design for one in judged], sums, bill),
         warnings=tuple(_warnings(judged, shown, several=several)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncline_design.choice.outcome import Proof
@@ -22,7 +23,7 @@ from syncline_design.verdict.tree import (
     Verdict,
     decided,
 )
-from syncline_design.verdict.verified import frame
+from syncline_design.verdict.verified import framed
 
 if TYPE_CHECKING:
     from syncline_design.choice.variations import Build
@@ -32,9 +33,8 @@ def unfinished_verdict(
     case: Case, problem: Problem | None, settings: CheckSettings, why: str
 ) -> Verdict:
     """A verdict that the time limit left without a design."""
-    return Verdict(
-        verdict="indeterminate",
-        **frame(case, problem, settings.seed),
+    return replace(
+        framed("indeterminate", case, problem, settings.seed),
         requirements=tuple(
             placed(case, index, one, unmet(case, one, in_conflict=False), settings)
             for index, one in enumerate(case.spec.requirements)
@@ -56,9 +56,8 @@ def infeasible_verdict(
     conflict = {member.id for members in found.conflicts for member in members}
     minimal = found.conflict.minimal
     late = Caution("time-limit", "the time limit ended the search for reasons and remedies")
-    return Verdict(
-        verdict="infeasible",
-        **frame(case, problem, settings.seed),
+    return replace(
+        framed("infeasible", case, problem, settings.seed),
         requirements=tuple(
             placed(case, i, one, unmet(case, one, one.id in conflict, minimal), settings)
             for i, one in enumerate(case.spec.requirements)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.problem import selection_of
 from syncline_design.choice.table import Design, Problem
@@ -35,7 +37,7 @@ from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verified import (
     Verified,
     error_figures,
-    frame,
+    framed,
     known_effects,
     syncline_figures,
 )
@@ -86,9 +88,8 @@ def verdict_on(
     shown = named_design(case, problem, verified.design, verified.figures)
     worked = Worked(verified.system, case.spec.sync_model, shown, figures, told)
     asked = [row for row in verified.requirements if row.id in settings.explain]
-    return Verdict(
-        verdict=verified.word,
-        **frame(case, problem, settings.seed),
+    return replace(
+        framed(verified.word, case, problem, settings.seed),
         requirements=verified.requirements,
         design=shown,
         syncline=syncline_figures(verified, case.spec.sync_model),

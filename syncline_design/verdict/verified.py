@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.table import Design, Problem
@@ -34,6 +33,7 @@ from syncline_design.verdict.tree import (
     StageFrame,
     StageSyncline,
     SynclineFigures,
+    Verdict,
     Word,
     finite,
     word_of,
@@ -145,14 +145,15 @@ def known_effects(system: System) -> tuple[KnownEffect, ...]:
     )
 
 
-def frame(case: Case, problem: Problem | None, seed: int) -> dict[str, Any]:
-    """The fields that every verdict has; problem: None where time ended first."""
+def framed(word: Word, case: Case, problem: Problem | None, seed: int) -> Verdict:
+    """A verdict with the fields that every one has; problem: None where time ended first."""
     horizon = case.spec.horizon.horizon()
-    return {
-        "spec": _spec_frame(case, problem),
-        "horizon": MissionHorizon(horizon.duration_s, horizon.extent_m, horizon.tilt_rad),
-        "provenance": _provenance(case, seed),
-    }
+    return Verdict(
+        verdict=word,
+        spec=_spec_frame(case, problem),
+        horizon=MissionHorizon(horizon.duration_s, horizon.extent_m, horizon.tilt_rad),
+        provenance=_provenance(case, seed),
+    )
 
 
 def _spec_frame(case: Case, problem: Problem | None) -> SpecFrame:
