@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from syncline_design.auditing.series import Array, Mask, scatter, spread
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_BLOCKS: Final = 180
 LEAST_MESSAGES: Final = 10  # of a block

@@ -6,7 +6,6 @@ against the rhythm is the clock of the stamps, what does not is transport or the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import Final
 
@@ -14,6 +13,7 @@ import numpy as np
 
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Mask, Series, scatter, seconds, spread
+from syncline_design.machine.quick_dataclass import dataclass
 
 _LEAST_INTERVALS: Final = 20  # to know a rhythm by
 _MOST_GAPS: Final = 0.05  # of all intervals, or two: more are how the messages come

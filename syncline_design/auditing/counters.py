@@ -6,7 +6,7 @@ no stamp leaves an interval of length R; that tells it from jumps and slips, wha
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, in_words, scatter
+from syncline_design.machine.quick_dataclass import dataclass
 
 # ranges by name [ns]: bits of a unit, first what is most often met; parts of the calendar
 _UNITS: Final = (

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, UNIX_S, Array, Series, in_words, seconds
+from syncline_design.machine.quick_dataclass import dataclass
 
 GPS_EPOCH_S: Final = 315_964_800.0  # 1980-01-06 since 1970
 LEAP_S: Final = 18.0  # GPS minus UTC since 2017

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -10,6 +9,7 @@ import numpy as np
 from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
+from syncline_design.machine.quick_dataclass import dataclass
 
 GRAINS: Final = (
     10**9, 5 * 10**8, 2 * 10**8, 10**8, 5 * 10**7, 2 * 10**7, 15_625_000, 10**7, 5 * 10**6,

@@ -8,7 +8,7 @@ sensor's jitter, however short it lasts; one that goes back by the same amount i
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, in_words, scatter, seconds, spread
+from syncline_design.machine.quick_dataclass import dataclass
 
 _BESIDE: Final = 12  # messages on each side that tell a level
 _BESIDE_MORE: Final = (_BESIDE, 4 * _BESIDE, 16 * _BESIDE)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, Literal
 
 import numpy as np
@@ -17,6 +17,7 @@ import numpy as np
 from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.series import Array, Mask
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 Kind = Literal["drift", "bend", "ramp", "step", "episode", "relock", "holdover"]
 _LONGEST: Final = 0.3  # of the log: what settles more slowly is drift

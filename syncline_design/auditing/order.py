@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Mask, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import UNSET
+from syncline_design.machine.quick_dataclass import dataclass
 
 WEEK_NS: Final = 604_800 * 10**9
 BACK_NS: Final = 100_000  # no clock is set by less

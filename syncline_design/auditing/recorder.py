@@ -8,7 +8,7 @@ taken out of all receipts, and every stream is examined again without it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -18,6 +18,7 @@ from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, in_words
 from syncline_design.auditing.stream import Examined, examined
 from syncline_design.logs.readers.stream import UNSET
+from syncline_design.machine.quick_dataclass import dataclass
 
 _SHARE: Final = 0.6  # of the streams that could show a shape
 _ALIKE: Final = 0.25  # of a size

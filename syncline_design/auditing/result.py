@@ -6,10 +6,10 @@ that runs fast a positive `ppm`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 
 SCHEMA: Final = "syncline-design/audit/v1"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -28,6 +27,7 @@ from syncline_design.logs.readers.stream import UNSET, Incomplete, Stream
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead, content_of, note_read
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
 
 _CSV: Final = "CSV"

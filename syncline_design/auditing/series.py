@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
+from syncline_design.machine.quick_dataclass import dataclass
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -7,7 +7,7 @@ stamps keep their rhythm and receipts move, it is the recorder or transport.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Final
 
@@ -23,6 +23,7 @@ from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds, spread
 from syncline_design.auditing.witness import Side
+from syncline_design.machine.quick_dataclass import dataclass
 
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip

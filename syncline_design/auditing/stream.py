@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -26,6 +26,7 @@ from syncline_design.auditing.series import NS, Array, Mask, Series, seconds, se
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
 _SAMPLE: Final = 100_000  # messages that tell a resolution

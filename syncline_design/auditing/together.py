@@ -6,7 +6,7 @@ What moves all streams at once is not a stream's own: their receipts come from o
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -15,6 +15,7 @@ from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, in_words
 from syncline_design.auditing.shifts import Shift, common
 from syncline_design.auditing.stream import Examined, without_clock_step
+from syncline_design.machine.quick_dataclass import dataclass
 
 _ALIKE: Final = 0.25  # of a size, among streams
 _SHARE: Final = 0.6  # of the streams that could show a shift

@@ -8,7 +8,7 @@ breathes does not.  A line is seen by neither: T itself is known only to the sen
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 from typing import Final, Literal
 
@@ -18,6 +18,7 @@ from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import Cadence
 from syncline_design.auditing.levels import SURE, Shape, course
 from syncline_design.auditing.series import Array, Series, scatter, seconds
+from syncline_design.machine.quick_dataclass import dataclass
 
 Side = Literal["stamp", "receipt", "unknown"]
 SLOW: Final = ("bend", "ramp", "relock", "holdover")

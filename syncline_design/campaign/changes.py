@@ -17,7 +17,6 @@ e-processes; Shin, Ramdas, Rinaldo, New England J. Stat. Data Sci. 2 (2024), on 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -25,6 +24,7 @@ import numpy as np
 
 from syncline_design.campaign.pool import Index, Pool, Term, inverted
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 REACH: Final = 5.0  # bounds of one run: the change that is looked for
 SOON: Final = 100  # runs since the baseline in any of which a change is as likely

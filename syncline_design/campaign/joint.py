@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from syncline_design.campaign.adding import content_hash, run_of
@@ -25,6 +24,7 @@ from syncline_design.diagnosis.search import DiagnosisSettings, Progress, silent
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 
 

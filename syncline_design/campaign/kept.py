@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
@@ -12,6 +11,7 @@ import numpy as np
 
 from syncline_design.campaign.packing import PackingError, lower, packed, unpacked, whole
 from syncline_design.diagnosis.sufficient import Label, Less, Sufficient
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 
 EARLIEST_S: Final = 946_684_800.0  # 2000-01-01: a first stamp from here on is a time of day

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -25,6 +25,7 @@ from syncline_design.diagnosis.result import Scope
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 LEAST_GAIN: Final = 3.0  # nat, below which a candidate is not looked at
 AS_GOOD_NATS: Final = 2.0  # within which the commoner of two effects is named

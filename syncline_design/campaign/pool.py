@@ -10,7 +10,6 @@ Sums do not depend on the order in which logs are added.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -22,6 +21,7 @@ from syncline_design.diagnosis.slow_states import LOST, Judged
 from syncline_design.diagnosis.sufficient import Less, Sufficient
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
+from syncline_design.machine.quick_dataclass import dataclass
 
 Index = NDArray[np.int64]
 KNOWN: Final = 30  # freedom for which the noise fitted counts against the scatter of parts

@@ -14,7 +14,6 @@ import hashlib
 import itertools
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +23,7 @@ from syncline_design.campaign.packing import PackingError
 from syncline_design.campaign.same_system import description, differences
 from syncline_design.machine.appended_files import append_line, whole_lines
 from syncline_design.machine.input_files import UnsuitableError, read_plain
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import NotThisResultError, json_of, read_as
 from syncline_design.model.system import System
 from syncline_design.spec.load import BadInput

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -41,6 +41,7 @@ from syncline_design.diagnosis.sight import Seen, alone, informative
 from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.known import EffectEntry
 from syncline_design.spec.case import Case
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 from syncline_design.diagnosis.result import LogOutcome, SpecRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 
 SCHEMA: Final = "syncline-design/watch/v1"

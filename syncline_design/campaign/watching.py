@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Final
@@ -49,6 +48,7 @@ from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 
 RATE: Final = 0.05

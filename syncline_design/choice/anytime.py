@@ -7,7 +7,6 @@ the whole search leaves a design that meets every sum, and a bound on what it mi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -20,6 +19,7 @@ from syncline_design.choice.outcome import Choice, Proof, TooLarge
 from syncline_design.choice.partition import best_of
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Deadline, OutOfTime
+from syncline_design.machine.quick_dataclass import dataclass
 
 FEW = (3, 9)  # options per role and aim
 SHARE = 0.25  # of the time that is left, for each

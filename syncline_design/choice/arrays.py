@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -23,6 +22,7 @@ from syncline_design.choice.options import (
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.table import Problem
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_CHANNELS = 1000
 

@@ -10,7 +10,6 @@ import heapq
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -30,6 +29,7 @@ from syncline_design.choice.options import (
 from syncline_design.choice.outcome import Deadline, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.table import Design, Problem, VehicleTable, is_empty
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_ROWS = 2_000_000  # options in the blocks of a search: about 200 MB
 Key = tuple[Amount, float, Amount, Amount, Amount, tuple[int, ...]]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from typing import Any, overload
 
@@ -34,6 +34,7 @@ from syncline_design.choice.prices import amount_of, resources_of
 from syncline_design.choice.table import Limits, RoleTable
 from syncline_design.choice.ways import Way, ways_of_stamping
 from syncline_design.machine.deadline import unhurried
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.barred import barred_sensor, surroundings
 from syncline_design.spec.case import Case, RoleCase, StageCase

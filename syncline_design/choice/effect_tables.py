@@ -8,7 +8,7 @@ candidate sensor at a time.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from typing import Any
 
@@ -20,6 +20,7 @@ from syncline_design.choice.problem import build_problem, with_everything
 from syncline_design.choice.table import Design, Problem, is_empty
 from syncline_design.effects import registry
 from syncline_design.effects.acting import known_of
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import Budget, budget
 from syncline_design.model.known import EffectEntry, Known
 from syncline_design.model.roles import RoleName

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 from fractions import Fraction
 
 from syncline_design.choice.options import RESOURCES, Option, ResourceName, Resources
 from syncline_design.choice.table import ClockOption, Design, Nearer, Pair, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import overload
 
 import numpy as np
 
 from syncline_design.choice.options import Indices, Option, Options, sync_ratio
+from syncline_design.machine.quick_dataclass import dataclass
 
 NO_OPTIONS = Options.of(())
 

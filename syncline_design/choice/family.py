@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -35,6 +34,7 @@ from syncline_design.choice.options import (
 )
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import Design, Objective, Problem, RoleTable
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_WAYS = 1_000_000  # of one role that may differ between missions
 

@@ -12,7 +12,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial as having
 
@@ -41,6 +41,7 @@ from syncline_design.choice.options import MARGIN, Floats, Indices, ResourceName
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.remaining import Ceiling
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 ROUGH = 60  # partial designs that a first pass goes on with, to know what the others must beat
 SMALL = 20_000  # combinations up to which nothing is gained by a first pass

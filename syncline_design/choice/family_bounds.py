@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
 from syncline_design.choice.family_tables import FamilyTables, Ways, clock_of
 from syncline_design.choice.options import MARGIN, Bools, Floats
 from syncline_design.choice.remaining import Ceiling
+from syncline_design.machine.quick_dataclass import dataclass
 
 STEPS = 48  # of the staircases that bound what is still to come
 

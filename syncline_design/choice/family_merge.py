@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from syncline_design.choice.options import MARGIN, Bools, Column, Floats, Indice
 from syncline_design.choice.outcome import Deadline, TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.remaining import Ceiling, StageRoles, stage_roles
+from syncline_design.machine.quick_dataclass import dataclass
 
 ROWS = 400_000  # candidates that are looked at together
 MOST_PARTIAL = 400_000  # partial designs after which merging gives up

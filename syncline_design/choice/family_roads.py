@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -38,6 +38,7 @@ from syncline_design.choice.options import Floats, Indices, ResourceName
 from syncline_design.choice.outcome import NoVerdict, OutOfTime, Proof, Road, TooLarge
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force, within_s
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_ENUMERATED = 20_000  # combinations of which a front is worked out one by one
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -22,6 +22,7 @@ from syncline_design.choice.options import (
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.pareto import Columns, undominated
 from syncline_design.choice.table import ClockOption, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 
 UTC, HOST = 0, 1
 

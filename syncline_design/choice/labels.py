@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from syncline_design.choice.options import Bools, Column, Floats, Indices
 from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 NOT_MET = np.array([-np.inf])  # nothing waits for a reference
 CHUNK = 200_000  # candidates looked at in one go

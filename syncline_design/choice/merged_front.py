@@ -17,7 +17,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from functools import partial
 from typing import overload
@@ -44,6 +44,7 @@ from syncline_design.choice.remaining import Ceiling, lowered
 from syncline_design.choice.searched_front import searched_front
 from syncline_design.choice.table import ClockOption, Design, Nearer, Problem, is_empty
 from syncline_design.machine.deadline import in_force, within
+from syncline_design.machine.quick_dataclass import dataclass
 
 APART = 3e-11  # errors that differ by a larger share differ in their 12 figures
 ROUGH = 100  # partial designs that a first pass goes on with, to know what the others must beat

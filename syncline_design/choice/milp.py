@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib import metadata
 from typing import Any
 
@@ -23,6 +23,7 @@ from syncline_design.choice.evaluate import broken, evaluate
 from syncline_design.choice.options import MARGIN, ResourceName
 from syncline_design.choice.outcome import Deadline, NoVerdict
 from syncline_design.choice.table import Design, Pair, Problem, is_empty
+from syncline_design.machine.quick_dataclass import dataclass
 
 LEAST_HIGHSPY = (1, 15)
 MOST_CUTS = 40

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from fractions import Fraction
 
 from syncline_design.choice.explain import conflict_of, listed
 from syncline_design.choice.outcome import NoVerdict
 from syncline_design.choice.parts import FIELDS, SIMULATED, Part, least, parts_of
 from syncline_design.choice.table import Problem
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import LIMIT_DIMENSIONS

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from syncline_design.choice.options import RESOURCES, Bools, Indices, Options, ResourceName
 from syncline_design.choice.table import ClockOption, Design, Problem, RoleTable
+from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

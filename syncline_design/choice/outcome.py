@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
@@ -10,6 +9,7 @@ from syncline_design.choice.table import Design
 from syncline_design.machine.deadline import Deadline as Deadline
 from syncline_design.machine.deadline import NoVerdict as NoVerdict
 from syncline_design.machine.deadline import OutOfTime as OutOfTime
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 
 Road = Literal["auto", "front", "milp", "enumerate"]

@@ -12,7 +12,6 @@ from __future__ import annotations
 import heapq
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -23,6 +22,7 @@ from syncline_design.choice.narrowed import Narrowed, narrowed
 from syncline_design.choice.options import Indices
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Deadline, in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 Label = Literal["sensor", "names"]
 Open = tuple[Indices, ...]  # places still open, per role

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 
 import numpy as np
@@ -29,6 +29,7 @@ from syncline_design.choice.variations import (
     with_platform_figure,
 )
 from syncline_design.choice.written import DIGITS, in_unit_of
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.case import Case
 from syncline_design.spec.exact import fraction_of

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ from syncline_design.choice.labels import Labels
 from syncline_design.choice.options import MARGIN, Column, Floats
 from syncline_design.choice.stairs import NO_ROLES, Stairs, stairs
 from syncline_design.choice.table import ClockOption, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 
 STEPS = 64  # of the staircases that bound what is still to come
 

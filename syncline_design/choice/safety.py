@@ -9,7 +9,6 @@ rate * tau - limit * e still leaves it true.
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from syncline_design.choice.arrays import Tables
 from syncline_design.choice.labels import Labels
 from syncline_design.choice.options import MARGIN, Bools, Floats, Indices
 from syncline_design.choice.table import Pair
+from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

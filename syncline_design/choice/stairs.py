@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from syncline_design.choice.options import Floats
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_STEPS = 64  # points of a staircase; between them it takes its lower corners
 

@@ -7,7 +7,6 @@ floats; what lies closer to a limit than floats tell is decided exactly, and so 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
@@ -25,6 +24,7 @@ from syncline_design.choice.options import (
     Spent,
 )
 from syncline_design.choice.table import Design, Pair, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_COMBINED = 50_000
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from typing import Literal, Protocol
 
@@ -25,6 +25,7 @@ from syncline_design.choice.options import (
     Resources,
     exactly,
 )
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 
 NOTHING = Exclusions.of(())

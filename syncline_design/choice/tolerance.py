@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
@@ -38,6 +37,7 @@ from syncline_design.choice.what_if import (
     sensors_that_matter,
     with_sheet_figure,
 )
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 from syncline_design.model.quantity import format_like
 from syncline_design.spec.case import Case

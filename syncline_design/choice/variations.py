@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any, Literal
 
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import IN_PLACE, Case, ends_of

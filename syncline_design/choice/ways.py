@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Literal
 
 from syncline_design.choice.options import Requires
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.barred import barred_method
 from syncline_design.spec.case import Case, RoleCase, StageCase, usable_primitives
 from syncline_design.spec.catalog import SensorEntry, TimestampingEntry

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -25,6 +25,7 @@ from syncline_design.choice.problem import with_motions
 from syncline_design.choice.table import Design, Problem, RoleTable
 from syncline_design.choice.variations import PlatformFigure, SheetFigure, with_changed
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.case import Candidate, Case
 from syncline_design.spec.catalog import SensorEntry

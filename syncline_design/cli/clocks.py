@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
@@ -22,6 +21,7 @@ from syncline_design.cli.shared import (
     refuse,
     watched,
 )
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.streams import say
 
 if TYPE_CHECKING:

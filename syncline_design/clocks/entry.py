@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
 from syncline_design.clocks.files import refused
 from syncline_design.clocks.result import CatalogEntry, EntryKind, Timing
 from syncline_design.clocks.study import TimingStudy
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.result_files import write_files
 from syncline_design.machine.streams import harmless
 from syncline_design.spec.load import load_builtin

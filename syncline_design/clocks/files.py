@@ -6,12 +6,12 @@ import hashlib
 import re
 import zlib
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import UnsuitableError, read_plain
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw
 

@@ -8,10 +8,11 @@ Stamps are seconds since boot, or whole Unix seconds; the date that syslog puts 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from syncline_design.clocks.series import Row, SourceKind, Stamps, Steering
+from syncline_design.machine.quick_dataclass import dataclass
 
 _PROGRAM: Final = re.compile(r"\b(ptp4l|phc2sys|ts2phc)(?=\[|: )")
 _STAMP: Final = re.compile(r"\[(\d{1,12}(?:\.\d+)?)\]")

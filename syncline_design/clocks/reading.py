@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import zlib
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -16,6 +16,7 @@ from syncline_design.clocks.files import LogFile, read_files, refused
 from syncline_design.clocks.series import FARTHEST_S, Row, Series, Sheet, SourceKind, series_of
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
 
 _Read = Callable[[str], tuple[SourceKind, Row, str] | None]

@@ -5,11 +5,11 @@ Offsets are local minus reference: a clock that is 1 ms late gives -1 ms.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 from syncline_design.clocks.sessions import EventKind
 from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 
 SCHEMA: Final = "syncline-design/timing/v1"

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
@@ -13,6 +13,7 @@ from syncline_design.clocks.files import refused
 from syncline_design.clocks.result import EntryKind
 from syncline_design.clocks.series import Series
 from syncline_design.clocks.sessions import sessions_of
+from syncline_design.machine.quick_dataclass import dataclass
 
 SIGNS: Final = {
     "chrony tracking": "local - reference in the log",

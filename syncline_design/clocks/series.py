@@ -5,11 +5,13 @@ from __future__ import annotations
 import math
 from array import array
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from syncline_design.machine.quick_dataclass import dataclass
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]

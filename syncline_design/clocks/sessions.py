@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.clocks.series import Array, Flags, Series
+from syncline_design.machine.quick_dataclass import dataclass
 
 EventKind = Literal[
     "startup", "step", "unlock", "holdover", "gap", "relock", "leap_second", "frequency_jump"

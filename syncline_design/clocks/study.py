@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Final, Literal
 
@@ -38,6 +38,7 @@ from syncline_design.clocks.tolerance import (
     tolerance_bound,
 )
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import format_duration
 
 MOST_EVENTS: Final = 1000

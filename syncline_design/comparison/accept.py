@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Final
 
@@ -30,6 +30,7 @@ from syncline_design.comparison.stamp_meaning import held_against
 from syncline_design.diagnosis.built import sighted
 from syncline_design.diagnosis.search import DiagnosisSettings
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 from syncline_design.verdict.measured import coverage_of
 from syncline_design.verdict.pinned import as_measured

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 from syncline_design.effects.record import Promise
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.verdict.tree import Word
 

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
 from syncline_design.comparison.acceptance import AssumptionName
 from syncline_design.comparison.stamp_meaning import ARRIVAL
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.verdict.named import NamedDesign, NamedRole

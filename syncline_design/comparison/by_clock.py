@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from syncline_design.clocks.result import Timing
@@ -10,6 +9,7 @@ from syncline_design.clocks.study import TimingStudy
 from syncline_design.comparison.acceptance import MeasuredFigure, Status
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import format_duration
 from syncline_design.spec.case import Case
 from syncline_design.verdict.measured import COMMONLY, coverage_of, coverage_words

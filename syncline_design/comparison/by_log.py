@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
@@ -18,6 +18,7 @@ from syncline_design.diagnosis.limits import Beyond
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Smallest
 from syncline_design.effects import registry
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import format_duration
 
 # what undoes a departure, so that neither the log nor the objects' places show both together

@@ -8,7 +8,6 @@ that of the stamps or of the clock.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
@@ -18,6 +17,7 @@ from syncline_design.comparison.judgement import Judgement
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.result import Diagnosis, Estimate, Finding
 from syncline_design.effects import registry
+from syncline_design.machine.quick_dataclass import dataclass
 
 OF_STAMPS: Final = ("timing", "clock")  # promises whose effects move the stamps themselves
 LASTING: Final = "latency_s"  # parameter of the effect that is a constant delay

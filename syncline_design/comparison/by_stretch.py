@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 from syncline_design.comparison.acceptance import MeasuredFigure
@@ -14,6 +14,7 @@ from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import format_duration
 
 SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show

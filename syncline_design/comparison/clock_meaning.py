@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 
 from syncline_design.clocks.entry import values_of
 from syncline_design.clocks.result import EntryKind, Timing
 from syncline_design.clocks.study import TimingStudy
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry

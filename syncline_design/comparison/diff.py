@@ -8,13 +8,14 @@ them moves the payload and the price.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from syncline_design.comparison.difference import Cause, Difference, changes, difference
 from syncline_design.comparison.verdict_file import read_verdict, text_of
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Json
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SECTIONS

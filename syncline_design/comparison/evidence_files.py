@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from syncline_design.clocks.reading import is_clock_log
@@ -13,6 +12,7 @@ from syncline_design.logs import delimited
 from syncline_design.logs.readers import reader_of
 from syncline_design.logs.readers.csv_names import RECEIVE, time_columns
 from syncline_design.logs.readers.reader import head_of
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw

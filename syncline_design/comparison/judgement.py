@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from syncline_design.comparison.acceptance import AssumptionResult, MeasuredFigure, Status, worst
 from syncline_design.comparison.assumptions import Assumed
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 from syncline_design.choice.effect_tables import NoBudget
 from syncline_design.choice.outcome import Explanation
 from syncline_design.choice.problem import build_problem
 from syncline_design.comparison.repairs import Repair
 from syncline_design.diagnosis.result import Diagnosis
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
 from syncline_design.model.quantity import Dimension, format_duration, format_quantity

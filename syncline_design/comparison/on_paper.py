@@ -6,13 +6,13 @@ The requirements that `check` judges are all asked, whatever their kind.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
 from syncline_design.diagnosis.result import Diagnosis, Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice

@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal
 
 from syncline_design.choice.effect_tables import problem_of
@@ -22,6 +21,7 @@ from syncline_design.choice.ways import INLINE
 from syncline_design.diagnosis.result import Estimate, Finding
 from syncline_design.effects import registry
 from syncline_design.effects.record import Origin
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.choices import MethodChoice
 from syncline_design.spec.edit import PinnedRole, with_effects

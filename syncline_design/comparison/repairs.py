@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import NoBudget, problem_of
@@ -14,6 +14,7 @@ from syncline_design.comparison.repair_options import Kind, Remedy, applied, bou
 from syncline_design.diagnosis.result import Finding
 from syncline_design.effects.acting import known_of
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 from syncline_design.spec.case import Case
 from syncline_design.verdict.admitted import with_whole_catalog

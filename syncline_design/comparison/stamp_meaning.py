@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, cast
 
 from syncline_design.auditing.result import Audit, StreamAudit
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import Case
 from syncline_design.spec.edit import with_timestamping_text

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import format_estimate
 
 LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import Log, LogTrack, StageLog
 from syncline_design.logs.stamps import groups
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Stage
 
 DRAWS = 2

@@ -7,7 +7,7 @@ would be noise of all of them.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 from typing import Final
 
@@ -23,6 +23,7 @@ from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.undone import LeftOpen, left_open
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 
 ROUNDS: Final = 3  # of taking out what stands out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import SELDOM, Array, Effect, Target
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Stage
 
 STEP_TIMES = 24  # places along the log where a step is looked for at first

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.identity import Label, effect_of
 from syncline_design.diagnosis.trials import freedom_of
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 USUAL_ARM = 3.0  # longest arm or baseline of a stage, beyond which an error of an arm is not usual
 

@@ -9,7 +9,7 @@ a requirement.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from syncline_design.diagnosis.noise import as_specified, marginal_variance
 from syncline_design.effects import registry
 from syncline_design.effects.acting import known_of
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import budget
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import System

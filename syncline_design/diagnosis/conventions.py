@@ -13,7 +13,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -27,6 +27,7 @@ from syncline_design.effects.kinematics import (
 )
 from syncline_design.effects.record import Array, Target
 from syncline_design.logs.log import Log, LogTrack, StageLog
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 
 ROWS = 200  # on which all are tried

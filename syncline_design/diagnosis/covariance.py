@@ -14,7 +14,7 @@ Source: Rue and Held, Gaussian Markov Random Fields (2005), ch. 2; Woodbury's id
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from scipy.linalg import LinAlgError, cho_solve_banded, cholesky_banded
 
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import Index, groups, repeated, starts, summed
+from syncline_design.machine.quick_dataclass import dataclass
 
 _LEAST_STEP = 1e-9  # least dt / T: keeps 1 - phi^2 above rounding
 

@@ -12,7 +12,7 @@ to come and go from row to row: a missing effect that shows while the vehicle mo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from syncline_design.diagnosis.motion_scatter import lasting
 from syncline_design.diagnosis.noise import Sensor, as_specified, white_covariance
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array, Effect
+from syncline_design.machine.quick_dataclass import dataclass
 
 BLOCKS = 40
 LEAST, MOST = 2, 30  # blocks of a stretch

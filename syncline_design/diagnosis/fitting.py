@@ -7,7 +7,7 @@ fitted again after every change of the effects, as what it absorbs depends on wh
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,7 @@ from syncline_design.diagnosis.noise import (
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 NOISE_ROWS = 800  # rows on which the noise is fitted; stretches spread over the whole log
 POLISH_ROWS = 3000

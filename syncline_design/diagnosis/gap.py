@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,7 @@ from syncline_design.diagnosis.noise import (
 from syncline_design.diagnosis.regimes import covariates
 from syncline_design.diagnosis.result import Fit, Gap, HeldOut, Saved
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 BLOCKS = 5
 PURGE_S = 5.0  # left out on both sides of a held-out block

@@ -9,7 +9,7 @@ bring the error down to a tenth, or to a third where nothing but noise is left.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -24,6 +24,7 @@ from syncline_design.effects.record import Array, Effect, Target
 from syncline_design.logs.log import GAP_FACTOR, Log, LogTrack
 from syncline_design.logs.merging import hermite
 from syncline_design.logs.stamps import per_stamp
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 
 FALLS_TO = 1.0 / 3.0

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.spans import cut_to, cuttable, span_of
 from syncline_design.diagnosis.trials import plausible, with_effect
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 SAME = 0.99  # |cos| of the whitened angle above which two effects are one class
 NEAR = 0.97  # above which another is refitted in its place: first order is not the last word

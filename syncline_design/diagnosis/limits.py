@@ -7,7 +7,6 @@ the largest of so many means is known from the readings themselves.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -18,6 +17,7 @@ from syncline_design.diagnosis.checks import MEAN_S
 from syncline_design.diagnosis.scatter import scatter
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Stage
 
 CHANCE: Final = 1e-3  # that noise alone reaches so far beyond a limit in one of the means

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,6 +32,7 @@ from syncline_design.effects.record import (
     Target,
     Values,
 )
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Stage
 
 LINE = "spectral_line"

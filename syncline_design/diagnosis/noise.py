@@ -7,7 +7,7 @@ is a finding.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 from scipy.linalg import LinAlgError
@@ -17,6 +17,7 @@ from syncline_design.diagnosis.noise_slopes import noise_slopes, summed_over
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import Rows
 from syncline_design.logs.stamps import repeated
+from syncline_design.machine.quick_dataclass import dataclass
 
 Sensor = tuple[str, str]  # (stage, role)
 

@@ -14,12 +14,11 @@ Source: Takahashi et al. (1973), as in Rue and Held, Gaussian Markov Random Fiel
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from syncline_design.diagnosis.covariance import Precision
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True)

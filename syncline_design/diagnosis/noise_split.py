@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -21,6 +20,7 @@ from scipy.stats import t
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import as_specified, white_covariance
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 BLOCKS: Final = 16
 ROUNDS: Final = 6

@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from syncline_design.diagnosis.slow_states import BLOCKS, INSIDE, LEAST_ROWS, St
 from syncline_design.diagnosis.spans import Span, cut_to, cuttable, span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect
+from syncline_design.machine.quick_dataclass import dataclass
 
 LEAST, MOST = 2, 13  # blocks of a stretch, of the states' sixteen
 STRETCHES = sum(BLOCKS - k + 1 for k in range(LEAST, MOST + 1))

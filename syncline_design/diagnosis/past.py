@@ -7,7 +7,7 @@ what the lag lacks of it at one stamp has decayed by exp(-h / T) at the next.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from itertools import pairwise
 from typing import Any
 
@@ -18,6 +18,7 @@ from syncline_design.diagnosis.trajectory import SplinePieces, pieces
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR, LogTrack, Rows
+from syncline_design.machine.quick_dataclass import dataclass
 
 MEMORY_S = 60.0  # of the past that is looked at
 AHEAD = 12  # rows after a stamp that the spline up to it feels

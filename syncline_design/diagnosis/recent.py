@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
-from dataclasses import dataclass, field
+from dataclasses import field
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(slots=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2
@@ -15,6 +14,7 @@ from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import groups, per_stamp
+from syncline_design.machine.quick_dataclass import dataclass
 
 BINS = 6
 SMOOTH_S, LEAST_HALF = 3.0, 3

@@ -13,7 +13,6 @@ shifts of the whitened error against the regressors show how large it is for thi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +31,7 @@ from syncline_design.effects.kinematics import (
     sweep_velocity,
 )
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 Shifts = NDArray[np.int64]
 MOST_ROWS = 6000  # of a longer log, windows

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Final, Literal
 
 from syncline_design.diagnosis.plotted import Plots
 from syncline_design.effects import registry
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.spec.effects_listed import EffectChoice
 

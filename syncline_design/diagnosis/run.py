@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -64,6 +64,7 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.log import Log
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 from syncline_design.spec.load import load
 

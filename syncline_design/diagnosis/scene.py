@@ -10,7 +10,7 @@ Without departures this is the georeferencing error itself.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotat
 from syncline_design.effects.record import Array, Departures, StageRows, Target
 from syncline_design.logs.log import Log, LogTrack, Rows, StageLog
 from syncline_design.logs.stamps import per_stamp
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model import timing
 from syncline_design.model.system import Sensor, Stage, System
 from syncline_design.simulation.chain import rotation_exp

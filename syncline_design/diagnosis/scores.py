@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -27,6 +26,7 @@ from syncline_design.diagnosis.noise import (
 from syncline_design.effects.kinematics import gauss_markov
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import groups
+from syncline_design.machine.quick_dataclass import dataclass
 
 DRAWS = 3000  # clean scores drawn for the distribution of the largest
 MOST_ROWS = 6000  # of a longer log the noise is known well enough

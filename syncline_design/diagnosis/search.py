@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -42,6 +42,7 @@ from syncline_design.diagnosis.trials import (
 )
 from syncline_design.effects.record import Effect
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 TRIED = 4  # candidates fitted with their own noise per step
 SCREENED_OUT = 6.0  # gain [nat] below which a candidate is not fitted

@@ -10,7 +10,7 @@ here by the trapezoidal rule over log w.  A row is that or an outlier: normal, O
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.special import gammaln
@@ -19,6 +19,7 @@ from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import Sensor, white_covariance
 from syncline_design.diagnosis.tails import OUTLIER_NATS
 from syncline_design.effects.record import OUTLIER_FACTOR, Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_ROWS = 3000
 LOG_W = np.arange(-11.0, 3.2, 0.25)  # of the mixed variances: beyond, nothing is left of any t

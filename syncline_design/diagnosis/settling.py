@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from syncline_design.diagnosis.step_form import refuted_steps
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import freedom_of, log_chance, seen_in_motion
 from syncline_design.effects.record import Effect
+from syncline_design.machine.quick_dataclass import dataclass
 
 APART = 2.0  # standard uncertainties between the values by two noise models
 NEEDLESS = 0.2  # chance of as good a fit by noise alone, from which an effect is of no use

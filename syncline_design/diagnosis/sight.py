@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -16,6 +15,7 @@ from syncline_design.diagnosis.result import BlindSpot, Informative, Smallest
 from syncline_design.diagnosis.search import Search, SearchResult
 from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.known import EffectEntry
 
 NEARLY_ALL: Final = 1.6449  # standard deviations below which 5 % lie: seen in 19 of 20 logs

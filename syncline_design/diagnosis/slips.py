@@ -7,7 +7,7 @@ on some rows for every shift of a grid, then more finely about the best.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotat
 from syncline_design.effects.record import Array, Target
 from syncline_design.logs.log import Log
 from syncline_design.logs.stamps import per_stamp
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.simulation.chain import rotation_exp
 

@@ -17,7 +17,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from syncline_design.diagnosis.positive import solution
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 Channel = tuple[Sensor, int]
 SURVEY: Sensor = ("", "target")  # channel of the targets' survey errors

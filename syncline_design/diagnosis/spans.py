@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from syncline_design.effects.record import (
     Target,
     Values,
 )
+from syncline_design.machine.quick_dataclass import dataclass
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -15,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2, f
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 LEAST_ROWS: Final = 3  # of a window
 GROWTH: Final = math.sqrt(2.0)  # from one length to the next

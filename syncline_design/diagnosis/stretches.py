@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -48,6 +48,7 @@ from syncline_design.diagnosis.stretch_windows import (
 )
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_BLOCKS: Final = 1200  # that windows are made of; of a longer log several rows each
 DRAWS: Final = 6  # logs drawn from the fitted noise

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +25,7 @@ from syncline_design.diagnosis.noise import SLOW_LEAST, NoiseLevel, Structure, p
 from syncline_design.diagnosis.slow_states import LEAST_BLOCKS, LOST, SHOWN_NATS, States
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 FAR = 1.6  # root mean square of a row's whitened components, from where on a row counts less
 REWEIGHTED = 1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from syncline_design.choice.chosen_system import system_of
@@ -15,6 +15,7 @@ from syncline_design.logs.log import Log
 from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.pose_pairs import lever_m
 from syncline_design.logs.reading import read_log
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import si_name
 from syncline_design.model.system import System
 from syncline_design.spec.case import Case

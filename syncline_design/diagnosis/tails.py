@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from syncline_design.diagnosis.axes import Axes
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import NoiseLevel, Structure, white_covariance
 from syncline_design.effects.record import OUTLIER_FACTOR, Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 FREEDOMS = np.geomspace(1.2, 30.0, 25)
 FAR = 5.0  # core standard deviations beyond which a row is taken for an outlier at first

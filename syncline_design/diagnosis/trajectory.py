@@ -7,7 +7,7 @@ time shift, and a fit would prefer shifts half way between rows.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -20,6 +20,7 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.logs.smoothing import LEAST_SMOOTHED, MOST_TRIED, penalty
 from syncline_design.logs.stamps import per_stamp
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.simulation.chain import rotation_exp
 
 Index = NDArray[np.int64]

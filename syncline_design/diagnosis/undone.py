@@ -12,7 +12,6 @@ Source: Bayes' rule for a linear model, e.g. Tarantola, Inverse Problem Theory (
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -20,6 +19,7 @@ import numpy as np
 from syncline_design.diagnosis.candidates import Signature, slopes
 from syncline_design.diagnosis.fitting import Data, Model, inner
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 BUILD: Final = {"s": 0.2, "m": 1.0, "rad": 0.1}  # what a build can be wrong by, by unit
 HELD: Final = 1e8  # of the prior's weight, along what moves no object

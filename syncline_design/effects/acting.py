@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
@@ -20,6 +19,7 @@ from syncline_design.effects.record import (
     Values,
 )
 from syncline_design.effects.underway import OF_CAUSE
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.known import Known
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.pairing import distance_m

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import field, fields
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Stage

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final, Literal
 
 import numpy as np
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 Turns = Literal["none", "heading", "any"]
 FREE: Final[Mapping[Turns, int]] = {"none": 0, "heading": 1, "any": 3}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
@@ -20,6 +19,7 @@ from syncline_design.logs.run_parts import Known, one_run
 from syncline_design.logs.static_arms import ArmBeside, arms_beside
 from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Json, Named, Record, optional
 from syncline_design.spec.edit import flow_text
 from syncline_design.spec.load import BadInput

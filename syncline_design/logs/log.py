@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import usual_step_s
+from syncline_design.machine.quick_dataclass import dataclass
 
 GAP_FACTOR = 5.0  # rows further apart than this times the median interval are a gap
 Kind = Literal["georeference", "position", "pose"]

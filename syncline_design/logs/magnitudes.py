@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +19,7 @@ from syncline_design.logs.columns import (
     shown,
 )
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_SPEED_MPS = 2000.0
 MOST_LENGTH_M = 1e8  # a quarter of the way to the Moon; Earth-centred coordinates stay below 1e7

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,7 @@ from syncline_design.logs.log import LogTrack
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.tables import LogTable
 from syncline_design.logs.twins import one_a_stamp, without_twins
+from syncline_design.machine.quick_dataclass import dataclass
 
 Index = NDArray[np.intp]
 TURNING = ("yaw_rad", "azimuth_rad", "longitude_rad")  # where 180 deg and -180 deg are neighbours

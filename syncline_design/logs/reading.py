@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Literal
 
@@ -34,6 +34,7 @@ from syncline_design.logs.refusals import refuse
 from syncline_design.logs.sources import RowSource
 from syncline_design.logs.tables import LogTable, read_tables
 from syncline_design.logs.twins import without_twins
+from syncline_design.machine.quick_dataclass import dataclass
 
 Source = Literal["columns", "position", "reference"]  # of a velocity
 

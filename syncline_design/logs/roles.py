@@ -6,12 +6,12 @@ A choice that nobody made is said with its reason and how sure it is.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, Literal
 
 from syncline_design.logs.readers.stream import Recording, Stream
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.log_block import LogChoice
 

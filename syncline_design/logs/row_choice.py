@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.columns import TIME
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.runs import pieces_of
+from syncline_design.machine.quick_dataclass import dataclass
 
 MOST_KEPT = 500_000  # rows of one file that are held in memory
 WINDOWS = 40

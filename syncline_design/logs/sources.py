@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -31,6 +30,7 @@ from syncline_design.logs.cells import (
 from syncline_design.logs.parquet_footer import FooterError, chunks
 from syncline_design.logs.parquet_times import FarTimeError, calendar, spans
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
 
 if TYPE_CHECKING:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.logs.readers.stream import StaticPose
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 
 BODIES: Final = ("base_link", "base", "body", "vehicle", "base_footprint")  # ROS REP 105

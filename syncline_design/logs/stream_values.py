@@ -6,7 +6,7 @@ Every conversion is noted in words; nothing is turned, shifted or scaled silentl
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +18,7 @@ from syncline_design.logs.readers.stream import Body, Frame, Nanoseconds, Piece
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer
 from syncline_design.logs.run_parts import pieces_of
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import si_name, suffix_unit
 from syncline_design.spec.log_block import LogChoice
 

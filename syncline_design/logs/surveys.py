@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +13,7 @@ from syncline_design.logs.cells import trimmed
 from syncline_design.logs.columns import GEODETIC, TARGET, TARGET_ID, TIME
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.sources import RowSource, TextSource
+from syncline_design.machine.quick_dataclass import dataclass
 
 PLACES = (TARGET, tuple(f"target_{name}" for name in GEODETIC))
 Found = Mapping[str, tuple[str, float]]  # SI name -> column of the file, factor to SI

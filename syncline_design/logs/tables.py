@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +26,7 @@ from syncline_design.logs.row_choice import Arranged, arranged, thinned
 from syncline_design.logs.runs import demand_one_run
 from syncline_design.logs.sources import NANOSECONDS, Clock, Mask, RowSource, opened
 from syncline_design.logs.surveys import Survey, has_places, is_survey, joined, survey_of
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import format_estimate, si_name, suffix_unit
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.load import BadInput

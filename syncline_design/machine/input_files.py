@@ -13,9 +13,10 @@ import os
 import stat
 from collections.abc import Iterator, Sequence
 from contextvars import ContextVar
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 
 Identity = tuple[int, int]  # device and inode: one file, whatever its names

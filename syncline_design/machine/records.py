@@ -21,6 +21,7 @@ from typing import Annotated, Any, ClassVar, Final, TypeVar
 
 from syncline_design.machine.frozen import frozen
 from syncline_design.machine.notebooks import Shown
+from syncline_design.machine.quick_dataclass import dataclass
 
 Json = dict[str, Any]
 R = TypeVar("R", bound="Record")
@@ -84,7 +85,7 @@ class _NullIsInfinite:
 Unbounded = Annotated[float, _NullIsInfinite]  # may be infinite: unlimited, or no end known
 
 
-@dataclasses.dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True)
 class Named:
     """Of the `schema` key: only this name is taken, so that no other kind or version is read."""
 

@@ -15,12 +15,12 @@ import secrets
 import stat
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 from typing import Final
 
 from syncline_design.machine.deadline import OutOfTime, of_command, overdue
+from syncline_design.machine.quick_dataclass import dataclass
 
 fcntl: ModuleType | None
 try:

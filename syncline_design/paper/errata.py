@@ -7,9 +7,9 @@ docs/theory.md and in the tests of `reproduce`.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Final
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 
 Key = tuple[str, str, str]  # table, row, column of printed.PRINTED

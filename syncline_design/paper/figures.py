@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 from syncline_design.model import syncline
 from syncline_design.model.budget import budget

@@ -7,12 +7,12 @@ quarter of the horizon, at a spread of distances.  They are aimed at in turn.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.vehicle import Vehicle
 
 STEEP_RAD = math.radians(75.0)  # beyond, azimuths mean nothing

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -17,6 +16,7 @@ from syncline_design.diagnosis.scene import Scene, scene
 from syncline_design.effects.acting import acting_of
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.planning.information import (
     Unknown,

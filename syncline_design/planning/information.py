@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -29,6 +29,7 @@ from syncline_design.diagnosis.result import Noise
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, Parameter, StageRows
+from syncline_design.machine.quick_dataclass import dataclass
 
 LOST: Final = 1e-9  # of a parameter's scaled information: below, the others hold it all
 STEP_AT: Final = 0.5  # of the drive: where a step is taken to happen

@@ -9,12 +9,13 @@ moved by the sea, the others stay as level as their path.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 
 import numpy as np
 
 from syncline_design.effects.kinematics import euler_to_rotation, rotate
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.vehicle import SEA_RATE_SHARE, SEA_TILT, Vehicle
 
 GRAVITY_MPS2 = 9.80665

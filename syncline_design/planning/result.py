@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Final
 
 from syncline_design.diagnosis.result import SpecRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, Unbounded, optional
 
 SCHEMA: Final = "syncline-design/plan/v1"

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.drives import Outcome, outcome
 from syncline_design.planning.search import (
     AREA_SHARE,

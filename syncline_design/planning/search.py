@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import Deadline
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.information import (
     Unknown,
     canonical_correlation,

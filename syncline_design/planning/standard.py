@@ -10,12 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.planning.legs import FULL_RAD, LINE_S, Leg
 from syncline_design.planning.path import STEP_S, Course
 from syncline_design.planning.search import Judge, Told

@@ -7,9 +7,9 @@ table of docs/plan.md), and is said with the plan as assumed.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Final, Literal, NamedTuple
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw

@@ -8,13 +8,14 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Final
 
 import numpy as np
 
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import UnitError, parse_quantity, suffix_unit
 from syncline_design.model.system import System
 from syncline_design.planning.information import Unknown

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from typing import Annotated, Any, Final
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.conversion import conversion_of
 from syncline_design.model.quantity import (

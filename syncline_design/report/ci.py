@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Final, Literal
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.report import numbers
 from syncline_design.report.verdict_words import kind_text, margin_text, outcome, waiver_text

@@ -10,9 +10,10 @@ Each node says how far it reaches: `everywhere`, only on the `page`, or only in 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report.table import Table, Tone
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ in: the vehicle's host clock, or UTC.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
 from syncline_design.report.palette import BAD, GRID, INK, LINE, MUTED, SERIES, SHADE

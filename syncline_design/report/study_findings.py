@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from xml.etree import ElementTree
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report.ci import Level, Notice, requirement_sentence
 from syncline_design.report.github import github_command
 from syncline_design.report.sarif import sarif_log

@@ -13,10 +13,10 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Final, Literal
 from xml.etree import ElementTree
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report.matplotlib_import import load_matplotlib
 from syncline_design.report.palette import INK, MUTED, SURFACE, VARIABLES
 from syncline_design.report.text import visible

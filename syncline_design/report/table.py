@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Literal
+
+from syncline_design.machine.quick_dataclass import dataclass
 
 Tone = Literal["", "good", "bad", "warn", "muted"]
 

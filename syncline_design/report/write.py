@@ -7,10 +7,10 @@ import errno
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.result_files import OutputError, descriptor_of, is_stream, write_files
 from syncline_design.report.formats import FIGURE_FORMATS, NOT_FOR_A_TERMINAL
 

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from syncline_design.effects import acting as acting_effects
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import budget
 from syncline_design.model.known import Known
 from syncline_design.model.lever_arms import arm_difference, arm_lengths

@@ -7,7 +7,6 @@ position and attitude are taken at their own shifted times, lever arms rotate.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -20,6 +19,7 @@ from syncline_design.effects.kinematics import (
     rotation_to_euler,
 )
 from syncline_design.effects.record import NOTHING, Array, Departures, StageRows
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.syncline import Sigma
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 
 KEPT_VALUES = 1_000_000  # 8 MB; beyond, memory must not grow with the number of samples
 _BITS = 12  # bins per octave: 2^12, so a bin is 0.024 % wide, and values spread within it

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any, Literal, cast
 
 import numpy as np
 
 from syncline_design.effects.acting import ByStage, departures
 from syncline_design.effects.record import NOTHING, Array, Departures, StageRows
+from syncline_design.machine.quick_dataclass import dataclass
 
 Shape = Literal["normal", "uniform", "other"]
 STEP: dict[Shape, float] = {

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Look, Sensor, Stage, System

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from syncline_design.effects import registry
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.system import Sensor, Stage, System

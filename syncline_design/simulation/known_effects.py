@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from syncline_design.effects.acting import Acting, departures
 from syncline_design.effects.record import Array, Departures, StageRows
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.simulation import kernel
 from syncline_design.simulation.chain import ChainMotion, ChainNoise, stage_error
 from syncline_design.simulation.surroundings import Moment, placed_rows

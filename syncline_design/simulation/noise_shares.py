@@ -17,13 +17,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
 from syncline_design.effects.acting import acts
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System

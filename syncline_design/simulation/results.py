@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import platform
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Final, Literal
 
 import numpy as np
@@ -13,6 +12,7 @@ import numpy as np
 from syncline_design import __version__
 from syncline_design.effects.record import Array
 from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, Unbounded, optional
 from syncline_design.model.quantity import Dimension, format_quantity
 from syncline_design.simulation.distribution import Binned, Values

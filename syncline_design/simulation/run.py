@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import budget
 from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.system import SimulationError, System

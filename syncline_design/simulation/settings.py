@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
 from syncline_design.effects.acting import demand_acting
 from syncline_design.machine.input_files import FileContent
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Sensor, SimulationError, Stage, System
 from syncline_design.model.timing import Constant, Distribution, Empirical, Normal, Uniform
 

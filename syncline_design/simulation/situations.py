@@ -7,12 +7,13 @@ and looks, when and where it is, and, where one mission is asked for, what is co
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from syncline_design.effects.acting import by_stage
 from syncline_design.effects.record import Array, StageRows
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.lever_arms import position_lever_arm
 from syncline_design.model.roles import ROLES
 from syncline_design.model.syncline import Sigma

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 from statistics import NormalDist
 from typing import Literal
@@ -18,6 +17,7 @@ import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.simulation.ascent import Ascent, Index
 from syncline_design.simulation.lattice import MANY_POINTS, POINTS, sphere_lattice

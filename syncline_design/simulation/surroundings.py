@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from syncline_design.effects.kinematics import bearing, cross, euler_to_rotation, rotate
 from syncline_design.effects.record import Array, StageRows
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.horizon import Horizon
 from syncline_design.simulation.chain import ChainNoise, ConstantTwist
 from syncline_design.simulation.draws import RandomSource, angle

@@ -8,7 +8,6 @@ attitude's matrix (9), kept side by side, so that any arm l has its lag.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.simulation.chain import rotation_exp, screw_displacement
 
 _SMALL = 0.3  # h / T below which the closed weights would cancel

@@ -16,7 +16,7 @@ import csv
 import io
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache, partial
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from syncline_design.effects import acting as acting_effects
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.machine.input_files import FileContent, UnsuitableError, read_plain
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import Platform, SimulationError, Stage, System
 from syncline_design.simulation import known_effects
 from syncline_design.simulation.chain import ChainNoise

@@ -15,7 +15,6 @@ import subprocess
 import sys
 import threading
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import IO
 
 import numpy as np
@@ -23,6 +22,7 @@ import numpy as np
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.processes import end_with_stream, ended_by_signals, python_command
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.simulation.distribution import Counts, add_counts, no_counts
 from syncline_design.simulation.kernel import norm

@@ -8,12 +8,13 @@ looked up anew as it is made, so that what was found never lags behind what was 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Generic, TypeVar
 
 from syncline_design.machine.input_files import FileContent, FileRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.known import NOTHING_KNOWN as NOTHING_KNOWN
 from syncline_design.model.known import EffectEntry
 from syncline_design.model.known import Known as Known

@@ -8,12 +8,13 @@ the data instead, with a comment that says so.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import yaml
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.result_files import write_file
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName

@@ -9,9 +9,9 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from typing import Literal, get_args
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.spec.catalog import Product, SensorEntry
 from syncline_design.spec.exact import fraction_of

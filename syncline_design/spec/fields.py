@@ -8,7 +8,6 @@ is never reported for all.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, TypeVar
 
 from pydantic import (
@@ -22,6 +21,7 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import (
     EXAMPLES,
     UNITS,

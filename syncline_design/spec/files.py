@@ -6,13 +6,14 @@ import functools
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 from syncline_design.machine.frozen import frozen
 from syncline_design.machine.input_files import note_place
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import UNITS, Dimension, Quantity, UnitError, parse_quantity
 from syncline_design.spec.catalog import SECTIONS, Catalog, CatalogFile
 from syncline_design.spec.fields import did_you_mean

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Final
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw, ParsedFile, read

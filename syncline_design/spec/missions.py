@@ -7,9 +7,10 @@ says the place in the file where the user wrote what is wrong.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import ROLES
 from syncline_design.spec.case import Mission, RoleCase
 from syncline_design.spec.fields import did_you_mean

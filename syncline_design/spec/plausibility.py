@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from statistics import median
 from typing import Final
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import Dimension, Quantity, format_quantity
 from syncline_design.model.roles import ROLES
 from syncline_design.spec.case import Candidate, Case, StageCase

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import RoleName
 
 

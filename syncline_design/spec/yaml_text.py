@@ -14,13 +14,14 @@ import importlib
 import re
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 from syncline_design.machine.input_files import UnsuitableError, read_plain
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.streams import harmless
 from syncline_design.spec.yaml_scalars import Number as Number
 from syncline_design.spec.yaml_scalars import plain_scalar as plain_scalar

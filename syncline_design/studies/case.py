@@ -6,7 +6,7 @@ import contextlib
 import hashlib
 import platform
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import date
 from importlib import metadata
 from pathlib import Path
@@ -15,6 +15,7 @@ from typing import Any
 from syncline_design import __version__
 from syncline_design.machine.deadline import NoVerdict, within_s
 from syncline_design.machine.input_files import ReplacedInputError, noting
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.simulation import SimulationError
 from syncline_design.spec.case import Case
 from syncline_design.spec.keys import plain

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from syncline_design import __version__
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import MeetsWhen

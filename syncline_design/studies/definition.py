@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, WithJsonSchema
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import UNITS, Dimension, UnitError, parse_number
 from syncline_design.spec.fields import AtLeastOne, FileRecord, PositiveTime, Text, kind_of, refusal
 from syncline_design.spec.keys import label

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from typing import Any, get_args
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.keys import label
 from syncline_design.studies.definition import MeetsWhen
 from syncline_design.studies.loading import Study

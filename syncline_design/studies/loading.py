@@ -6,11 +6,12 @@ import json
 import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
 from syncline_design.machine.input_files import note_read
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import Catalog
 from syncline_design.spec.fields import did_you_mean

@@ -14,7 +14,7 @@ import contextlib
 import signal
 from collections import deque
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from multiprocessing import get_context
 from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
@@ -27,6 +27,7 @@ from syncline_design.machine.processes import (
     interrupts_held_back,
     starting_safely,
 )
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.studies.case import CaseSettings, check_case
 from syncline_design.studies.inputs import canonical
 from syncline_design.studies.loading import Study

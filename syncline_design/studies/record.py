@@ -6,10 +6,10 @@ All that the tables and findings of a study need of a verdict, no more.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Literal
 
 from syncline_design.choice.outcome import Explanation
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 from syncline_design.studies.inputs import Inputs
 from syncline_design.verdict.named import NamedDesign

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from syncline_design.machine.notebooks import Shown
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Json
 from syncline_design.studies.data import study_data
 from syncline_design.studies.finished import Finished

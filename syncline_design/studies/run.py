@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import date
 from pathlib import Path
 
 from syncline_design.choice.outcome import NoVerdict
 from syncline_design.machine.deadline import Deadline, OutOfTime, in_force, within
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import read_as
 from syncline_design.studies.case import CaseSettings, case_keys
 from syncline_design.studies.cluster import ClusterError, run_on_cluster

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final, TypeVar
 
 from syncline_design.machine.input_files import UnsuitableError, read_plain
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import NotThisResultError, Record, read_as
 from syncline_design.machine.result_files import clear_stale, replace_whole
 from syncline_design.studies.inputs import Inputs, canonical

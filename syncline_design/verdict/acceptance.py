@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from datetime import date
 from fractions import Fraction
 from typing import Any, NoReturn
@@ -21,6 +21,7 @@ from syncline_design.choice.outcome import Unfinished
 from syncline_design.choice.table import Cut, Design, Judge, Judgement, Problem, RoleTable
 from syncline_design.effects import registry
 from syncline_design.machine.input_files import FileContent
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.roles import ROLES, RoleName
 from syncline_design.model.system import UTC, Sensor, Stage, System
 from syncline_design.model.timing import (

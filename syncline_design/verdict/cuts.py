@@ -8,13 +8,13 @@ limits, so that it leaves out whole branches and stays exact.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from syncline_design.choice.chosen_system import sigma_of
 from syncline_design.choice.options import Floats
 from syncline_design.choice.table import Cut, Design, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.simulation.noise_shares import NoiseAt, most_noise, noise_at
 from syncline_design.simulation.situations import Situations

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
@@ -11,6 +10,7 @@ from syncline_design.choice.effect_tables import design_budget
 from syncline_design.choice.evaluate import Evaluation, chosen_clocks, chosen_options, evaluate
 from syncline_design.choice.options import Option
 from syncline_design.choice.table import Design, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import Budget, SensorRow
 from syncline_design.model.quantity import Quantity
 from syncline_design.model.roles import RoleName

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from syncline_design.effects.acting import known_of
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model import timing
 from syncline_design.model.ends import at_ends, distances_of
 from syncline_design.model.pairing import distance_m

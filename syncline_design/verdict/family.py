@@ -8,7 +8,7 @@ tau_crit), so that what holds at both ends holds everywhere between.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ from syncline_design.choice.problem import sole_design
 from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import SheetFigure, quantity, sigma_figures, with_figure
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, Mission
 from syncline_design.verdict.likely import Likelihood, likelihood_of
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -19,6 +19,7 @@ from syncline_design.choice.outcome import Conflict, ConflictMember, Fix, NoVerd
 from syncline_design.choice.parts import FIELDS, KINDS, Part
 from syncline_design.choice.table import Problem, with_limits
 from syncline_design.choice.variations import with_stage
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, Mission
 from syncline_design.verdict.family import (
     ALL,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 from typing import Any
 
@@ -14,6 +14,7 @@ from syncline_design.choice.missed import shown_figures
 from syncline_design.choice.narrowed import narrowed
 from syncline_design.choice.outcome import NoVerdict, OutOfTime
 from syncline_design.choice.table import Problem
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Mission
 from syncline_design.verdict.admitted import Kinds, admissions, with_whole_catalog
 from syncline_design.verdict.family import (

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Literal
 
 import numpy as np
@@ -23,6 +23,7 @@ from syncline_design.choice.options import Bools, Floats, Option
 from syncline_design.choice.table import Design, Problem, RoleTable
 from syncline_design.choice.variations import sigma_figures
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
 from syncline_design.simulation.intervals import proportion_interval
 from syncline_design.spec.case import Case

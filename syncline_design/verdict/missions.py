@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from fractions import Fraction
 
 from syncline_design.choice.family import FamilyEvaluation
@@ -15,6 +15,7 @@ from syncline_design.choice.outcome import (
 from syncline_design.choice.problem import selection_of, with_everything
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Pieces, in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import Selection

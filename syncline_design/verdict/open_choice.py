@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from syncline_design.choice.outcome import Choice, Infeasible, NoVerdict, Road
 from syncline_design.choice.table import Design, Problem
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.verdict.verified import Verified
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Annotated
 
 from syncline_design.choice.options import ResourceName
@@ -20,6 +19,7 @@ from syncline_design.choice.tolerance import (
     ToleranceVerdict,
 )
 from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case

@@ -7,10 +7,10 @@ halves up, piece by piece.  Mass and power are those of every piece.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, Literal
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.case import Case
 
 Budget = Literal["cost", "mass", "power"]

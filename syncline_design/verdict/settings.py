@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import date
 from typing import TYPE_CHECKING
 
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.requirement import JUDGED_KINDS, STATED_KINDS
 from syncline_design.verdict.acceptance import Simulations
 

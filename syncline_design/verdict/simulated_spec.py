@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from syncline_design.choice.chosen_system import system_of
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.system import System
 from syncline_design.simulation import Simulation, SimulationError, simulate
 from syncline_design.simulation.results import SpecContent, SpecName

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 
 from syncline_design.effects.acting import acts
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.ends import at_distance
 from syncline_design.model.system import UTC, Sensor, System
 from syncline_design.model.timing import NO_ERROR

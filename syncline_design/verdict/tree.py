@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 from syncline_design.choice.outcome import Explanation
 from syncline_design.machine.input_files import FileRead
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.budget import SyncModelName, TermKind
 from syncline_design.simulation import MonteCarlo

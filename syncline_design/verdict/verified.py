@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from syncline_design import __version__
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import OutOfTime, in_force
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.budget import Budget, SyncModelName
 from syncline_design.model.system import System
 from syncline_design.simulation import MonteCarlo, SimulationError

@@ -6,7 +6,7 @@ What the spec does not list is answered twice: that it is no candidate, and what
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.explain import listed
@@ -14,6 +14,7 @@ from syncline_design.choice.holding import EntryKind, best_with, parts_with
 from syncline_design.choice.missed import nearest_miss
 from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import Build
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
 from syncline_design.verdict.admitted import Kinds, admissions, homes, kinds_of, with_whole_catalog

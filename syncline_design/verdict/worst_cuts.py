@@ -14,13 +14,13 @@ lower ones the smaller slope of each magnitude is taken.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from syncline_design.choice.chosen_system import sigma_of, timing_error
 from syncline_design.choice.options import Floats
 from syncline_design.choice.table import Cut, Design, Problem, RoleTable
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model import timing
 from syncline_design.model.lever_arms import arm_lengths
 from syncline_design.model.roles import RoleName

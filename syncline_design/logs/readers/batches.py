@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ from syncline_design.logs.readers.stream import (
 )
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 Columns = Mapping[str, NDArray[Any]]
 MOST_STREAMS = 2_000

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from syncline_design.logs.columns import ISO_TIMES
 from syncline_design.logs.readers.stream import Frame
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import si_name, suffix_unit
 from syncline_design.model.unit_table import DEG, SPELLINGS, SUFFIXES
 

@@ -9,7 +9,7 @@ units, and which field tells one sensor from the next.  Layout by ArduPilot's de
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ from syncline_design.logs.readers.dataflash_kinds import (
 from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 HEAD = b"\xa3\x95"
 FMT, FMT_LENGTH = 128, 89

@@ -7,7 +7,7 @@ north, east, down; attitude is roll, pitch, yaw of a body forward, right, down.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers.epochs import GPS_EPOCH_S, NANO, WEEK_S, gps_to_utc
 from syncline_design.logs.readers.stream import Frame, Nature
+from syncline_design.machine.quick_dataclass import dataclass
 
 Values = Mapping[str, NDArray[Any]]
 Made = dict[str, NDArray[Any]]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +22,7 @@ from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Re
 from syncline_design.logs.readers.receiver_frames import UBX, FrameCount, frames
 from syncline_design.logs.readers.stream import UNSET, Recording
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 FIX = "fix"
 MOST_ROWS = 20_000

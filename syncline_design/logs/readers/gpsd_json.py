@@ -10,7 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,7 @@ from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Recording
 from syncline_design.logs.readers.text_lines import head_lines, line_blocks
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 SURER = BY_MAGIC + 1  # than of the NMEA that gpsd puts between its reports
 BEGINNING = '{"class":"'

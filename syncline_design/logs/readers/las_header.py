@@ -6,10 +6,10 @@ LAS 1.4 R15 (ASPRS), public header block: offsets as of version 1.0 to 1.4.
 from __future__ import annotations
 
 import struct
-from dataclasses import dataclass
 from pathlib import Path
 
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 MAGIC = b"LASF"
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375}  # by minor version, least

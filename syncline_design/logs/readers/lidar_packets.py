@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import struct
 import zlib
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from syncline_design.logs.readers.epochs import NANO, WEEK_S, week_start_ns
+from syncline_design.machine.quick_dataclass import dataclass
 
 COLUMNS = 16  # of an Ouster packet
 PIXELS = (16, 32, 64, 128)

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from datetime import date
 
 from syncline_design.logs.readers.epochs import DAY_NS, NANO
 from syncline_design.logs.readers.stream import UNSET
+from syncline_design.machine.quick_dataclass import dataclass
 
 KNOT_MPS = 1852 / 3600
 ROLLOVER_DAYS = 7168  # 1024 weeks

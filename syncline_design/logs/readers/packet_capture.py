@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from decimal import Decimal
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -24,6 +24,7 @@ from syncline_design.logs.readers.reader import BY_MAGIC, NO, Head, Reader, libr
 from syncline_design.logs.readers.stream import PointTimes, Recording, Timeline
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 FORMAT = "packet capture"
 MAGICS = frozenset(

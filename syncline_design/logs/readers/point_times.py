@@ -7,13 +7,13 @@ absolute seconds.  What is meant is told by type and size.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.readers.stream import PointTimes
+from syncline_design.machine.quick_dataclass import dataclass
 
 NAMES: Final = ("t", "time", "timestamp", "time_stamp", "offset_time", "timeOffset", "ts")
 # PointField datatypes of sensor_msgs

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 HEAD_BYTES = 1 << 16
 EXTRA = "logs"

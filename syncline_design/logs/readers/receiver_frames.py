@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import reduce
 from operator import xor
 from typing import BinaryIO, Literal
 
 import numpy as np
+
+from syncline_design.machine.quick_dataclass import dataclass
 
 BLOCK = 1 << 20
 LONGEST_SENTENCE = 1024

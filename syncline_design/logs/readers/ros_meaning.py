@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Final
 
 from syncline_design.logs.readers.stream import Body, Frame, StaticPose
+from syncline_design.machine.quick_dataclass import dataclass
 
 Row = tuple[float, ...]
 NAN: Final = math.nan

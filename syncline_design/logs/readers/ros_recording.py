@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,6 +26,7 @@ from syncline_design.logs.readers.stream import (
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import NoVerdict, in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 PIECE_ROWS = 20_000
 CHECK_EVERY = 8_192  # messages between two looks at the clock

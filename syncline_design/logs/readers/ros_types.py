@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -13,6 +12,7 @@ from typing import Any, Literal
 from syncline_design.logs.readers.reader import library
 from syncline_design.logs.readers.stream import UNSET
 from syncline_design.machine.deadline import NoVerdict
+from syncline_design.machine.quick_dataclass import dataclass
 
 Encoding = Literal["ros1", "cdr", "other"]
 StampOf = Callable[[bytes], int]

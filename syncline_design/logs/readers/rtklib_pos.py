@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
 from typing import Any
@@ -25,6 +24,7 @@ from syncline_design.logs.readers.reader import BY_MAGIC, BY_SHAPE, NO, Head, Re
 from syncline_design.logs.readers.stream import Frame, Recording, Timeline
 from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 DATE = re.compile(r"^(\d{4})/(\d\d?)/(\d\d?)$")
 CLOCK = re.compile(r"^(\d\d?):(\d\d):(\d\d)(\.\d*)?$")

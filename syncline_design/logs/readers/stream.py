@@ -29,12 +29,13 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+
+from syncline_design.machine.quick_dataclass import dataclass
 
 Timeline = Literal["utc", "gps", "tai", "boot", "unknown"]
 Frame = Literal["wgs84", "enu", "ned", "utm", "unknown"]

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
 
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.spec.load import BadInput
 
 BLOCK = 1 << 20

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -25,6 +24,7 @@ from syncline_design.logs.readers.stream import UNSET, Recording, Timeline
 from syncline_design.logs.readers.text_lines import Line, bad_line, head_lines, line_blocks
 from syncline_design.logs.readers.timelines import timeline_of
 from syncline_design.logs.refusals import refuse
+from syncline_design.machine.quick_dataclass import dataclass
 
 BY_HEADER = 2
 PLACE = tuple(f"position_{a}_m" for a in "xyz")

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 import struct
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Any, BinaryIO, Final
 
@@ -31,6 +31,7 @@ from syncline_design.logs.readers.timelines import EARLIEST_NS, calendar
 from syncline_design.logs.readers.ulog_meaning import Meaning, meaning_of
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
+from syncline_design.machine.quick_dataclass import dataclass
 
 MAGIC: Final = b"ULog\x01\x12\x35"
 FORMAT: Final = "PX4 ULog"

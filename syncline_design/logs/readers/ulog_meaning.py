@@ -8,13 +8,13 @@ sea level.  Source: msg/*.msg of PX4-Autopilot.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.logs.readers.stream import Body, Frame, Nature
+from syncline_design.machine.quick_dataclass import dataclass
 
 Column = Callable[[NDArray[Any]], NDArray[Any]]
 Fields = Mapping[str, tuple[int, str]]
