@@ -23,7 +23,7 @@ from syncline_design.choice.family import (
 )
 from syncline_design.choice.family_best import primary_of
 from syncline_design.choice.family_tables import clock_of, tabulate_family
-from syncline_design.choice.milp import ERROR_STEPS, MOST_CUTS, Model, Solver, Variables
+from syncline_design.choice.milp import ERROR_STEPS, MOST_CUTS, Model, Solver, Variables, best_of
 from syncline_design.choice.options import Indices
 from syncline_design.choice.outcome import Deadline, NoVerdict, TooLarge
 from syncline_design.choice.table import Problem
@@ -46,15 +46,10 @@ def family_by_milp(family: Family, deadline: Deadline) -> FamilyDesign | None:
     solver = Solver(deadline)
     solver.demand_canary()
     model = _FamilyModel(family, solver.cp, deadline)
-    first = model.solve(solver, model.objective())
-    if first is None or family.objective == "error":
-        return first
-    amount = evaluate_family(family, first).amount(family.objective)
-    model.hold_objective(first)
-    second = model.solve(solver, model.error())
-    if second is None or evaluate_family(family, second).amount(family.objective) != amount:
-        return first
-    return second
+    if family.objective == "error":
+        return model.solve(solver, model.objective())
+    resource = family.objective
+    return best_of(model, solver, lambda design: evaluate_family(family, design).amount(resource))
 
 
 class _FamilyModel:

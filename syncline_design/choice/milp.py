@@ -13,8 +13,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import field
+from fractions import Fraction
 from importlib import metadata
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from syncline_design.choice.table import Design, Pair, Problem, is_empty
 from syncline_design.machine.quick_dataclass import dataclass
 
 LEAST_HIGHSPY = (1, 15)
+D = TypeVar("D")
 MOST_CUTS = 40
 MOST_DEMANDS = 10_000
 OPTIONS: dict[str, Any] = {"mip_rel_gap": 0.0, "mip_abs_gap": 0.0, "threads": 1, "random_seed": 1}
@@ -46,15 +48,38 @@ def best_by_milp(problem: Problem, deadline: Deadline) -> Design | None:
     solver = Solver(deadline)
     solver.demand_canary()
     model = Model(problem, solver.cp, deadline)
-    first = model.solve(solver, model.objective())
-    if first is None or problem.objective == "error":
-        return first
-    amount = evaluate(problem, first).amount(problem.objective)
-    model.hold_objective(first)
-    second = model.solve(solver, model.error())
-    if second is None or evaluate(problem, second).amount(problem.objective) != amount:
-        return first
-    return second
+    if problem.objective == "error":
+        return model.solve(solver, model.objective())
+    resource = problem.objective
+    return best_of(model, solver, lambda design: evaluate(problem, design).amount(resource))
+
+
+class Program(Protocol[D]):
+    """An integer program whose solutions stand up to exact arithmetic."""
+
+    def objective(self) -> Any:
+        """What is minimised first."""
+
+    def error(self) -> Any:
+        """What is minimised among those of the least objective."""
+
+    def hold_objective(self, design: D) -> None:
+        """No more of the objective than this design takes."""
+
+    def solve(self, solver: Solver, objective: Any) -> D | None:
+        """The best design; None when proven that none is."""
+
+
+def best_of(
+    program: Program[D], solver: Solver, amount: Callable[[D], Fraction | None]
+) -> D | None:
+    """Of the designs of the least amount the one of the least error; None if there is none."""
+    first = program.solve(solver, program.objective())
+    if first is None:
+        return None
+    program.hold_objective(first)
+    second = program.solve(solver, program.error())
+    return first if second is None or amount(second) != amount(first) else second
 
 
 class Solver:
