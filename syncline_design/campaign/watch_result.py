@@ -10,6 +10,12 @@ from syncline_design.machine.records import Named, Record, optional
 
 SCHEMA: Final = "syncline-design/watch/v1"
 WatchOutcome = Literal["unchanged", "alarm"]
+MOST_EVIDENCE: Final = 1e299  # beyond it evidence is not told apart
+
+
+def e_value_text(value: float) -> str:
+    """An e-value to two figures, everywhere alike: `40`, `1.6e+03`, `more than 1e+299`."""
+    return "more than 1e+299" if value >= MOST_EVIDENCE else f"{value:.2g}"
 
 
 @dataclass(frozen=True, slots=True)

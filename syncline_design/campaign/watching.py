@@ -37,6 +37,7 @@ from syncline_design.campaign.watch_result import (
     WatchedRun,
     WatchProvenance,
     WatchRule,
+    e_value_text,
 )
 from syncline_design.diagnosis.candidates import commonness
 from syncline_design.diagnosis.consequence import promise_of
@@ -232,7 +233,7 @@ class _Watching:
             value, sigma = float(change.values[k]), float(spread[k])
             half = NORMAL_95 * sigma
             e_value = math.exp(min(one.log_evidence, 690.0))
-            shown = f"{e_value:.3g}" if one.log_evidence < 690.0 else "more than 1e299"
+            alarm_from = f"alarm from {1.0 / self.request.rate:.3g} on"
             yield Alarm(
                 effect=term.effect.name,
                 sensor=term.sensor,
@@ -244,7 +245,7 @@ class _Watching:
                 unit=slopes[k].unit,
                 text=estimate(value, sigma, slopes[k].unit).text,
                 since=self._since(change.k, one.low, one.high),
-                evidence=f"e-value {shown}, alarm from {1.0 / self.request.rate:.3g} on",
+                evidence=f"e-value {e_value_text(e_value)}, {alarm_from}",
                 e_value=e_value,
                 first_run=self.ordered[one.first_look - 1].number,
                 aliases=others,

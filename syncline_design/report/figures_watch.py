@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
-from syncline_design.campaign.watch_result import RunValue, WatchedRun
+from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_text
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.figures import WIDTH
@@ -44,7 +44,7 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineFigure:
         axes.set_ylabel("e-value")
         scales.grid(axes, "y")
 
-    spoken = f"{values[-1]:.2g} after run {numbers_of[-1]}, alarm from {threshold:.3g} on"
+    spoken = f"{e_value_text(values[-1])} after run {numbers_of[-1]}, alarm from {threshold:.3g} on"
     return draw("fig-evidence", "Evidence for a change", spoken, (WIDTH, 220.0), build)
 
 

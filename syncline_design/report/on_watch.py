@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Final
 
-from syncline_design.campaign.watch_result import Alarm, Watch, WatchedRun
+from syncline_design.campaign.watch_result import Alarm, Watch, WatchedRun, e_value_text
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
@@ -119,15 +119,11 @@ def _parameter(one: Alarm) -> str:
 
 def _facts(found: Watch) -> Iterator[tuple[str, str]]:
     if found.e_value is not None:
-        yield "Evidence for a change", f"e-value {_e_text(found.e_value)}"
+        yield "Evidence for a change", f"e-value {e_value_text(found.e_value)}"
         yield "Alarm", f"from {found.rule.threshold:.3g} on, at any look"
     yield "Runs", str(len(found.runs))
     if found.baseline_after:
         yield "Baseline", f"after run {found.baseline_after}"
-
-
-def _e_text(value: float) -> str:
-    return f"{value:.2g}" if value < 1e4 else f"{value:.0e}"
 
 
 def _alarms(found: Watch) -> list[Node]:
@@ -197,7 +193,7 @@ def _runs(found: Watch) -> list[Node]:
 
 
 def _row(one: WatchedRun) -> Sequence[Cell | str]:
-    e_value = "" if one.e_value is None else _e_text(one.e_value)
+    e_value = "" if one.e_value is None else e_value_text(one.e_value)
     mark = "+" if one.new else ""
     return (Cell(str(one.run), one.run, mark=mark), ", ".join(one.files), one.date or "",
             Cell(numbers.count(one.rows), one.rows), one.verdict, "; ".join(one.named),
