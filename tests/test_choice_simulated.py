@@ -149,6 +149,7 @@ def test_no_design_passes_is_infeasible_in_check_and_optimize(tmp_path: Path) ->
         assert why["conflict"] == {
             "requirements": [{"id": "MC", "kind": "monte_carlo", "line": 6}],
             "minimal": True,
+            "each_suffices": True,
         }
     status = {r["id"]: r["status"] for r in verdict.to_json()["requirements"]}
     assert status["MC"] == "fail"

@@ -116,8 +116,14 @@ def test_intervals_of_one_quantile_that_differ_differ_in_name(simulated_page: st
     cells = [re.sub(r"<[^>]+>", "", c) for c in re.findall(r"<td.*?</td>", simulated_page, re.S)]
     [decided] = [cell for cell in cells if cell.startswith("95 % interval")]
     [row] = re.findall(r"<tr>(?:(?!</tr>).)*?>95 %<.*?</tr>", simulated_page, re.S)
-    ends = [re.findall(r"([\d.]+)\smm", text) for text in (decided, re.sub(r"<[^>]+>", " ", row))]
-    (low, high), (_, final_low, final_high) = (list(map(float, found)) for found in ends)
+    ends = [
+        [float(figure) * (1e-3 if unit == "mm" else 1.0) for figure, unit in found]
+        for found in (
+            re.findall(r"([\d.]+)\s(mm|m)\b", text)
+            for text in (decided, re.sub(r"<[^>]+>", " ", row))
+        )
+    ]
+    (low, high), (_, final_low, final_high) = ends
     assert low <= final_low < final_high <= high
     assert (low, high) != (final_low, final_high)
     assert "over all looks" in decided

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
-from syncline_design.model.quantity import UNITS, Dimension, Quantity
+from syncline_design.model.quantity import UNITS, Quantity
 from syncline_design.spec.case import IN_PLACE, Case
 from syncline_design.spec.choices import InlineTimestamping, RoleChoice
 from syncline_design.spec.load import BadInput, load, load_text
@@ -352,6 +352,5 @@ def test_the_example_of_the_manual_loads(tmp_path: Path) -> None:
 def test_the_manual_lists_every_unit() -> None:
     manual = (SPECS.parent / "docs" / "specs.md").read_text(encoding="utf-8")
     listed = set(re.findall(r"[^\s|,]+", manual.split("|---|---|")[1].split("\n\n")[0]))
-    left_out = {Dimension.ACCELERATION}  # no key of a file takes it
-    units = {u for u, (d, _) in UNITS.items() if d not in left_out and u.isascii()}
+    units = {u for u in UNITS if u.isascii()}
     assert units <= listed

@@ -7,7 +7,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -205,6 +205,15 @@ def test_an_alarm_that_strikes_in_a_finalizer_comes_again(monkeypatch: pytest.Mo
     assert OVERDUE_S <= time.monotonic() - started < 15.0
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """What a shell starts in the background ignores Ctrl-C."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interrupt_that_strikes_in_a_finalizer_comes_again() -> None:
     started = time.monotonic()
     with heard_again(), pytest.raises(KeyboardInterrupt):
