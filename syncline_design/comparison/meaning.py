@@ -21,16 +21,17 @@ from syncline_design.spec.edit import with_effects
 from syncline_design.spec.effects_listed import EffectChoice
 from syncline_design.verdict.named import NamedDesign
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import MissionHorizon, RequirementResult, Verdict, Word, finite
+from syncline_design.verdict.tree import (
+    PREDICATES,
+    MissionHorizon,
+    RequirementResult,
+    Verdict,
+    Word,
+    finite,
+)
 from syncline_design.verdict.verified import framed
 from syncline_design.verdict.verify import check_loaded
 
-WORDS = {
-    "meets": "meets its requirements",
-    "fails": "does not meet its requirements",
-    "infeasible": "has no candidate design that meets the requirements",
-    "indeterminate": "could not be decided",
-}
 MODELS: Mapping[SyncModelName, str] = {"syncline": "Syncline", "per_sensor": "per-sensor model"}
 QUANTILE = "0.95"
 WORTH_SAYING = 1.2  # a Syncline that exceeds the per-sensor model by more is explained
@@ -208,7 +209,7 @@ def horizon_words(horizon: MissionHorizon, *, given: bool) -> str:
 
 
 def _lines(before: _Checked, after: _Checked) -> Iterator[str]:
-    said = [WORDS[one.verdict.verdict] for one in (before, after)]
+    said = [PREDICATES[one.verdict.verdict] for one in (before, after)]
     yield f"Without the findings the spec {said[0]}; with them, it {said[1]}."
     yield from after.refusal or before.refusal
     for row in after.verdict.requirements:

@@ -21,6 +21,7 @@ from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import kind_words, status_word
 from syncline_design.report.words import KINDS, OUTCOMES
+from syncline_design.verdict.tree import PREDICATES
 
 
 def render_diff(name: str, data: Difference) -> str:
@@ -86,15 +87,9 @@ def effect_words(data: Difference | Changes) -> str:
 
 
 def _verdict_words(verdict: VerdictChange) -> str:
-    words = {
-        "meets": "meets its requirements",
-        "fails": "does not meet its requirements",
-        "infeasible": "no design meets the requirements",
-        "indeterminate": "no verdict",
-    }
     if verdict.old == verdict.new:
-        return f"still {words[verdict.new]}"
-    return f"now {words[verdict.new]} (before: {words[verdict.old]})"
+        return f"still {PREDICATES[verdict.new]}"
+    return f"now {PREDICATES[verdict.new]} (before: {PREDICATES[verdict.old]})"
 
 
 def signed_change(change: float, unit: str) -> str:

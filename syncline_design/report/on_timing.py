@@ -28,6 +28,7 @@ from syncline_design.report.figures_timing import offsets, sessions, stability
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.verdict.measured import coverage_words
+from syncline_design.verdict.tree import PREDICATES
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
@@ -45,12 +46,6 @@ _RESTS: Final = {
 _METHODS: Final = {
     "log-normal": "a tolerance bound over sessions, never below the largest",
     "order statistic": "the largest session (order statistic), or what raises it",
-}
-_WORDS: Final = {
-    "meets": "meets its requirements",
-    "fails": "does not meet its requirements",
-    "infeasible": "has no design that meets its requirements",
-    "indeterminate": "could not be decided",
 }
 
 
@@ -172,10 +167,12 @@ def _spec(result: TimingAndSpec) -> list[Node]:
     means = result.spec
     if means is None:
         return []
-    words = f"{means.name} {_WORDS[means.before]}"
+    words = f"{means.name} {PREDICATES[means.before]}"
     if means.after is not None:
         same = means.after == means.before
-        words += "; with the measured clock it " + ("still " if same else "") + _WORDS[means.after]
+        words += (
+            "; with the measured clock it " + ("still " if same else "") + PREDICATES[means.after]
+        )
     changes = [Items(tuple(given(one) for one in means.requirement_changes), mark="!")]
     nodes: list[Node] = [Text(given(words + "."))]
     nodes += changes if means.requirement_changes else []

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Final, Literal
 
 from syncline_design.choice.outcome import Explanation
 from syncline_design.machine.input_files import FileRead
@@ -33,6 +33,13 @@ SCHEMA = "syncline-design/verdict/v1"
 SEVERAL_SCHEMA = "syncline-design/verdicts/v1"
 Status = Literal["pass", "fail", "indeterminate"]
 Word = Literal["meets", "fails", "infeasible", "indeterminate"]
+# What a verdict says of its spec, wherever a sentence goes on with it.
+PREDICATES: Final[dict[Word, str]] = {
+    "meets": "meets its requirements",
+    "fails": "does not meet its requirements",
+    "infeasible": "has no design that meets its requirements",
+    "indeterminate": "could not be decided",
+}
 EXIT_CODES: Mapping[str, int] = {
     "meets": 0,
     "fails": 1,
