@@ -13,16 +13,21 @@ from syncline_design.machine.deadline import in_force
 MOST_COMBINATIONS = 300_000
 
 
+def demand_few(combinations: int) -> None:
+    """TooLarge where trying every one of them would take too long."""
+    if combinations > MOST_COMBINATIONS:
+        raise TooLarge(
+            f"{combinations:.3g} combinations are too many to enumerate "
+            f"(at most {MOST_COMBINATIONS})"
+        )
+
+
 def all_designs(
     problem: Problem, deadline: Deadline | None = None
 ) -> Iterator[tuple[Design, Evaluation]]:
     """Every design with what it costs and reaches; NoVerdict after the deadline."""
     end = deadline or in_force()
-    if problem.combinations > MOST_COMBINATIONS:
-        raise TooLarge(
-            f"{problem.combinations:.3g} combinations are too many to enumerate "
-            f"(at most {MOST_COMBINATIONS})"
-        )
+    demand_few(problem.combinations)
     option_ranges = [range(len(role.options)) for role in problem.roles]
     clock_ranges = [range(len(vehicle.clocks)) for vehicle in problem.vehicles]
     for options in itertools.product(*option_ranges):

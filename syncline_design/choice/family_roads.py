@@ -12,7 +12,7 @@ import numpy as np
 
 from syncline_design.choice.anytime import FEW, SHARE
 from syncline_design.choice.decide import SAME, SMALL
-from syncline_design.choice.enumerate import MOST_COMBINATIONS
+from syncline_design.choice.enumerate import demand_few
 from syncline_design.choice.evaluate import error_key, known_or_more
 from syncline_design.choice.family import (
     Family,
@@ -96,11 +96,7 @@ def _by_milp(family: Family, *, confirm: bool) -> FamilyChoice:
 
 def _enumerated(family: Family) -> Found | None:
     """The first design of all, one by one."""
-    if family.combinations > MOST_COMBINATIONS:
-        raise TooLarge(
-            f"{family.combinations:.3g} combinations are too many to enumerate "
-            f"(at most {MOST_COMBINATIONS})"
-        )
+    demand_few(family.combinations)
     best: Found | None = None
     for one in all_of_family(family):
         if best is not None and one.rank >= best.rank:

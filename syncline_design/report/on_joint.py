@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from syncline_design.diagnosis.result import Finding, Joint, LogAlone
@@ -46,6 +47,18 @@ def _tested(found: Finding) -> str:
     return f"Were it one value, the logs would differ so much with a chance of {size}."
 
 
+def latest(
+    title: str, heads: Sequence[str], rows: Sequence[Sequence[Cell | str]], most: int
+) -> list[Node]:
+    """A table that grows with time: whole on the page, elsewhere its last rows."""
+    nodes = show(table(title, heads, rows), silent=True, reach="page")
+    nodes += show(table(title, heads, rows[-most:]), silent=True, reach="text")
+    if len(rows) > most:
+        words = f"The last {most} of {len(rows)}; all in --output json or html."
+        nodes.append(Text(words, quiet=True, reach="text"))
+    return nodes
+
+
 def joint_nodes(joint: Joint | None) -> list[Node]:
     """Every log by itself, and where their statistics are kept."""
     if joint is None:
@@ -54,15 +67,7 @@ def joint_nodes(joint: Joint | None) -> list[Node]:
     heads = ("Log", "File", *(["Start"] if several else []), "First stamp", "Rows #",
              "Alone", "Named alone")  # fmt: skip
     rows = [_row(one, several=several) for one in joint.logs]
-    whole = table("The logs", heads, rows)
-    few = table("The logs", heads, rows[-MOST_LOGS:])
-    nodes: list[Node] = [
-        *show(whole, silent=True, reach="page"),
-        *show(few, silent=True, reach="text"),
-    ]
-    if len(rows) > MOST_LOGS:
-        words = f"The last {MOST_LOGS} of {len(rows)}; all in --output json or html."
-        nodes.append(Text(words, quiet=True, reach="text"))
+    nodes = latest("The logs", heads, rows, MOST_LOGS)
     if joint.starts == len(joint.logs) > 1:
         words = "Each log is a start of its own, so what differs by start differs by log."
         nodes.append(Text(words, quiet=True))

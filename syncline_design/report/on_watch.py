@@ -28,14 +28,13 @@ from syncline_design.report.document import (
     given,
     provenance,
     section,
-    show,
 )
 from syncline_design.report.formats import WATCH_FORMATS as WATCH_FORMATS
 from syncline_design.report.json_out import json_text
-from syncline_design.report.on_joint import torn_nodes
+from syncline_design.report.on_joint import latest, torn_nodes
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
-from syncline_design.report.table import Cell, table
+from syncline_design.report.table import Cell
 from syncline_design.report.text import visible
 
 MOST_RUNS: Final = 10  # told outside the page
@@ -183,13 +182,7 @@ def _effects(found: Watch) -> list[Node]:
 
 def _runs(found: Watch) -> list[Node]:
     heads = ("Run", "File", "First stamp", "Rows #", "Alone", "Named alone", "E-value #")
-    rows = [_row(one) for one in found.runs]
-    nodes = show(table("Runs", heads, rows), silent=True, reach="page")
-    nodes += show(table("Runs", heads, rows[-MOST_RUNS:]), silent=True, reach="text")
-    if len(rows) > MOST_RUNS:
-        words = f"The last {MOST_RUNS} of {len(rows)}; all in --output json or html."
-        nodes.append(Text(words, quiet=True, reach="text"))
-    return nodes
+    return latest("Runs", heads, [_row(one) for one in found.runs], MOST_RUNS)
 
 
 def _row(one: WatchedRun) -> Sequence[Cell | str]:

@@ -20,9 +20,9 @@ from syncline_design.verdict.family_fixes import (
 )
 from syncline_design.verdict.family_named import ruled_out_of
 from syncline_design.verdict.named import ChoiceResult
-from syncline_design.verdict.no_design import infeasible_verdict, unmet
+from syncline_design.verdict.no_design import LATE, infeasible_verdict, unmet
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import Caution, MissionVerdict, RequirementResult, Verdict
+from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Verdict
 from syncline_design.verdict.verified import framed
 
 
@@ -47,14 +47,13 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
     first = work.missions[0].case
     ids = {member.id for member in why.conflict.requirements}
     excluded, count = ruled_out_of(work)
-    late = Caution("time-limit", "the time limit ended the search for reasons and remedies")
     return replace(
         framed("infeasible", work.case, work.scenarios[0].problem, settings.seed),
         requirements=tuple(
             replace(unmet(first, one, one.id in ids, why.conflict.minimal), line=None, column=None)
             for one in first.spec.requirements
         ),
-        warnings=(late,) if why.cut_short else (),
+        warnings=(LATE,) if why.cut_short else (),
         infeasibility=why,
         choice=ChoiceResult(excluded=excluded, excluded_count=count),
         missions=_without_design(work, None),

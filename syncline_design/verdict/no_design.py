@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from syncline_design.choice.outcome import Proof
 from syncline_design.choice.table import Problem
@@ -27,6 +27,8 @@ from syncline_design.verdict.verified import framed
 
 if TYPE_CHECKING:
     from syncline_design.choice.variations import Build
+
+LATE: Final = Caution("time-limit", "the time limit ended the search for reasons and remedies")
 
 
 def unfinished_verdict(
@@ -55,14 +57,13 @@ def infeasible_verdict(
     found = explain(case, problem, build)
     conflict = {member.id for members in found.conflicts for member in members}
     minimal = found.conflict.minimal
-    late = Caution("time-limit", "the time limit ended the search for reasons and remedies")
     return replace(
         framed("infeasible", case, problem, settings.seed),
         requirements=tuple(
             placed(case, i, one, unmet(case, one, one.id in conflict, minimal), settings)
             for i, one in enumerate(case.spec.requirements)
         ),
-        warnings=(*((late,) if found.cut_short else ()), *implausible_cautions(case)),
+        warnings=(*((LATE,) if found.cut_short else ()), *implausible_cautions(case)),
         infeasibility=found,
         nearest=nearest(case, problem, found, build),
         choice=without_choice(problem),
