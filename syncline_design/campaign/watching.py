@@ -44,12 +44,12 @@ from syncline_design.diagnosis.consequence import promise_of
 from syncline_design.diagnosis.findings import estimate
 from syncline_design.diagnosis.result import SpecRead
 from syncline_design.diagnosis.search import DiagnosisSettings, Progress, silent
-from syncline_design.diagnosis.slow_states import NORMAL_95
 from syncline_design.diagnosis.system import pinned_system
 from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NORMAL_95
 from syncline_design.spec.case import Case
 
 RATE: Final = 0.05

@@ -28,9 +28,8 @@ from syncline_design.choice.options import Indices
 from syncline_design.choice.outcome import Deadline, NoVerdict, TooLarge
 from syncline_design.choice.table import Problem
 
-MOST_BINARIES = (
-    20_000  # of all ways together; a program of more takes longer to write than to merge
-)
+# Of all ways together; a program of more takes longer to write than to merge.
+MOST_BINARIES = 20_000
 
 
 def family_by_milp(family: Family, deadline: Deadline) -> FamilyDesign | None:

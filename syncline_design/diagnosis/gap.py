@@ -23,6 +23,7 @@ from syncline_design.diagnosis.regimes import covariates
 from syncline_design.diagnosis.result import Fit, Gap, HeldOut, Saved
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NORMAL_95
 
 BLOCKS = 5
 PURGE_S = 5.0  # left out on both sides of a held-out block
@@ -30,7 +31,6 @@ PURGE_SHARE = 0.1  # of a block, at most
 REGIME_SHARE = 0.3  # fastest share of the rows, held out as a regime
 LEAST_GAP = 1e-9  # nat per sample
 LEAST_TRAINING = 30  # rows
-NORMAL_95 = 1.959963984540054
 
 Index = NDArray[np.int64]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Final
 
 import numpy as np
 from scipy.stats import chi2, f
@@ -17,8 +16,7 @@ from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.known import EffectEntry
-
-NEARLY_ALL: Final = 1.6449  # standard deviations below which 5 % lie: seen in 19 of 20 logs
+from syncline_design.model.normal import NEARLY_ALL
 
 
 @dataclass(frozen=True, slots=True)

@@ -35,6 +35,7 @@ from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NORMAL_95
 
 Channel = tuple[Sensor, int]
 SURVEY: Sensor = ("", "target")  # channel of the targets' survey errors
@@ -57,7 +58,6 @@ LOST = 1e-7  # share of a column's information below which others hold it all
 RIDGE = 1e-9  # of scaled columns that hold one another
 SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
 LEAST_LOG_P = -700.0
-NORMAL_95 = 1.959963984540054
 
 
 @dataclass(frozen=True, slots=True)

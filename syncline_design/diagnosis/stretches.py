@@ -49,12 +49,12 @@ from syncline_design.diagnosis.stretch_windows import (
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NEARLY_ALL
 
 MOST_BLOCKS: Final = 1200  # that windows are made of; of a longer log several rows each
 DRAWS: Final = 6  # logs drawn from the fitted noise
 STREAM: Final = 23  # key of their draws
-SURE: Final = 1e-4  # the same: it acts there
-NEARLY_ALL: Final = 1.6449  # standard deviations below which 5 % lie
+SURE: Final = 1e-4  # chance that a sound log has such a window, below which it acts there
 NEARLY_ALL_PLACES: Final = 0.05  # of the windows show less than is told
 AS_GOOD_NATS: Final = 4.5  # within which candidates of a window are not told apart
 ASKED: Final = ("latency", "lever_arm", "mounting")  # kinds of assumptions

@@ -20,10 +20,10 @@ from syncline_design.diagnosis.candidates import Signature, slopes
 from syncline_design.diagnosis.fitting import Data, Model, inner
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NEARLY_ALL
 
 BUILD: Final = {"s": 0.2, "m": 1.0, "rad": 0.1}  # what a build can be wrong by, by unit
 HELD: Final = 1e8  # of the prior's weight, along what moves no object
-NEARLY_ALL: Final = 1.6449  # standard deviations below which 95 % lie
 LARGER: Final = 1.5  # times the uncertainty alone, from which others count
 Label = tuple[str, str, int]
 
