@@ -21,6 +21,7 @@ from syncline_design.diagnosis.noise import (
     precision,
     spec_bounds,
 )
+from syncline_design.diagnosis.noise_slopes import _blocks
 from syncline_design.diagnosis.scene import acting
 from syncline_design.diagnosis.scores import Gram, clean_threshold, log_p_of
 from syncline_design.diagnosis.tails import tails_of
@@ -65,6 +66,24 @@ def test_banded_algebra_is_the_dense_one(m: int) -> None:
     error = series[:, :, 0]
     density = multivariate_normal(np.zeros(45), full).logpdf(error.ravel())
     assert known.negative_log_likelihood(error) == pytest.approx(-density, rel=1e-10)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 7, 15])
+def test_states_vary_as_the_whole_matrix_says(n: int) -> None:
+    """Covariances of each stamp, and of a process with itself at the next, by a dense inverse."""
+    white, loading, time_s, constants = example(n, 3)
+    prior, seen = np.zeros((2, n, 3, n, 3))
+    for i in range(n):
+        seen[i, :, i] = loading[i].T @ np.linalg.solve(white[i], loading[i])
+        for j in range(n):
+            prior[i, :, j] = np.diag(np.exp(-abs(time_s[i] - time_s[j]) / constants))
+    flat = (3 * n, 3 * n)
+    whole = np.linalg.inv(np.linalg.inv(prior.reshape(flat)) + seen.reshape(flat))
+    blocks = whole.reshape(n, 3, n, 3)
+    same, following = _blocks(factored(white, loading, time_s, constants).factor, 3)
+    assert same == pytest.approx(np.array([blocks[i, :, i] for i in range(n)]), abs=1e-9)
+    expected = [np.diagonal(blocks[i + 1, :, i]) for i in range(n - 1)]
+    assert following == pytest.approx(np.array(expected).reshape(-1, 3), abs=1e-9)
 
 
 def test_the_slow_part_is_the_conditional_mean() -> None:

@@ -69,12 +69,11 @@ class Promise:
 
     def turns_at(self, entry: EffectEntry, name: str, most: float) -> float:
         """Least value of one parameter, up to `most`, that turns a requirement."""
-        low, high = 0.0, most
+        low, high, before = 0.0, most, self._broken((), 0.0)
         for _ in range(HALVINGS):
             middle = 0.5 * (low + high)
-            low, high = (
-                (low, middle) if self.turned([_with(entry, name, middle)]) else (middle, high)
-            )
+            turned = before < self._broken([_with(entry, name, middle)], 0.0)
+            low, high = (low, middle) if turned else (middle, high)
         return high
 
 

@@ -146,7 +146,13 @@ class Precision:
     def negative_log_likelihood(self, error: Array) -> float:
         """-log N(e; 0, C) [nat], e (n, 3)."""
         squares = float(np.sum(error * self.solve(error[:, :, None])[:, :, 0]))
-        return 0.5 * (squares + self.log_determinant + error.size * math.log(2.0 * math.pi))
+        return self.likelihood_of(squares)
+
+    def likelihood_of(self, squares: float) -> float:
+        """The same of an error of which e' C^-1 e is known."""
+        size = self.white_inverse.shape[0] * 3
+        found: float = 0.5 * (squares + self.log_determinant + size * math.log(2.0 * math.pi))
+        return found
 
 
 def factored(white: Array, loading: Array, time_s: Array, time_constant_s: Array) -> Precision:

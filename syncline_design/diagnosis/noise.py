@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import LinAlgError
 
 from syncline_design.diagnosis.covariance import Precision, factored, with_lasting
-from syncline_design.diagnosis.noise_slopes import noise_slopes, summed_over
+from syncline_design.diagnosis.noise_slopes import Slopes, noise_slopes, summed_over
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import Rows
 from syncline_design.logs.stamps import repeated
@@ -362,14 +362,15 @@ class _Packing:
             size[i] = value
         return NoiseLevel(factor, tuple(slow), tuple(times), tuple(size))
 
-    def slopes(self, level: NoiseLevel, known: Precision, error: Array) -> Array:
+    def slopes_at(self, level: NoiseLevel, known: Precision, error: Array) -> Slopes:
+        """Slopes of the NLL by what the covariance is made of."""
+        _, times = loadings(self.structure, level)
+        fresh = np.zeros(known.loading.shape[2] - times.shape[0])
+        return noise_slopes(known, error, self.structure.time_s, np.concatenate([times, fresh]))
+
+    def slopes(self, level: NoiseLevel, found: Slopes) -> Array:
         """Slopes of the NLL and the prior by the packed logarithms."""
         structure = self.structure
-        _, times = loadings(structure, level)
-        count = known.loading.shape[2] - times.shape[0]
-        found = noise_slopes(
-            known, error, structure.time_s, np.concatenate([times, np.zeros(count)])
-        )
         column, time = found.column, found.time
         own = np.cumsum([0, *(part.columns for part in structure.slow)])
         factor = np.array(
@@ -445,7 +446,8 @@ def fit_noise(
 ) -> tuple[NoiseLevel, float]:
     """Noise level of largest likelihood within bounds, and the NLL [nat] reached (no prior in it).
 
-    error (n, 3) [m] on the structure's rows; free_sizes: which directed parts are fitted.
+    error (n, 3) [m] on the structure's rows, which holds no errors of a survey; free_sizes: which
+    directed parts are fitted.
     """
     from scipy.optimize import minimize
 
@@ -457,8 +459,9 @@ def fit_noise(
             known = precision(structure, level)
         except LinAlgError:
             return 1e15, np.zeros_like(vector)
-        total = known.negative_log_likelihood(error) + packing.prior(level)
-        return total, packing.slopes(level, known, error)
+        found = packing.slopes_at(level, known, error)
+        total = known.likelihood_of(found.squares) + packing.prior(level)
+        return total, packing.slopes(level, found)
 
     limits = packing.limits()
     result = minimize(

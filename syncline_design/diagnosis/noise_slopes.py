@@ -14,6 +14,8 @@ Source: Takahashi et al. (1973), as in Rue and Held, Gaussian Markov Random Fiel
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from syncline_design.diagnosis.covariance import Precision
@@ -27,11 +29,13 @@ class Slopes:
 
     white (n, 3, 3): to be summed against the slope of each row's white covariance.  column (m,): by
     the logarithm of each column's scale.  time (m,): by the logarithm of each time constant.
+    squares: e' C^-1 e, which is found on the way.
     """
 
     white: Array
     column: Array
     time: Array
+    squares: float
 
 
 def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Array) -> Slopes:
@@ -41,7 +45,9 @@ def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Arr
     weighted = inverse @ error[:, :, None]
     if m == 0:
         own = weighted[:, :, 0]
-        return Slopes(0.5 * (inverse - own[:, :, None] * own[:, None, :]), np.zeros(0), np.zeros(0))
+        outer = own[:, :, None] * own[:, None, :]
+        squares = float(np.sum(error * own))
+        return Slopes(0.5 * (inverse - outer), np.zeros(0), np.zeros(0), squares)
     states = known.states(weighted)[:, :, 0]  # at every row
     left = weighted[:, :, 0] - (inverse @ (loading @ states[:, :, None]))[:, :, 0]
     same, next_same = _blocks(known.factor, m)
@@ -53,24 +59,61 @@ def noise_slopes(known: Precision, error: Array, time_s: Array, constants_s: Arr
     column -= np.einsum("ni,nic,nc->c", left, loading, states)
     if known.first is not None:
         time_s, states = time_s[known.first], states[known.first]
-    return Slopes(0.5 * white, column, _times(same, next_same, states, time_s, constants_s))
+    times = _times(same, next_same, states, time_s, constants_s)
+    return Slopes(0.5 * white, column, times, float(np.sum(error * left)))
 
 
 def _blocks(factor: Array, m: int) -> tuple[Array, Array]:
     """Blocks of S: of one stamp (n, m, m), and the diagonals of those of neighbours (n - 1, m)."""
-    n = factor.shape[1] // m
-    a, b = np.indices((m, m))
-    columns = np.arange(n)[:, None, None] * m + b
-    diagonal = np.where(a >= b, factor[np.where(a >= b, a - b, 0), columns], 0.0)
-    below = np.where(a <= b, factor[np.where(a <= b, m + a - b, 0), columns[:-1]], 0.0)
-    inverse = np.linalg.inv(diagonal)
+    bands = factor.reshape(m + 1, -1, m)
+    n = bands.shape[1]
+    below = np.zeros((n - 1, m, m))
+    for a in range(m):
+        for b in range(a, m):
+            below[:, a, b] = bands[m + a - b, :-1, b]
+    inverse = _lower_inverse(bands)
     own = np.swapaxes(inverse, 1, 2) @ inverse
     carry = below @ inverse[:-1]
-    back = np.ascontiguousarray(np.swapaxes(carry, 1, 2))
-    for i in range(n - 2, -1, -1):
-        own[i] += back[i] @ own[i + 1] @ carry[i]
+    own[:-1] = _carried(own, carry)
     following = -np.einsum("nab,nba->na", own[1:], carry)
     return own, following
+
+
+def _lower_inverse(bands: Array) -> Array:
+    """Inverses (n, m, m) of the lower triangles (n, m, m) in bands (>= m, n, m), row by row."""
+    n, m = bands.shape[1:]
+    found = np.zeros((m, m, n))
+    for a in range(m):
+        before = np.array([bands[a - b, :, b] for b in range(a)]).reshape(a, n)
+        found[a] = -np.einsum("bn,bcn->cn", before, found[:a])
+        found[a, a] += 1.0
+        found[a] /= bands[0, :, a]
+    return np.ascontiguousarray(np.moveaxis(found, 2, 0))
+
+
+def _carried(own: Array, carry: Array) -> Array:
+    """S_i = A_i + C_i' S_i+1 C_i backwards from S_n-1 = A_n-1, (n - 1, m, m).
+
+    Runs of rows go side by side from zero, S_i = s_i + T_i' X T_i with X the S behind the run and
+    T_i = T_i+1 C_i; then X is carried from run to run.
+    """
+    steps, m = carry.shape[:2]
+    length = max(math.isqrt(steps), 1)
+    runs = -(-steps // length)
+    first = np.zeros((2, runs * length, m, m))  # rows before the first carry nothing on
+    first[0, runs * length - steps :], first[1, runs * length - steps :] = own[:-1], carry
+    alone, product = first.reshape(2, runs, length, m, m)
+    for i in range(length - 2, -1, -1):
+        step = product[:, i].copy()
+        alone[:, i] += np.swapaxes(step, 1, 2) @ alone[:, i + 1] @ step
+        product[:, i] = product[:, i + 1] @ step
+    behind = np.empty((runs, 1, m, m))
+    value = own[-1]
+    for run in range(runs - 1, -1, -1):
+        behind[run, 0] = value
+        value = alone[run, 0] + product[run, 0].T @ value @ product[run, 0]
+    found: Array = alone + np.swapaxes(product, 2, 3) @ behind @ product
+    return found.reshape(-1, m, m)[runs * length - steps :]
 
 
 def _times(

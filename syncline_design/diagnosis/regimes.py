@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from syncline_design.diagnosis.covariance import Precision
@@ -83,41 +85,37 @@ def axis_vectors(view: Scene) -> Array:
     return np.concatenate([ned, along[:, :, None], across[:, :, None], rows.rotation], axis=2)
 
 
-def where_map(view: Scene, error: Array, known: Precision) -> tuple[Regime, ...]:
-    """All cells; the score takes the noise's correlation into account."""
-    weighted = known.solve(np.nan_to_num(error)[:, :, None])[:, :, 0]
+def where_maps(
+    view: Scene, errors: Sequence[Array], known: Precision
+) -> tuple[tuple[Regime, ...], ...]:
+    """All cells, of each error; the score takes the noise's correlation into account."""
     axes = axis_vectors(view)
-    numerator = np.einsum("nij,ni->nj", axes, weighted)
-    plain = np.einsum("nij,ni->nj", axes, np.nan_to_num(error))
-    cells: list[Regime] = []
-    for covariate in covariates(view):
-        edges = np.quantile(covariate.values, np.linspace(0.0, 1.0, BINS + 1))
-        for low, high in itertools.pairwise(edges):
-            last = high == edges[-1]
-            inside = (covariate.values >= low) & (
-                (covariate.values <= high) if last else (covariate.values < high)
-            )
-            if not np.any(inside):
-                continue
-            columns = axes * inside[:, None, None]
-            own = np.einsum("nij,nij->j", columns, known.solve(columns))
+    weighted = [known.solve(np.nan_to_num(error)[:, :, None])[:, :, 0] for error in errors]
+    numerators = [np.einsum("nij,ni->nj", axes, own) for own in weighted]
+    plain = [np.einsum("nij,ni->nj", axes, np.nan_to_num(error)) for error in errors]
+    found: list[list[Regime]] = [[] for _ in errors]
+    for covariate, low, high, inside in _cells(view):
+        columns = axes * inside[:, None, None]
+        own = np.einsum("nij,nij->j", columns, known.solve(columns))
+        count, unit = int(np.sum(inside)), covariate.unit
+        for cells, numerator, values in zip(found, numerators, plain, strict=True):
             for k, axis in enumerate(AXES):
                 if own[k] > 0.0:
                     score = float(np.sum(numerator[inside, k]) / np.sqrt(own[k]))
-                    mean = float(np.mean(plain[inside, k]))
-                    cells.append(
-                        Regime(
-                            covariate.name,
-                            float(low),
-                            float(high),
-                            covariate.unit,
-                            axis,
-                            score,
-                            mean,
-                            int(np.sum(inside)),
-                        )
-                    )
-    return tuple(cells)
+                    mean = float(np.mean(values[inside, k]))
+                    cells.append(Regime(covariate.name, low, high, unit, axis, score, mean, count))
+    return tuple(tuple(cells) for cells in found)
+
+
+def _cells(view: Scene) -> Iterator[tuple[Covariate, float, float, NDArray[np.bool_]]]:
+    """BINS of every covariate, as many rows in each: its ends, and which rows are in it."""
+    for covariate in covariates(view):
+        edges = np.quantile(covariate.values, np.linspace(0.0, 1.0, BINS + 1))
+        for low, high in itertools.pairwise(edges):
+            under = covariate.values <= high if high == edges[-1] else covariate.values < high
+            inside = (covariate.values >= low) & under
+            if np.any(inside):
+                yield covariate, float(low), float(high), inside
 
 
 def strongest(cells: tuple[Regime, ...], count: int = 8) -> tuple[Regime, ...]:

@@ -107,7 +107,8 @@ def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Sh
     """
     own = np.nan_to_num(slopes(data.view, model.acting))
     columns = np.concatenate([own, family], axis=2)
-    normal = inner(columns, model.precision.solve(columns))
+    weighted = model.precision.solve(columns)
+    normal = inner(columns, weighted)
     projector, root, single = _freed(normal, own.shape[2])
     score = projector @ inner(columns, residual[:, :, None])[:, 0]
     seen = root.T @ score
@@ -121,18 +122,23 @@ def _energy(data: Data, model: Model, family: Array, residual: Array, shifts: Sh
     inflation = float(np.clip(grown, 1.0, MOST_INFLATION))
     peak = float(np.max((score * single) ** 2, initial=0.0)) / inflation
     p = float(chi2.sf(float(seen @ seen) / inflation, max(freedom, 1)))
-    return _Tested(p, peak, freedom, _predicted_m(data, model, columns, residual, own.shape[2]))
+    size_m = _predicted_m(data, model, (columns, weighted), residual, own.shape[2])
+    return _Tested(p, peak, freedom, size_m)
 
 
-def _predicted_m(data: Data, model: Model, columns: Array, residual: Array, width: int) -> float:
+def _predicted_m(
+    data: Data, model: Model, weighed: tuple[Array, Array], residual: Array, width: int
+) -> float:
     """RMS [m] of the structure: by how much the regressors bring down errors they have not seen.
+
+    weighed: the regressors X, and C^-1 X.
 
     Stretches of the log are dealt out to FOLDS hands, and each hand is predicted from the others,
     the regressors' scores shrunk by what noise has of their energy (James and Stein 1961).
     """
     n = len(data.view)
     hand = (np.arange(n) * STRETCHES // max(n, 1)) % FOLDS
-    weighted = model.precision.solve(columns)
+    columns, weighted = weighed
     normals = [inner(columns[hand == k], weighted[hand == k]) for k in range(FOLDS)]
     scores = [
         inner(columns[hand == k], residual[hand == k][:, :, None])[:, 0] for k in range(FOLDS)

@@ -26,7 +26,12 @@ from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_s
 from syncline_design.diagnosis.identify import unseen
 from syncline_design.diagnosis.noise import SLOW_LEAST, SLOW_LIMIT, as_specified
 from syncline_design.diagnosis.plots import plots
-from syncline_design.diagnosis.regimes import covariates, first_disagreement_s, strongest, where_map
+from syncline_design.diagnosis.regimes import (
+    covariates,
+    first_disagreement_s,
+    strongest,
+    where_maps,
+)
 from syncline_design.diagnosis.remainder import remainder
 from syncline_design.diagnosis.result import (
     Check,
@@ -38,6 +43,7 @@ from syncline_design.diagnosis.result import (
     Motion,
     Noise,
     Provenance,
+    Regime,
     Remaining,
     SlowNoise,
     SpecRead,
@@ -164,7 +170,7 @@ def told(one: Examined, case: Case | None = None, progress: Progress = silent) -
     checks, sound, verdict = weighed_up.checks, weighed_up.sound, weighed_up.verdict
     shown = smallest_seen(search, result)
     progress("measuring the gap", 0.8)
-    cells = where_map(view, result.base.error, result.model.precision)
+    cells = weighed_up.cells
     remaining = replace(weighed_up.remaining, unexplained=verdict == "unexplained")
     return Diagnosis(
         verdict=verdict,
@@ -195,11 +201,12 @@ def told(one: Examined, case: Case | None = None, progress: Progress = silent) -
 
 @dataclass(frozen=True, slots=True)
 class WeighedUp:
-    """What was found, and what is left, with what both are worth."""
+    """What was found, and what is left, with what both are worth; where the log disagrees."""
 
     findings: tuple[Finding, ...]
     remaining: Remaining
     checks: tuple[Check, ...]
+    cells: tuple[Regime, ...]
 
     @property
     def sound(self) -> bool:
@@ -226,7 +233,8 @@ def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
     material = bool(waves) or (left and weights.left(rest.size_m, causes))
     if material:
         named = stand_ins(named, data, result.model, rest.size_m)
-    after = where_map(data.view, result.model.error, result.model.precision)
+    errors = (result.base.error, result.model.error)
+    before, after = where_maps(data.view, errors, result.model.precision)
     remaining = Remaining(
         unexplained=material,
         spec_m=weights.spec_m,
@@ -237,7 +245,8 @@ def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
         material=material,
     )
     checks = log_checks(data.view, result.model.acting)
-    return WeighedUp(with_system_delay(named, data.view.log.kind), remaining, tuple(checks))
+    named = with_system_delay(named, data.view.log.kind)
+    return WeighedUp(named, remaining, tuple(checks), before)
 
 
 def _with_sizes(
