@@ -83,6 +83,45 @@ def test_sound_under_way_displaces_by_what_the_vehicle_moves(
     assert budget(found).systematic_m == pytest.approx(arc, rel=1e-12)
 
 
+def moored(folder: Path, corrects: list[str]) -> str:
+    """A buoy that neither moves nor turns, 75 m from an AUV at 2 m/s that looks 1 m away."""
+    raw = json.loads(spec(ranging={"corrects": corrects}))
+    buoy = raw["stages"][0]
+    auv = {**buoy, "name": "auv", "platform": {**buoy["platform"], **SAILING, "distance": "1 m"}}
+    auv["ranging"] = {**STILL, "sensor": {**buoy["ranging"]["sensor"], "type": "lidar"}}
+    del auv["position"]
+    return json.dumps({**raw, "stages": [buoy, auv]})
+
+
+def test_what_a_moored_buoy_locates_moves_while_sound_is_under_way(tmp_path: Path) -> None:
+    """The AUV is 2 m/s 2 75 m / c = 20 cm further when the echo is back; figures, ledger, recheck,
+    samples, explanation; where the maker corrects for it, nothing."""
+    text = moored(tmp_path, [])
+    found = system(text, tmp_path)
+    figures = error_statistics(found).over_missions
+    assert figures.rmse_m["3d"] == pytest.approx(0.2, rel=1e-4)
+    assert figures.thu95_m == pytest.approx(0.2, rel=1e-4)
+    assert figures.tvu95_m == pytest.approx(0.2, rel=1e-3)
+    assert worst_case_m(found, 1.0) == pytest.approx(0.2, rel=1e-4)
+    drawn = np.linalg.norm(sample_errors(found, SimulationSettings(samples=4000)), axis=1)
+    assert drawn.min() == pytest.approx(0.2, rel=1e-3)
+    assert drawn.max() == pytest.approx(0.2, rel=1e-3)
+    [term] = [one for one in budget(found).ledger if one.kind == "underway"]
+    assert (term.term, term.stage) == ("v_object*2d/c", "vessel")
+    assert term.value_m == pytest.approx(0.2, rel=1e-12)
+    case = load_text(text, tmp_path / "s.yaml")
+    exact = recheck(case, selection_of(*_sole(case)))
+    assert float(exact.total_m - exact.sensor_error_m) == pytest.approx(0.2, rel=1e-12)
+    asked = CheckSettings(monte_carlo=False, explain=("ACC",))
+    verdict = check_loaded(case, asked).to_json()
+    assert "auv" not in dict(cautions(text, tmp_path)).get("rate", "")
+    [row] = verdict["explained"]
+    [step] = [one for one in row["steps"] if one["name"].startswith("travel_object")]
+    assert eval(step["numbers"]) == pytest.approx(0.2, rel=1e-12)
+    corrected = system(moored(tmp_path, ["travel_time"]), tmp_path)
+    assert budget(corrected).systematic_m == 0.0
+
+
 def test_the_sound_of_the_near_end_travels_less(tmp_path: Path) -> None:
     """Largest at the far end of the distances, in the ledger as in the figures."""
     one = spec({"distance": "30 m .. 75 m"}, platform=SAILING, ranging={"corrects": []})
@@ -207,6 +246,8 @@ def by_hand(stages: list[Raw], chosen: dict[tuple[int, str], Raw]) -> float:
         total += math.sqrt(3.0) * attitude["s"] * DEGREE * d
         if sonar["type"] == "mbes" and sonar["c"] == []:
             total += (one["v"] + d * one["w"]) * 2.0 * d / 1500.0
+            located = stages[index + 1 :]
+            total += located[0]["v"] * 2.0 * d / 1500.0 if located else 0.0
         if one["alpha"] and attitude["rate"]:
             total += one["alpha"] / attitude["rate"] ** 2 / 8.0 * d
         if index == 0:

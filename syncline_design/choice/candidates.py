@@ -151,7 +151,8 @@ def underway_m(
 ) -> Fraction:
     """What a sensor adds by sound under way and by interpolation [m]: see model/underway.py.
 
-    A ranging sensor's fixes are the next stage's positions; its rate is at most c / (2 d).
+    A ranging sensor's fixes are the next stage's positions, whose vehicle moves while sound is
+    under way as well; its rate is at most c / (2 d).
     """
     platform = stage.platform.entry
     if role == "position":
@@ -161,11 +162,12 @@ def underway_m(
         return turn * motion.distance
     sound = fraction_of(stage.choice.sound_speed or SOUND_MPS)
     found = echo = Fraction(0)
+    following = case.stages[stage.index + 1 : stage.index + 2]
     if is_acoustic(sensor.type):
         echo = 2 * motion.distance / sound
         if is_charged(sensor, case.spec.strict_facts):
-            found = travel_m(motion.speed, motion.turning, motion.distance, sound)
-    following = case.stages[stage.index + 1 : stage.index + 2]
+            objects = sum((motion_of(one).speed for one in following), Fraction(0))
+            found = travel_m(motion.rate + objects, motion.distance, sound)
     return found + sum(
         (bend_of(one.platform.entry.acceleration, sensor.rate, echo) for one in following),
         Fraction(0),

@@ -65,7 +65,7 @@ def implied(system: System) -> tuple[Acting, ...]:
 
 
 def _values_of(one: Underway) -> Values:
-    if one.cause == "travel":
+    if one.cause in ("travel", "object"):
         assert one.sensor.sound_mps is not None
         return {"share": 2.0 / one.sensor.sound_mps}
     return {"size": one.size}

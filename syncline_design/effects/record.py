@@ -190,7 +190,7 @@ class Contribution:
     tau_s: to the timestamp error's bound of its sensor; systematic_m: displaces the estimate by at
     most this; turn_rad: turns the measured attitude, and with it the line of sight and the arms;
     sight_rad: turns the line of sight in the body; shift_s: of position and attitude against the
-    ranging sensor, beside tau.
+    ranging sensor, beside tau; relayed_s: of what the stage locates, as the next stage takes it.
     """
 
     tau_s: float = 0.0
@@ -198,6 +198,7 @@ class Contribution:
     turn_rad: float = 0.0
     sight_rad: float = 0.0
     shift_s: float = 0.0
+    relayed_s: float = 0.0
 
     def total_m(self, basis: Basis) -> float:
         """Systematic term of the budget [m]: systematic + sight d + turn (d + |l_L - l_G|)."""

@@ -35,6 +35,21 @@ def _travels(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Cont
     return Contribution(shift_s=values["share"] * basis.distance_m)
 
 
+def _relayed(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
+    """A fix of what carries the next stage is 2 r / c older than its stamp.
+
+    All three sensors are shifted alike, which leaves the stage's own pairs as they are: only the
+    ranging's stamp is handed on.
+    """
+    later = -values["share"] * rows.range_m
+    return Departures(position_shift_s=later, attitude_shift_s=later, ranging_shift_s=later)
+
+
+def _relays(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
+    """The next stage's position is late by 2 d / c at most."""
+    return Contribution(relayed_s=values["share"] * basis.distance_m)
+
+
 def _bend(rng: np.random.Generator, count: int) -> Array:
     """4 u (1 - u), u uniform in the time between two samples: t (T - t) over its largest value.
 
@@ -97,6 +112,20 @@ OF_CAUSE: dict[Cause, Effect] = {
         depart=_travelled,
         sensitivity=None,
         contribute=_travels,
+        implied=True,
+    ),
+    "object": Effect(
+        name="sound under way to what moves",
+        sensors=("ranging",),
+        kind="deterministic",
+        parameters=(),
+        sentence="fixes by {sensor} are of the time before their sound went to the vehicle and back",
+        confused_with="latency of the fixes",
+        separated_by="the same motion of the vehicle near and far",
+        source="the echo is back after 2 r / c",
+        depart=_relayed,
+        sensitivity=None,
+        contribute=_relays,
         implied=True,
     ),
     "path": Effect(

@@ -1,7 +1,8 @@
 """What happens between two samples and while sound is on its way: terms beside noise and stamps.
 
-While sound goes to the object and back, 2 d / c, vehicle and object move: (v_max + d omega_max)
-2 d / c [m] unless the maker corrects for it.  Position and attitude are wanted between two of their
+While sound goes to the object and back, 2 d / c, the vehicle moves: (v_max + d omega_max) 2 d / c
+[m], and the object by its own v_max 2 d / c where it carries the next stage, unless the maker
+corrects for it: a fix of the ping's moment is stamped when its echo is back.  Position and attitude are wanted between two of their
 samples, T apart: the straight line between them is off by at most a_max T^2 / 8 from a path of that
 acceleration (the error of linear interpolation, h^2 / 8 max |f''|, NIST DLMF 3.3.4), an attitude
 by alpha_max T^2 / 8, which moves an object by d times as much.  In a chain the fixes that the stage
@@ -19,9 +20,10 @@ from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Sensor, Stage, System
 
 TRAVEL = "(v_max+d*omega_max)*2d/c"
+MOVED = "v_object*2d/c"
 PATH = "a_max*T^2/8"
 TURN = "alpha_max*T^2/8*d"
-Cause = Literal["travel", "path", "turn"]
+Cause = Literal["travel", "object", "path", "turn"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +31,7 @@ class Underway:
     """One such term, of a sensor of a stage as it enters its estimate.
 
     role: what is shifted or interpolated; sensor, owner: which sensor does it, of which stage;
-    size: 2 d / c [s], a_max T^2 / 8 [m] or alpha_max T^2 / 8 [rad]; value_m: the term.
+    size: 2 d / c [s] (travel, object), a_max T^2 / 8 [m] or alpha_max T^2 / 8 [rad]; value_m: the term.
     interval_s: T, of an interpolated one.
     """
 
@@ -45,7 +47,7 @@ class Underway:
     @property
     def term(self) -> str:
         """Its name in the ledger."""
-        return {"travel": TRAVEL, "path": PATH, "turn": TURN}[self.cause]
+        return {"travel": TRAVEL, "object": MOVED, "path": PATH, "turn": TURN}[self.cause]
 
 
 def echo_s(sensor: Sensor, distance: float) -> float:
@@ -64,9 +66,19 @@ def underway(system: System) -> tuple[Underway, ...]:
     found: list[Underway] = []
     before: Stage | None = None
     for index, stage in enumerate(system.stages):
-        found += (one for one in _of_stage(index, stage, before) if one.value_m)
+        moved = (*_of_stage(index, stage, before), *_of_object(index, system.stages[index:]))
+        found += (one for one in moved if one.value_m)
         before = stage
     return tuple(found)
+
+
+def _of_object(index: int, stages: tuple[Stage, ...]) -> Iterator[Underway]:
+    """How far the vehicle that the first of some stages locates moves until its fix is stamped."""
+    ranging = stages[0].ranging
+    if ranging is not None and ranging.travels and len(stages) > 1:
+        echo = echo_s(ranging, distance_m(stages[0]))
+        speed = float(stages[1].platform.v_max_mps)
+        yield Underway("object", index, "ranging", ranging, stages[0], echo, speed * echo)
 
 
 def _of_stage(index: int, stage: Stage, before: Stage | None) -> Iterator[Underway]:

@@ -53,6 +53,7 @@ TERMS: Final[dict[str, str]] = {
     "sigma_r": "range noise \u03c3_r",
     "sigma_u*d": "bearing noise \u03c3_u\u00b7d",
     "(v_max+d*omega_max)*2d/c": "sound under way (v_max + d\u00b7\u03c9_max)\u00b72d/c",
+    "v_object*2d/c": "sound under way to a vehicle that moves v_object\u00b72d/c",
     "a_max*T^2/8": "interpolated position a_max\u00b7T\u00b2/8",
     "alpha_max*T^2/8*d": "interpolated attitude \u03b1_max\u00b7T\u00b2/8\u00b7d",
     "v_max*tau": "translation v_max\u00b7\u03c4",

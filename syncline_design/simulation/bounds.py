@@ -206,7 +206,17 @@ def _added(system: System, index: int, known: Known) -> Added:
         offset += what.systematic_m * (1.0 + stretched if one.sensor == "ranging" else 1.0)
     position = pair_extra_s(system, index, "position", known)
     attitude = pair_extra_s(system, index, "attitude", known)
-    return Added(position + later, attitude + later, turn, euler, sight, offset)
+    return Added(
+        position + later + _relayed_s(system, index), attitude + later, turn, euler, sight, offset
+    )
+
+
+def _relayed_s(system: System, index: int) -> float:
+    """By how much the fixes of the stage before are later than its stamps say, beside tau [s]."""
+    if index == 0:
+        return 0.0
+    before = acting_effects.stage_contributions(system, index - 1)
+    return math.fsum(what.relayed_s for _, what in before)
 
 
 def pair_extra_s(system: System, index: int, role: RoleName, known: Known) -> float:

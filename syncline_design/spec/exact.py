@@ -32,9 +32,9 @@ def norm(figures: float | Sequence[float], axes: int) -> Fraction:
     return square_root(sum((fraction_of(v) ** 2 for v in values), Fraction(0)))
 
 
-def travel_m(speed: Fraction, turning: Fraction, distance: Fraction, sound: Fraction) -> Fraction:
-    """(v_max + d omega_max) 2 d / c [m], turning being d omega_max: see model/underway.py."""
-    return (speed + turning) * 2 * distance / sound
+def travel_m(speed: Fraction, distance: Fraction, sound: Fraction) -> Fraction:
+    """v 2 d / c [m], v the sum of what moves meanwhile: see model/underway.py."""
+    return speed * 2 * distance / sound
 
 
 def bend_of(acceleration: float | None, rate: float | None, echo: Fraction) -> Fraction:

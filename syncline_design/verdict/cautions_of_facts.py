@@ -114,7 +114,8 @@ def _favoured(chosen: list[Chosen]) -> Iterator[Caution]:
 
 
 def _travelling(case: Case, verified: Verified, chosen: list[Chosen]) -> Iterator[Caution]:
-    """What vehicle and object move while sound is on its way: (v + d omega) 2 d / c [m].
+    """What vehicle and object move while sound is on its way: (v + d omega) 2 d / c [m], v
+    with that of the vehicle that it locates, if it does.
 
     The maker takes it out (then no figure has it), or says that he does not (then the ledger has
     it), or nobody says: then no figure has it, and somebody has to look.
@@ -125,6 +126,7 @@ def _travelling(case: Case, verified: Verified, chosen: list[Chosen]) -> Iterato
         platform, sound = stage.platform.entry, surroundings(case, stage).sound_speed
         echo = 2.0 * platform.distance / sound
         moved = (platform.v_max + platform.distance * platform.omega_max) * echo
+        moved += sum(one.platform.entry.v_max * echo for one in case.stages[stage.index + 1 :][:1])
         where = (
             f"{name}: {stage.choice.name} and its object move up to "
             f"{format_quantity(moved, Dimension.LENGTH)} while sound is on its way "

@@ -258,6 +258,14 @@ def _underway(worked: Worked) -> Iterator[ExplainedStep]:
             about, numbers = "(v_max + d omega_max) 2 d / c", f"{rate} * {echo}"
             yield ExplainedStep(_name("travel", stage), about, numbers, one.value_m, "m", source)
             continue
+        if one.cause == "object":
+            located = worked.system.stages[one.stage + 1]
+            about = f"v_max of {located.name} 2 d / c, while sound goes there and back"
+            echo = f"2 * {_n(d)} / {_n(one.sensor.sound_mps or 0.0)}"
+            numbers = f"{_n(located.platform.v_max_mps)} * {echo}"
+            name = _name("travel_object", stage)
+            yield ExplainedStep(name, about, numbers, one.value_m, "m", source)
+            continue
         apart = ExplainedStep(
             _name(f"T_{one.role}", stage), *_apart(one), one.interval_s, "s", source
         )

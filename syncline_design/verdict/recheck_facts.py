@@ -157,7 +157,7 @@ def underway(case: Case, selection: Selection, distances: Mapping[str, Fraction]
 
     distances: of the objects [m], by stage.  A sonar that says that it corrects for nothing (of a
     strict spec: that does not say): its stage moves at v_max + d omega_max for the 2 d / c until
-    the echo is back.  Whoever accelerates is off the straight line between two samples T apart by
+    the echo is back, and so does, at its own v_max, a vehicle that it locates.  Whoever accelerates is off the straight line between two samples T apart by
     a T^2 / 8 at most, an attitude times d; a sonar does not ping again before its echo is back; who
     is located by the stage before has its fixes.
     """
@@ -175,12 +175,19 @@ def underway(case: Case, selection: Selection, distances: Mapping[str, Fraction]
             told = sensor.corrects
             if case.spec.strict_facts if told is None else "travel_time" not in told:
                 total += echo * speed + echo * turn * d
+                total += echo * _speed_of_the_located(case, stage)
         accelerates = _interpolated_for(case, stage, one.role)
         if accelerates is not None:
             apart = max(echo, Fraction(0) if sensor.rate is None else 1 / _exact(sensor.rate))
             bend = _exact(accelerates) * apart * apart / 8
             total += bend * d if one.role == "attitude" else bend
     return total
+
+
+def _speed_of_the_located(case: Case, stage: Any) -> Fraction:
+    """v_max of the vehicle that a stage locates for the next one; 0 of an object that is none."""
+    after = [one for one in case.stages if one.index == stage.index + 1]
+    return _exact(after[0].platform.entry.v_max) if after else Fraction(0)
 
 
 def _interpolated_for(case: Case, stage: Any, role: str) -> Any:
