@@ -252,19 +252,8 @@ def _underway(worked: Worked) -> Iterator[ExplainedStep]:
         stage = worked.system.stages[one.stage]
         platform, d = stage.platform, distance_m(stage)
         source = worked.source(one.sensor.id)
-        if one.cause == "travel":
-            echo = f"2 * {_n(d)} / {_n(one.sensor.sound_mps or 0.0)}"
-            rate = f"({_n(platform.v_max_mps)} + {_n(d)} * {_n(platform.omega_max_radps)})"
-            about, numbers = "(v_max + d omega_max) 2 d / c", f"{rate} * {echo}"
-            yield ExplainedStep(_name("travel", stage), about, numbers, one.value_m, "m", source)
-            continue
-        if one.cause == "object":
-            located = worked.system.stages[one.stage + 1]
-            about = f"v_max of {located.name} 2 d / c, while sound goes there and back"
-            echo = f"2 * {_n(d)} / {_n(one.sensor.sound_mps or 0.0)}"
-            numbers = f"{_n(located.platform.v_max_mps)} * {echo}"
-            name = _name("travel_object", stage)
-            yield ExplainedStep(name, about, numbers, one.value_m, "m", source)
+        if one.cause in ("travel", "object"):
+            yield replace(_echoed(worked, one), source=source)
             continue
         apart = ExplainedStep(
             _name(f"T_{one.role}", stage), *_apart(one), one.interval_s, "s", source
@@ -278,6 +267,21 @@ def _underway(worked: Worked) -> Iterator[ExplainedStep]:
             numbers = f"{_n(platform.angular_acceleration_radps2)} * {apart.name}**2 / 8 * {_n(d)}"
         name = _name(f"between_{one.role}", stage)
         yield ExplainedStep(name, about, numbers, one.value_m, "m", source)
+
+
+def _echoed(worked: Worked, one: Underway) -> ExplainedStep:
+    """What the vehicle, or the one that it locates, moves while sound is under way."""
+    stage = worked.system.stages[one.stage]
+    platform, d = stage.platform, distance_m(stage)
+    echo = f"2 * {_n(d)} / {_n(one.sensor.sound_mps or 0.0)}"
+    if one.cause == "travel":
+        about = "(v_max + d omega_max) 2 d / c"
+        rate = f"({_n(platform.v_max_mps)} + {_n(d)} * {_n(platform.omega_max_radps)})"
+        return ExplainedStep(_name("travel", stage), about, f"{rate} * {echo}", one.value_m, "m")
+    located = worked.system.stages[one.stage + 1]
+    about = f"v_max of {located.name} 2 d / c, while sound goes there and back"
+    numbers = f"{_n(located.platform.v_max_mps)} * {echo}"
+    return ExplainedStep(_name("travel_object", stage), about, numbers, one.value_m, "m")
 
 
 def _apart(one: Underway) -> tuple[str, str]:
