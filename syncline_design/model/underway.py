@@ -2,11 +2,12 @@
 
 While sound goes to the object and back, 2 d / c, the vehicle moves: (v_max + d omega_max) 2 d / c
 [m], and the object by its own v_max 2 d / c where it carries the next stage, unless the maker
-corrects for it: a fix of the ping's moment is stamped when its echo is back.  Position and attitude are wanted between two of their
-samples, T apart: the straight line between them is off by at most a_max T^2 / 8 from a path of that
-acceleration (the error of linear interpolation, h^2 / 8 max |f''|, NIST DLMF 3.3.4), an attitude
-by alpha_max T^2 / 8, which moves an object by d times as much.  In a chain the fixes that the stage
-before relays are interpolated too.  These terms add to the total, not to sensor error or tau_crit.
+corrects for it: a fix of the ping's moment is stamped when its echo is back.  Position and attitude
+are wanted between two of their samples, T apart: the straight line between them is off by at most
+a_max T^2 / 8 from a path of that acceleration (the error of linear interpolation, h^2 / 8 max
+|f''|, NIST DLMF 3.3.4), an attitude by alpha_max T^2 / 8, which moves an object by d times as much.
+In a chain the fixes that the stage before relays are interpolated too.  These terms add to the
+total, not to sensor error or tau_crit.
 """
 
 from __future__ import annotations
@@ -31,7 +32,8 @@ class Underway:
     """One such term, of a sensor of a stage as it enters its estimate.
 
     role: what is shifted or interpolated; sensor, owner: which sensor does it, of which stage;
-    size: 2 d / c [s] (travel, object), a_max T^2 / 8 [m] or alpha_max T^2 / 8 [rad]; value_m: the term.
+    size: 2 d / c [s] (travel, object), a_max T^2 / 8 [m] or alpha_max T^2 / 8 [rad]; value_m: the
+    term.
     interval_s: T, of an interpolated one.
     """
 

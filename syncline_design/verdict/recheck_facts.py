@@ -157,9 +157,10 @@ def underway(case: Case, selection: Selection, distances: Mapping[str, Fraction]
 
     distances: of the objects [m], by stage.  A sonar that says that it corrects for nothing (of a
     strict spec: that does not say): its stage moves at v_max + d omega_max for the 2 d / c until
-    the echo is back, and so does, at its own v_max, a vehicle that it locates.  Whoever accelerates is off the straight line between two samples T apart by
-    a T^2 / 8 at most, an attitude times d; a sonar does not ping again before its echo is back; who
-    is located by the stage before has its fixes.
+    the echo is back, and so does, at its own v_max, a vehicle that it locates.  Whoever accelerates
+    is off the straight line between two samples T apart by a T^2 / 8 at most, an attitude times d;
+    a sonar does not ping again before its echo is back; who is located by the stage before has its
+    fixes.
     """
     stages = {stage.choice.name: stage for stage in case.stages}
     total = Fraction(0)
