@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import make_smoothing_spline
 
 from syncline_design.diagnosis.trajectory import smooth_slope
-from syncline_design.logs.smoothing import PENALTIES, _Foretold, penalty
+from syncline_design.logs.smoothing import PENALTIES, Smoothing, penalty
 
 TIME_S = np.concatenate([np.arange(0.0, 60.0, 0.1), np.arange(75.0, 120.0, 0.1)])
 SPEED = np.stack([8.0 * np.sin(0.5 * TIME_S), 0.02 * TIME_S**2, np.zeros(TIME_S.size)], axis=1)
@@ -41,12 +41,14 @@ def test_what_is_foretold_is_what_another_librarys_splines_say() -> None:
     time_s = np.cumsum(rng.uniform(0.05, 0.4, 300))
     series = 3e3 + np.sin(time_s) + rng.normal(0.0, 0.2, 300)
     known, asked, unit = slice(0, None, 2), slice(1, -1, 2), float(np.median(np.diff(time_s))) ** 3
-    foretold = _Foretold(time_s[known], time_s[asked])
+    foretold = Smoothing(time_s[known], time_s[asked])
     errors = []
     for share in PENALTIES:
         other = make_smoothing_spline(time_s[known], series[known], lam=unit * share)
-        own = foretold.series(series[known], unit * share)
+        own = foretold.values(series[known], unit * share)
         assert own == pytest.approx(other(time_s[asked]), abs=1e-7)
+        slope = foretold.slopes(series[known], unit * share)
+        assert slope == pytest.approx(other(time_s[asked], 1), abs=1e-7)
         errors.append(np.sum((other(time_s[asked]) - series[asked]) ** 2))
     best = int(np.argmin(errors))
     assert 0 < best < len(PENALTIES) - 1

@@ -116,7 +116,13 @@ def _vector(arms: Array, polar: Array | None, rows: int) -> Array:
 
 
 def _size(error: Array) -> float:
-    return float(np.median(np.sqrt(np.nansum(error**2, axis=1))))
+    return float(_sizes(error))
+
+
+def _sizes(error: Array) -> Array:
+    """Median length of each error (..., n, 3)."""
+    found: Array = np.median(np.sqrt(np.nansum(error**2, axis=-1)), axis=-1)
+    return found
 
 
 def signed_permutations() -> list[Array]:
@@ -147,25 +153,29 @@ def _worlds(parts: _Parts, log: Log) -> Iterator[Convention]:
     """Axes and units of the antenna's place, of the targets, and of all that is in the world."""
     carried = rotate(euler_to_rotation(parts.euler), parts.vector)
     held = "target" if log.kind == "georeference" else "reference"
-    for matrix in signed_permutations():
-        for factor, unit in ({1.0: ""} | UNITS).items():
-            back = matrix.T / factor
-            if np.array_equal(back, np.eye(3)):
-                continue
-            words = _held_words(matrix, unit)
-            place, target = parts.antenna @ back.T, _turned(parts.target, back)
-            work = _changes(matrix) + (factor != 1.0)
-            sizes = (
-                _size(place + carried - parts.target),
-                _size(parts.antenna + carried - target),
-                _size(place + carried - target),
+    ways = itertools.product(signed_permutations(), ({1.0: ""} | UNITS).items())
+    for matrix, (factor, unit) in ways:
+        back = matrix.T / factor
+        if np.array_equal(back, np.eye(3)):
+            continue
+        words = _held_words(matrix, unit)
+        place, target = parts.antenna @ back.T, _turned(parts.target, back)
+        work = _changes(matrix) + (factor != 1.0)
+        sizes = _sizes(
+            np.stack(
+                (
+                    place + carried - parts.target,
+                    parts.antenna + carried - target,
+                    place + carried - target,
+                )
             )
-            proper = np.linalg.det(matrix) > 0.0
-            yield Convention("position", words, _antenna(back), work, sizes[0])
-            yield Convention("target", words, _truth(back), work, sizes[1])
-            if factor == 1.0 or (proper and log.kind == "georeference"):
-                words = f"{words} (position, velocity and {held} alike)"
-                yield Convention("position", words, _everything(back), work + 1, sizes[2])
+        ).tolist()
+        proper = np.linalg.det(matrix) > 0.0
+        yield Convention("position", words, _antenna(back), work, sizes[0])
+        yield Convention("target", words, _truth(back), work, sizes[1])
+        if factor == 1.0 or (proper and log.kind == "georeference"):
+            words = f"{words} (position, velocity and {held} alike)"
+            yield Convention("position", words, _everything(back), work + 1, sizes[2])
 
 
 def _held_words(matrix: Array, unit: str) -> str:
@@ -188,15 +198,18 @@ def _attitudes(parts: _Parts) -> Iterator[Convention]:
     off = parts.antenna - parts.target
     before = _belly_down(plain)
     turns = [m for m in signed_permutations() if np.linalg.det(m) > 0.0]
-    for world, body in itertools.product(turns, turns):
-        if np.array_equal(world, np.eye(3)) and np.array_equal(body, np.eye(3)):
-            continue
-        rotation = world.T @ plain @ body
-        words = _attitude_words(world, body)
-        size = _size(off + rotate(rotation, parts.vector))
-        mend = _rotation(partial(_between, world.T, body))
-        upright = _belly_down(rotation) or not before
-        yield Convention("attitude", words, mend, _changes(world) + _changes(body), size, upright)
+    worlds = np.array([m.T for m in turns])
+    for body in turns:
+        rotation = plain @ body
+        carried = rotate(rotation, parts.vector) @ np.swapaxes(worlds, 1, 2)  # exact: axes, signs
+        sizes = _sizes(off + carried).tolist()
+        belly_down = np.median(rotation[:, :, 2] @ worlds[:, 2].T, axis=0) > 0.0
+        for world, size, down in zip(turns, sizes, belly_down.tolist(), strict=True):
+            if np.array_equal(world, np.eye(3)) and np.array_equal(body, np.eye(3)):
+                continue
+            words, work = _attitude_words(world, body), _changes(world) + _changes(body)
+            mend = _rotation(partial(_between, world.T, body))
+            yield Convention("attitude", words, mend, work, size, down or not before)
     yield _transposed(parts, plain, off)
     for euler, words, mend, work in _eulers(parts.euler):
         rotation = euler_to_rotation(euler)

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.diagnosis.scene import levers
 from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotate, rotation_to_euler
@@ -24,6 +25,7 @@ ROWS = 150
 MOST_S = 300.0  # and no more than leaves enough rows
 STEP_S = 0.2
 FINER, TIMES = 25, 3  # shifts to either side of the best, and how often
+AT_ONCE = 100  # shifts
 LEAST_INSIDE = 0.4  # of the rows
 WHOLE_S = 0.03  # a shift this near to whole seconds is one
 
@@ -63,13 +65,15 @@ def best_shifts(system: System, log: Log) -> list[Shift]:
     off = one.antenna_m - few.truth_m
 
     def of_position(wanted: Array) -> Array:
-        place = np.stack([np.interp(wanted, times, places[:, k]) for k in range(3)], axis=1)
-        return place + swung - few.truth_m
+        place = np.stack([np.interp(wanted, times, places[:, k]) for k in range(3)], axis=-1)
+        found: Array = place + swung - few.truth_m
+        return found
 
     def of_attitude(wanted: Array) -> Array:
         near = np.searchsorted(middle, wanted)
-        ahead = (wanted - log.time_s[near])[:, None] * held.rate_radps[near]
-        return off + rotate(turns[near] @ rotation_exp(ahead), vector)
+        ahead = (wanted - log.time_s[near])[..., None] * held.rate_radps[near]
+        turned: Array = np.einsum("gnij,nj->gni", turns[near] @ rotation_exp(ahead), vector)
+        return off + turned
 
     found = [_best("position", few.time_s, of_position, log)]
     if np.any(vector):
@@ -78,25 +82,37 @@ def best_shifts(system: System, log: Log) -> list[Shift]:
 
 
 def _best(sensor: Target, stamps_s: Array, error: Callable[[Array], Array], log: Log) -> Shift:
+    """error: (g, n, 3) [m] of the rows at times (g, n), one line for every shift."""
     most = min(MOST_S, (1.0 - LEAST_INSIDE) * log.duration_s)
     first, last = log.time_s[0], log.time_s[-1]
 
-    def size(seconds: float) -> float:
-        wanted = stamps_s + seconds
+    def sizes(shifts: Array) -> Array:
+        wanted = stamps_s + shifts[:, None]
         inside = (wanted >= first) & (wanted <= last)
-        if np.mean(inside) < LEAST_INSIDE:
-            return np.inf
-        left = error(wanted)[inside]
-        return float(np.median(np.sqrt(np.nansum(left**2, axis=1))))
+        length = np.sqrt(np.nansum(error(wanted) ** 2, axis=2))
+        enough = np.mean(inside, axis=1) >= LEAST_INSIDE
+        found: Array = np.where(enough, _medians(length, inside), np.inf)
+        return found
 
     step = max(STEP_S, most / 2000.0)
     grid = np.arange(-most, most + step, step)
     for _ in range(TIMES):
-        sizes = [size(float(s)) for s in grid]
-        centre = float(grid[int(np.argmin(sizes))])
+        starts = range(0, grid.shape[0], AT_ONCE)
+        found = np.concatenate([sizes(grid[start : start + AT_ONCE]) for start in starts])
+        best = int(np.argmin(found))
+        centre = float(grid[best])
         grid = centre + step * np.linspace(-1.0, 1.0, 2 * FINER + 1)
         step /= FINER
-    return Shift(sensor, centre, min(sizes))
+    return Shift(sensor, centre, float(found[best]))
+
+
+def _medians(values: Array, inside: NDArray[np.bool_]) -> Array:
+    """Of every line (g, n), over what is inside; infinite where nothing is."""
+    ordered = np.sort(np.where(inside, values, np.inf), axis=1)
+    count = np.sum(inside, axis=1)[:, None]
+    pair = [np.take_along_axis(ordered, at, axis=1) for at in ((count - 1) // 2, count // 2)]
+    middle: Array = 0.5 * (pair[0] + pair[1])[:, 0]
+    return middle
 
 
 def attitude_restamped(log: Log, seconds: float) -> Log:

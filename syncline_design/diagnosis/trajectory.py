@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from syncline_design.diagnosis.recent import Recent
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
-from syncline_design.logs.smoothing import LEAST_SMOOTHED, MOST_TRIED, penalty
+from syncline_design.logs.smoothing import LEAST_SMOOTHED, MOST_TRIED, Smoothing, penalty
 from syncline_design.logs.stamps import per_stamp
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.simulation.chain import rotation_exp
@@ -135,8 +135,6 @@ def smooth_slope(time_s: Array, series: Array, at_s: Array) -> Array:
 
 @lru_cache(maxsize=8)  # the scene of one log is set many times, each gross fault once
 def _smooth_slope(time_bytes: bytes, series_bytes: bytes, at_bytes: bytes, width: int) -> Array:
-    from scipy.interpolate import make_smoothing_spline
-
     time_s, at_s = np.frombuffer(time_bytes), np.frombuffer(at_bytes)
     time_s, series = per_stamp(time_s, np.frombuffer(series_bytes).reshape(-1, width))
     slope = pieces(time_s, series).slope(at_s, at_s)
@@ -150,8 +148,8 @@ def _smooth_slope(time_bytes: bytes, series_bytes: bytes, at_bytes: bytes, width
         for a, b in pairwise(bounds) if found else ():
             own = (at_s >= time_s[a]) & (at_s <= time_s[b - 1])
             if b - a >= LEAST_SMOOTHED and np.any(own):
-                smooth = make_smoothing_spline(time_s[a:b], series[a:b, k], lam=found)
-                slope[own, k] = smooth(at_s[own], 1)
+                smooth = Smoothing(time_s[a:b], at_s[own])
+                slope[own, k] = smooth.slopes(series[a:b, k], found)
     return slope
 
 

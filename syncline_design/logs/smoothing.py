@@ -24,20 +24,20 @@ def penalty(time_s: Array, series: Array) -> float:
         return 0.0
     unit = float(np.median(np.diff(time_s))) ** 3
     known, asked = slice(0, None, 2), slice(1, -1, 2)
-    foretold = _Foretold(time_s[known], time_s[asked])
+    foretold = Smoothing(time_s[known], time_s[asked])
     errors = [
-        np.sum((foretold.series(series[known], unit * p) - series[asked]) ** 2) for p in PENALTIES
+        np.sum((foretold.values(series[known], unit * p) - series[asked]) ** 2) for p in PENALTIES
     ]
     best = int(np.argmin(errors))
     return 2.0 * unit * float(PENALTIES[best]) if best else 0.0  # a spline through all rows then
 
 
-class _Foretold:
+class Smoothing:
     """Smoothing splines of series at some stamps t, read at times between them.
 
-    With Q'y the second differences of the series and R = int of the products of hats, the second
-    derivatives at the inner stamps are c of (R + lambda Q'Q) c = Q'y, the values y - lambda Q c.
-    Matrices that do not depend on lambda are made once.
+    Of least sum (y - f)^2 + lambda int f''^2.  With Q'y the second differences of the series and
+    R = int of the products of hats, the second derivatives at the inner stamps are c of
+    (R + lambda Q'Q) c = Q'y, the values y - lambda Q c.  Matrices without lambda are made once.
     Source: Reinsch, Numer. Math. 10 (1967); Green and Silverman (1994), ch. 2.
     """
 
@@ -55,18 +55,30 @@ class _Foretold:
         self.at = np.clip(np.searchsorted(knots_s, asked_s, side="right") - 1, 0, last)
         self.off = (asked_s - knots_s[self.at]) / h[self.at]
 
-    def series(self, values: Array, lam: float) -> Array:
+    def values(self, series: Array, lam: float) -> Array:
         """The spline of lambda [s3] at the times asked for."""
-        from scipy.linalg import solveh_banded
-
-        bend = np.zeros_like(values)
-        second = np.diff(np.diff(values) / self.step)
-        bend[1:-1] = solveh_banded(self.hats + lam * self.rough, second, check_finite=False)
-        smooth, at, u = values - lam * self._differences(bend), self.at, self.off
+        (smooth, bend), at, u = self._fitted(series, lam), self.at, self.off
         curved = (2.0 - u) * bend[at] + (1.0 + u) * bend[at + 1]
         straight = (1.0 - u) * smooth[at] + u * smooth[at + 1]
         found: Array = straight - self.step[at] ** 2 * u * (1.0 - u) / 6.0 * curved
         return found
+
+    def slopes(self, series: Array, lam: float) -> Array:
+        """Its first derivative there."""
+        (smooth, bend), at, u = self._fitted(series, lam), self.at, self.off
+        curved = (2.0 - 6.0 * u + 3.0 * u**2) * bend[at] + (1.0 - 3.0 * u**2) * bend[at + 1]
+        straight = (smooth[at + 1] - smooth[at]) / self.step[at]
+        found: Array = straight - self.step[at] / 6.0 * curved
+        return found
+
+    def _fitted(self, series: Array, lam: float) -> tuple[Array, Array]:
+        """Values and second derivatives at the stamps."""
+        from scipy.linalg import solveh_banded
+
+        bend = np.zeros_like(series)
+        second = np.diff(np.diff(series) / self.step)
+        bend[1:-1] = solveh_banded(self.hats + lam * self.rough, second, check_finite=False)
+        return series - lam * self._differences(bend), bend
 
     def _differences(self, bend: Array) -> Array:
         """Q c, c with its zeros at both ends."""
@@ -82,8 +94,6 @@ def velocity_of(time_s: Array, place_m: Array) -> Array:
     slope, so that no motion is smoothed away, and noisy ones do not put their noise into every
     sensitivity.  Stretches that are too short to tell take the slope between neighbours.
     """
-    from scipy.interpolate import make_smoothing_spline
-
     group = groups(time_s)
     time_s, place_m = per_stamp(time_s, place_m)
     if time_s.shape[0] < 2:
@@ -100,7 +110,7 @@ def velocity_of(time_s: Array, place_m: Array) -> Array:
             own, series = time_s[a:b], place_m[a:b, k]
             if b - a >= LEAST_SMOOTHED:
                 lam = smooth or 1e-9 * float(np.median(step)) ** 3
-                slope[a:b, k] = make_smoothing_spline(own, series, lam=lam)(own, 1)
+                slope[a:b, k] = Smoothing(own, own).slopes(series, lam)
             elif b - a >= 2:
                 slope[a:b, k] = np.gradient(series, own)
     found: Array = slope[group]
