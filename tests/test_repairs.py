@@ -13,6 +13,7 @@ import pytest
 import yaml
 
 from plain_enumeration import Enumeration, Outcome, failed, number, read_catalog
+from syncline_design.comparison import repair_options
 from syncline_design.comparison.repairs import Repair, repairs
 from syncline_design.diagnosis.result import Estimate, Finding
 from syncline_design.report.on_repairs import _row, _sentence
@@ -156,3 +157,24 @@ def test_a_stand_in_and_what_does_not_matter_call_for_nothing() -> None:
     case = load_text(yaml.safe_dump(spec_of(primitive="pps", timestamping="gpio")), "specs/u.yaml")
     wire = finding("latency", "attitude", "s", latency_s=(0.016, 1e-4))
     assert repairs(case, [replace(wire, kind="stand_in"), replace(wire, material=False)]) == ()
+
+
+@pytest.mark.parametrize("in_place", [False, True])
+def test_one_role_is_not_put_right_in_two_ways_at_once(
+    monkeypatch: pytest.MonkeyPatch, *, in_place: bool
+) -> None:
+    """Who buys another sensor does not stamp the present one otherwise as well."""
+    monkeypatch.setattr(repair_options, "MOST_KEPT", 1)  # of each kind, for time's sake
+    spec = spec_of(primitive="pps", timestamping="gpio")
+    if in_place:
+        entry = read_catalog(families=False)["sensors"]["sbg_ellipse"]
+        kept = ("modality", "type", "sigma_attitude", "primitives", "cost")
+        spec["stages"][0]["attitude"]["sensor"] = {key: entry[key] for key in kept}
+    late = finding("latency", "attitude", "s", latency_s=(0.016, 1e-4))
+    noisy = finding("timestamp_jitter", "attitude", "s", std_s=(0.01, 1e-4))
+    found = by_kind(spec, late, noisy)
+    assert "timestamping+timestamping" in found
+    for repair in found.values():
+        ways = {s.text.replace(" for usv attitude", "").removeprefix("stamp usv attitude ")
+                for s in repair.steps if s.kind in ("timestamping", "sensor")}  # fmt: skip
+        assert len(ways) <= 1, [s.text for s in repair.steps]

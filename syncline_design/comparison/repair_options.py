@@ -92,6 +92,16 @@ def applied(case: Case, remedies: Sequence[Remedy]) -> Case:
     return with_effects(case, left)
 
 
+def compatible(remedies: Sequence[Remedy]) -> bool:
+    """Whether all of them can be done: no role is to have two sensors or to be stamped two ways."""
+    wanted: dict[tuple[int, str], PinnedRole] = {}
+    return all(
+        wanted.setdefault((new.stage, new.role), new) == new
+        for one in remedies
+        for new in one.roles
+    )
+
+
 def remedies(case: Case, whole: Case, finding: Finding) -> Iterator[Remedy]:
     """Everything that can be done about a finding.
 

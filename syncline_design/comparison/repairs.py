@@ -10,7 +10,14 @@ from syncline_design.choice.chosen_system import system_of
 from syncline_design.choice.effect_tables import NoBudget, problem_of
 from syncline_design.choice.evaluate import evaluate
 from syncline_design.choice.problem import selection_of, sole_design
-from syncline_design.comparison.repair_options import Kind, Remedy, applied, bought, remedies
+from syncline_design.comparison.repair_options import (
+    Kind,
+    Remedy,
+    applied,
+    bought,
+    compatible,
+    remedies,
+)
 from syncline_design.diagnosis.result import Finding
 from syncline_design.effects.acting import known_of
 from syncline_design.machine.deadline import in_force
@@ -70,7 +77,8 @@ def repairs(case: Case, found: Sequence[Finding], seed: int = 0) -> tuple[Repair
         return ()
     whole = with_whole_catalog(case)
     each = [list(remedies(case, whole, one)) for one in findings]
-    combined = itertools.islice(itertools.product(*each), MOST_COMBINED)
+    possible = filter(compatible, itertools.product(*each))
+    combined = itertools.islice(possible, MOST_COMBINED)
     scored = [one for chosen in combined for one in _scored(case, whole, chosen)]
     best = sorted(_best_of_each_kind(scored), key=_order)[:MOST_SHOWN]
     shown = [_repair(whole, one, seed) for one in best]
