@@ -6,15 +6,15 @@ import json
 import os
 import re
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 from diagnosis_samples import diagnosis
+from syncline_design.cli.app import app
 from syncline_design.comparison.meaning import DesignMeaning, meaning
 from syncline_design.model.quantity import format_duration
 from syncline_design.report import numbers
@@ -188,13 +188,10 @@ def test_the_spec_is_never_written_over_what_the_command_reads(tmp_path: Path) -
     before = {path: path.read_bytes() for path in (spec, log, own)}
     spelt = tmp_path / "sub" / ".." / "s.yaml"
     for target in (spec, log, own, spelt, tmp_path / "soft.yaml", tmp_path / "hard.yaml"):
-        done = subprocess.run(
-            [sys.executable, "-m", "syncline_design.cli", "diagnose", str(spec), str(log),
-             "--write-spec", str(target)],
-            env={**os.environ, "PYTHONPATH": str(ROOT)}, capture_output=True, text=True,
-            check=False, timeout=120,
-        )  # fmt: skip
-        assert done.returncode == 2, (target, done.stderr)
+        done = CliRunner().invoke(
+            app, ["diagnose", str(spec), str(log), "--write-spec", str(target)]
+        )
+        assert done.exit_code == 2, (target, done.stderr)
         assert done.stdout == ""
         assert str(target) in done.stderr
         assert {path: path.read_bytes() for path in before} == before

@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 
 import syncline_design as sd
 from syncline_design.cli.app import app
+from tests.world import hidden, make_log, scenario
 
 SPECS = Path(__file__).parent.parent / "specs"
 SPEC = SPECS / "position_track.yaml"
@@ -102,9 +103,11 @@ def test_the_others_give_what_their_commands_print(tmp_path: Path) -> None:
 
 
 def test_diagnose_and_study_and_reproduce_are_the_engines(tmp_path: Path) -> None:
-    examples = SPECS.parent / "examples"
-    logs = [examples / "hidden_latency.csv"]
-    found = sd.diagnose(examples / "hidden_latency.yaml", logs, max_effects=1)
+    late = hidden("latency", "position", latency_s=0.06)
+    made = make_log(scenario("multirotor_lines", 31, 60.0, 5.0), (late,))
+    (tmp_path / "late.yaml").write_text(made.spec_yaml(), "utf-8")
+    logs = [made.to_csv(tmp_path / "late.csv")]
+    found = sd.diagnose(tmp_path / "late.yaml", logs, max_effects=1)
     assert [one["effect"] for one in found.to_json()["findings"]] == ["latency"]
     (tmp_path / "base.yaml").write_bytes(SPEC.read_bytes())
     study = tmp_path / "study.yaml"

@@ -38,8 +38,13 @@ def of(log: WorldLog, *exclude: str) -> DiagnosisAndDesign:
 
 @cache
 def example() -> DiagnosisAndDesign:
+    """The shipped example, the first minute and a half of it."""
     spec = EXAMPLES / "hidden_latency.yaml"
-    found = diagnose(spec, [EXAMPLES / "hidden_latency.csv"])
+    lines = (EXAMPLES / "hidden_latency.csv").read_text("utf-8").splitlines(keepends=True)
+    with TemporaryDirectory() as folder:
+        log = Path(folder) / "log.csv"
+        log.write_text("".join(lines[:901]), "utf-8")
+        found = diagnose(spec, [log])
     means = meaning(load(spec), found.effects_entries())
     assert means is not None
     return with_design(found, means)
