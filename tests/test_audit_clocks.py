@@ -308,7 +308,9 @@ def test_stamps_out_of_order_by_transport_are_no_packets(tmp_path: Path) -> None
     got = t + 0.004 + np.random.default_rng(14).exponential(0.03, t.size)
     order = np.argsort(got, kind="stable")
     row = said(tmp_path, (t + 37.0)[order], got[order])
-    assert sorted(names(row)) == ["backward_jump", "epoch_offset"]
+    assert names(row) == ["epoch_offset"]
+    falls = int(np.sum(np.diff(t[order]) < 0))
+    assert any(f"why {falls} messages came after later ones" in words for words in row.cannot_show)
 
 
 # ---- receipts out of order, and a jump --------------------------------------------------------

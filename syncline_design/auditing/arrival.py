@@ -26,10 +26,12 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
     if series.receive is None or pace.places.size < 40:
         return None
     late = seconds((series.receive - series.stamp)[pace.places])
+    about = about_rhythm(seconds(series.stamp[pace.places] - series.stamp[pace.places[0]]))
     if not late.any():
+        if copied(about):
+            return None
         return StampFault("stamped_on_arrival", {}, None, None,
                           "every stamp equals its receipt")  # fmt: skip
-    about = about_rhythm(seconds(series.stamp[pace.places] - series.stamp[pace.places[0]]))
     if about is None:
         return None
     own, transport = spread(about), _width(late)
@@ -40,6 +42,11 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
         f"stamps scatter by {in_words(own)} about the sensor's rhythm, late rather than early, "
         f"while receipts follow within {in_words(transport)}: they say when messages came",
     )  # fmt: skip
+
+
+def copied(about: Array | None) -> bool:
+    """Whether times that are alike keep a rhythm that no arrivals keep: receipts made of stamps."""
+    return about is not None and float(np.ptp(np.percentile(about, [1.0, 99.0]))) < _LEAST_JITTER_S
 
 
 def _width(late: Array) -> float:

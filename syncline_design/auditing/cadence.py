@@ -12,12 +12,16 @@ from typing import Final
 import numpy as np
 
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import Array, Mask, Series, scatter, seconds, spread
+from syncline_design.auditing.series import NS, Array, Mask, Series, scatter, seconds, spread
 from syncline_design.machine.quick_dataclass import dataclass
 
 _LEAST_INTERVALS: Final = 20  # to know a rhythm by
 _MOST_GAPS: Final = 0.05  # of all intervals, or two: more are how the messages come
 _MOST_LOST: Final = 0.2  # of all messages: more are left out on purpose
+_LEAST_BY_CHANCE: Final = 100  # intervals that tell chance from a pattern
+_MOST_BY_CHANCE: Final = 0.5  # of all messages: of more the rhythm itself is not known
+_AS_LIKELY: Final = 0.2  # how near runs of missing messages are to the geometric law
+_UNRELATED: Final = 0.05  # correlation of one missing message with the next ones
 _UNEVEN: Final = 0.03  # of an interval: from here on a late message may look like a lost one
 REGULAR: Final = 0.35  # of an interval: larger irregularities are no rhythm
 _PLACED: Final = 0.2  # of an interval: how near to its place a message after a loss is
@@ -27,6 +31,7 @@ _MOST_STRETCHES: Final = 5000
 _GROWTH: Final = 2.0  # of irregularity over 16 intervals against over one: a rhythm 1, a walk 4
 _HOLE: Final = 0.85  # of an interval: more than a late message
 _WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
+_AS_EVER: Final = 0.5  # of a hole's messages that are not missing among receipts
 _IN_A_ROW: Final = 8  # intervals that are lengthened alike: no chance losses
 LONG_GAP: Final = 4  # missing in a row; fewer may be single losses
 
@@ -131,8 +136,8 @@ def missing(
         long_ = lost >= run
     if long_.sum() > max(2.0, _MOST_GAPS * long_.size):
         return ()
-    left_out = float(lost[~long_].sum()) + float(np.sum(_at_another_rate(pace.steps)))
-    blurred = blurred or left_out > _MOST_LOST * lost.size
+    left_out = float(lost[~long_].sum()) + float(np.sum(at_another_rate(pace.steps)))
+    blurred = blurred or (left_out > _MOST_LOST * lost.size and not _by_chance(pace.steps))
     singles = () if blurred else _losses(series, pace, np.where(long_, 0.0, lost))
     return (*_gaps(series, pace, long_), *singles)
 
@@ -141,11 +146,12 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
     """Missing messages of every interval, those taken out as unusable not counted."""
     between = np.diff(pace.places) - 1.0
     lost = np.maximum(pace.steps - 1.0 - between, 0.0)
-    lost[_at_another_rate(pace.steps)] = 0.0
+    lost[at_another_rate(pace.steps)] = 0.0
     if series.receive is not None:
         late = seconds(np.diff((series.receive - series.stamp)[pace.places]))
         shifted = np.abs(late) > np.maximum(6.0 * level_s + 1e-6, 0.5 * lost * pace.period_s)
         lost[shifted & (late < 0.0)] = 0.0
+        lost[_as_ever(series, pace, lost)] = 0.0
     off = np.abs(pace.interval - pace.steps * pace.period_s)
     lost[off > np.maximum(_PLACED * pace.period_s, 0.02 * pace.interval)] = 0.0
     if pace.jitter_s > _UNEVEN * pace.period_s:
@@ -155,7 +161,24 @@ def _lost(series: Series, pace: Cadence, level_s: float) -> Array:
     return lost
 
 
-def _at_another_rate(steps: Array) -> Mask:
+def _as_ever(series: Series, pace: Cadence, lost: Array) -> Mask:
+    """Long holes of the stamps around which as many messages come as ever: their clock jumped, or
+    they were stamped when they came at last."""
+    assert series.receive is not None
+    receive = series.receive[pace.places]
+    when = np.sort(receive)
+    out = np.zeros(lost.size, bool)
+    for k in np.flatnonzero(lost >= LONG_GAP):
+        beside = round(lost[k] * pace.period_s * NS)
+        first, last = sorted((int(receive[k]) - beside, int(receive[k + 1]) + beside))
+        first, last = max(first, int(when[0])), min(last, int(when[-1]))
+        came = int(np.searchsorted(when, last, "right") - np.searchsorted(when, first))
+        expected = (last - first) / NS / pace.period_s
+        out[k] = expected - came < _AS_EVER * lost[k]
+    return out
+
+
+def at_another_rate(steps: Array) -> Mask:
     """Intervals of one and the same number of periods in a row: the sensor measures less often."""
     out = np.zeros(steps.size, bool)
     edges = np.flatnonzero(np.diff(np.concatenate([[-1.0], steps, [-1.0]])) != 0)
@@ -163,6 +186,25 @@ def _at_another_rate(steps: Array) -> Mask:
         if end - begin >= _IN_A_ROW and steps[begin] > 1.0:
             out[begin:end] = True
     return out
+
+
+def _by_chance(steps: Array) -> bool:
+    """Whether messages are missing at random, each as likely as the others: runs of missing ones
+    are geometric, and none tells the next.  What is left out on purpose follows a pattern."""
+    steps = steps[steps > 0.0]
+    share = 1.0 - steps.size / float(steps.sum())
+    if steps.size < _LEAST_BY_CHANCE or not 0.0 < share < _MOST_BY_CHANCE:
+        return False
+    for run in (1, 2, 3):
+        expected = (1.0 - share) * share ** (run - 1)
+        if abs(float(np.mean(steps == run)) - expected) > max(
+            _AS_LIKELY * expected, 4.0 * np.sqrt(expected / steps.size)
+        ):
+            return False
+    missed = (steps > 1.0) - float(np.mean(steps > 1.0))
+    bound = _UNRELATED + 4.0 / float(np.sqrt(steps.size))
+    power = float(missed @ missed)
+    return all(abs(float(missed[lag:] @ missed[:-lag])) < bound * power for lag in range(1, 9))
 
 
 def _stays(series: Series, pace: Cadence, k: int) -> bool:

@@ -26,6 +26,8 @@ _WIDEST: Final = 1.3  # of a tick: how far from an even rhythm stamps on ticks a
 _STRICT: Final = 0.97
 _DISORDER: Final = 0.02  # of all stamps: transport that changes their order
 _COHERENT: Final = 0.75
+_EXACT: Final = 0.002  # of a tick
+_EVEN: Final = 0.1  # of what neighbours are uneven by
 _MOST_LOST: Final = 0.15  # of all messages
 _COARSE_STEPS: Final = 3.0
 _EVENLY: Final = 0.25  # scatter of the distance between skips
@@ -249,7 +251,23 @@ def _timer(series: Series, when: Array, interval: Array, pace: Cadence) -> Grain
         return None  # the rhythm itself, with messages left out
     if timer is None or timer > 1.5 * period or not 0.5 < uneven / timer < _WIDEST:
         return None
+    if _in_turn(when, period) and not _exactly(interval, timer):
+        return None  # publishers in turn, whose distance happens to be near some ticks
     return _packets(series, interval, timer, True, 1.0, pace)
+
+
+def _in_turn(when: Array, period: float) -> bool:
+    """Whether every second, third or fourth stamp comes evenly though neighbours do not."""
+    scattered = spread(np.diff(when))
+    even = [spread(when[lag:] - when[:-lag]) for lag in (2, 3, 4)]
+    return min(even) < _EVEN * min(scattered, period)
+
+
+def _exactly(interval: Array, timer: float) -> bool:
+    """Whether intervals are whole ticks, to what those of one kind scatter by."""
+    off = np.abs(interval - np.round(interval / timer) * timer)
+    alike = min(spread(interval[::2]), spread(interval[::3]), spread(interval[::4]))
+    return float(np.median(off)) < _EXACT * timer + alike
 
 
 def _beat(pace: Cadence, interval: Array) -> float | None:

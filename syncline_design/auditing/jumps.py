@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from syncline_design.auditing.cadence import Cadence
+from syncline_design.auditing.cadence import LONG_GAP, Cadence, at_another_rate
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, in_words, scatter, seconds, spread
 from syncline_design.machine.quick_dataclass import dataclass
@@ -73,6 +73,7 @@ def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
         return nothing
     lasting = _lasting(found, times, late)
     settling = tuple(float(times[j.place]) for j in found if j not in lasting)
+    lasting = [j for j in lasting if not _went_on(j, [s for s in found if s not in lasting], pace)]
     found = _paired(lasting, pace.jitter_s)
     known = series.stamp[pace.places]
     found = [jump for jump in found if not _replays(jump, known)]
@@ -95,7 +96,8 @@ def _found(pace: Cadence, late: Array, least_s: float) -> list[Jump]:
     if float(np.mean(off > max(_BROKEN * period, noise))) > _MOST_BROKEN:
         return []  # no such rhythm
     off_here = off > np.maximum(noise, _ALONE * _around(off))
-    odd = np.flatnonzero(off_here | (pace.steps != 1.0))[:_MOST]
+    counted = (pace.steps != 1.0) & ~at_another_rate(pace.steps)
+    odd = np.flatnonzero(off_here | counted)[:_MOST]
     if not odd.size:
         return []
     width = min(spread(late), spread(late[_APART:] - late[:-_APART]))  # no slow course enters
@@ -171,6 +173,13 @@ def _lasting(found: list[Jump], times: Array, late: Array) -> list[Jump]:
     level = level - _slope(times, level) * (times - times[0])
     ends = [*(jump.place for jump in found[1:]), late.size]
     return [j for j, end in zip(found, ends, strict=True) if not _settles(j, level[j.place : end])]
+
+
+def _went_on(jump: Jump, settling: list[Jump], pace: Cadence) -> bool:
+    """Whether a jump is how a lock went on to settle while no message came."""
+    before = [s for s in settling if s.place < jump.place]
+    hole = float(pace.steps[jump.place - 1]) > LONG_GAP
+    return hole and bool(before) and -1.0 < jump.size_s / before[-1].size_s < 0.0
 
 
 def _settles(jump: Jump, level: Array) -> bool:

@@ -21,7 +21,9 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 Kind = Literal["drift", "bend", "ramp", "step", "episode", "relock", "holdover"]
 _LONGEST: Final = 0.3  # of the log: what settles more slowly is drift
-_WILD: Final = 10.0  # of what is seen: sizes that nearly cancel one another
+_WILD: Final = (
+    10.0  # of what is seen, or of all shapes together: sizes that nearly cancel one another
+)
 _LEAST_BLOCKS: Final = 3  # of an episode
 MOST_SHAPES: Final = 6
 SURE: Final = 8.0  # sigma of a size that is believed
@@ -112,14 +114,15 @@ def shapes_of(
             break
         better = (*found, best)
         grown = polished(better, [True] * len(better), blocks, within=1.1)
-        wild = any(abs(s.size_s) > _WILD * float(np.ptp(low)) for s in grown)
-        if wild or not _believed(grown[-1], blocks, least_s):
+        reach = min(float(np.ptp(low)), float(np.ptp(course(grown, time_s))))
+        wild = any(abs(s.size_s) > _WILD * reach for s in grown)
+        if wild or not believed(grown[-1], blocks, least_s):
             break
         found = grown
     found = _in_two_rates(found, blocks)
     keep = ~straddling(found, time_s, blocks.length_s)
     kept = _pruned(time_s[keep], low[keep], found, blocks)
-    return tuple(s for s in kept if _believed(s, blocks, least_s))
+    return tuple(s for s in kept if believed(s, blocks, least_s))
 
 
 def _known_to_settle(
@@ -163,7 +166,8 @@ def _in_two_rates(found: tuple[Shape, ...], blocks: Blocks) -> tuple[Shape, ...]
     return best if new < now + more * blocks.noise_s**2 else found
 
 
-def _believed(shape: Shape, blocks: Blocks, least_s: float) -> bool:
+def believed(shape: Shape, blocks: Blocks, least_s: float) -> bool:
+    """Whether a shape is large enough to be named."""
     share = _DRIFT_SHARE if shape.kind == "drift" else _STEP_SHARE
     least_s = max(least_s, _LEAST_RUN_S if shape.kind in ("drift", "bend", "ramp") else 0.0)
     floor = max(share * blocks.spread_s, least_s, SURE * shape.sigma_s)

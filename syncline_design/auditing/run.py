@@ -188,7 +188,10 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
     if one.series.receive is None:
         return ("offset, drift, steps and delays: the file tells one time only",)
     said = []
-    if names & {"stamped_on_arrival", "packetised"}:
+    if one.copied:
+        said.append("anything of transport: every receipt is a copy of its stamp, whose rhythm is "
+                    "more even than arrivals are")  # fmt: skip
+    elif names & {"stamped_on_arrival", "packetised"}:
         said.append("how long the data were on their way before they were stamped")
     elif one.constant_s is not None and one.constant_s > 0.0:
         apart = in_words(one.constant_s)
@@ -200,6 +203,11 @@ def _cannot_show(one: Examined) -> tuple[str, ...]:
         far = in_words(one.breathing_s)
         said.append(f"why receipts move to and fro by {far} while its stamps keep their rhythm: "
                     "latency, or the sensor's own oscillator")  # fmt: skip
+    late = one.overtaken
+    if late.falls and late.fault is None:
+        said.append(f"why {late.falls} messages came after later ones, by up to "
+                    f"{in_words(late.deepest_s)}: transport changed their order, and their stamps "
+                    "keep the rhythm (sort by stamp)")  # fmt: skip
     if not one.pace.regular and "packetised" not in names:
         said.append("single lost messages, and whether it was stamped on arrival: it has no rhythm")
     if one.smallest.step_s is None:

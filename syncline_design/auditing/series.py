@@ -29,10 +29,10 @@ class Series:
 
     @property
     def seconds(self) -> Array:
-        """Seconds of receipt since the first message of the run; without receipts, of the latest
-        stamp so far."""
+        """Seconds of the latest receipt so far since the first message of the run; without
+        receipts, of the latest stamp."""
         if self.receive is not None:
-            return seconds(self.receive - self.start)
+            return seconds(np.maximum.accumulate(self.receive) - self.start)
         known = np.where(self.good, self.stamp, np.iinfo(np.int64).min)
         return seconds(np.maximum(np.maximum.accumulate(known), self.start) - self.start)
 

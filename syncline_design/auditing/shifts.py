@@ -18,7 +18,7 @@ from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
 from syncline_design.auditing.grains import best_timer
 from syncline_design.auditing.jumps import Jump, without_jumps
-from syncline_design.auditing.levels import Shape, course, polished, shapes_of
+from syncline_design.auditing.levels import Shape, believed, course, polished, shapes_of
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds, spread
@@ -27,12 +27,14 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip
+_ENTERS: Final = 0.45  # s that the first message of a slip may be from whole seconds
 _TRANSPORT_S: Final = 0.05
 _BLUR_S: Final = 0.2  # interquartile range of delays: from here on whole seconds are no mark
 _DRIFTING_S: Final = 0.03  # over the log: slower drifts do not blur whole seconds
 _WANDER: Final = 0.1  # of how far a clock drifts: smaller shifts may be its wander
 _TAIL: Final = 0.15  # skewness of quantiles; of gamma delays about 0.4, of a wait for a tick 0
 _OTHER_TICKS: Final = 3  # receipts that show a tick
+_OTHER_RATE: Final = 0.3  # of an interval
 _LOOK: Final = 4.0  # blocks around a jump in which the rhythm may break
 
 
@@ -141,7 +143,8 @@ def _is_slip(
     apart = abs(float(np.median(inside)) - float(np.median(right)))
     calm = max(3.0 * spread(right), 1e-3)
     level = spread(inside) < max(3.0 * spread(right), 0.02)
-    enters = begin == 0 or abs(abs(late[begin] - late[begin - 1]) - abs(turns[begin])) < 0.45
+    change = turns[begin] - turns[begin - 1]
+    enters = begin == 0 or abs(late[begin] - late[begin - 1] - change) < _ENTERS
     return apart < min(_WHOLE, max(calm, 0.01)) and level and enters
 
 
@@ -233,6 +236,7 @@ def _slow_shifts(
         own = tuple(s for s in shapes_of(told, least_s=least_s) if s.kind != "drift")
     if len(own) < len(found):  # without what is transport, sizes are others
         own = polished(own, [True] * len(own), blocks)
+        own = own if told is not None else tuple(s for s in own if believed(s, blocks, least_s))
     own = witness.simplest(count, own, blocks)
     whole = series.stamp.copy()
     whole[places] += np.round(course(own, time_s) * NS).astype(np.int64)
@@ -262,8 +266,24 @@ def _own(
         elif shape.kind == "drift" or shape.kind == "bend":
             kept += [shape] if (drift if shape.kind == "drift" else bends) else []
         elif side == "unknown" and shape.kind in ("step", "episode"):
-            kept += [shape] if seen and not _may_be_wander(shape, wander) else []
+            other = _may_be_wander(shape, wander) or _changes_rate(time_s, shape, blocks)
+            kept += [shape] if seen and not other else []
     return tuple(kept)
+
+
+def _changes_rate(time_s: Array, shape: Shape, blocks: Blocks) -> bool:
+    """Whether messages come at another rate from where something begins or ends: they wait for one
+    another more, or less, from then on."""
+    edges = (shape.begin_s,) if shape.kind == "step" else (shape.begin_s, shape.end_s)
+    for edge in edges:
+        near = [time_s[(time_s > a) & (time_s < b)] for a, b in (
+            (edge - 3.0 * blocks.length_s, edge), (edge, edge + 3.0 * blocks.length_s))]  # fmt: skip
+        if min(part.size for part in near) < 8:
+            continue
+        one, other = (float(np.mean(np.diff(part))) for part in near)
+        if abs(one - other) > _OTHER_RATE * min(one, other):
+            return True
+    return False
 
 
 def _placed(shape: Shape, time_s: Array, late: Array, blocks: Blocks) -> Shape:

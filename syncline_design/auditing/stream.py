@@ -11,6 +11,7 @@ from syncline_design.auditing import arrival, grains, order
 from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import Cadence, cadence, level_scatter, missing
 from syncline_design.auditing.counters import unwrapped
+from syncline_design.auditing.disorder import Disorder, disorder_of
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
 from syncline_design.auditing.levels import Shape, smallest
@@ -30,6 +31,8 @@ from syncline_design.machine.quick_dataclass import dataclass
 
 RECEIVED: Final = ("log time", "record", "receive", "capture", "arrival")
 _SAMPLE: Final = 100_000  # messages that tell a resolution
+_AT_EDGES: Final = 0.1  # of the messages that were overtaken
+_STRAY: Final = 0.01
 EDGE_S: Final = 1.5  # how near to the end of a shift a repeated stamp is its own
 TRACE_POINTS: Final = 240
 _NONE: Final = Stamps("", None, np.zeros(0, np.int64))
@@ -56,6 +59,8 @@ class Examined:
     blocks: Blocks | None = None  # levels of receipt minus stamp, without jumps of the stamps' own
     seen: tuple[Shape, ...] = ()  # in these levels
     breathing_s: float = 0.0  # of receipts, while the stamps keep their rhythm
+    overtaken: Disorder = Disorder()  # messages that came after later ones
+    copied: bool = False  # receipts are the stamps once more
 
 
 def examined(stream: Stream, start: int | None = None) -> Examined:
@@ -66,6 +71,12 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     raw = order.in_order_of_receipt(series_of(stamps.primary_ns, _receipts(stamps), start))
     found: list[StampFault] = []
     series, unit, step_ns = _ordered(raw, found, stamps.primary_factor)
+    disorder = disorder_of(series)
+    series = disorder.put(series)
+    if disorder.fault is None:
+        raw = disorder.put(raw)
+    else:
+        found.append(disorder.fault)
     grain = _grain(series, step_ns, found)
     arrived = None if grain else arrival.stamped_on_arrival(series, cadence(series))
     if arrived is not None:
@@ -74,7 +85,8 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         series = order.without_duplicates(series).series
     elif grain is None or not grain.explains_duplicates:
         series = _take(order.without_duplicates(series), found)
-    series = _take(order.without_spikes(series), found)
+    spikes = order.without_spikes(series)
+    series = _take(_beside(disorder, spikes), found)
     epoch = None if unit else epoch_fault(series)
     found[:] = _with_epoch(found, _as_declared(epoch, stream))
     known = _known(epoch, series, unit is not None)
@@ -89,7 +101,9 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     series = moved.series
     pace = cadence(series)
     _last(series, pace, stream, known, grain, found)
-    return _summed(stream, raw, series, pace, found, (slips, moved), known)
+    found = [f for f in found if not _at_edges(f, disorder)]
+    whole = _summed(stream, raw, series, pace, found, (slips, moved), known)
+    return replace(whole, overtaken=disorder, copied=_copied(whole))
 
 
 def _receipts(stamps: Stamps) -> Nanoseconds | None:
@@ -121,6 +135,26 @@ def _ordered(
 def _take(repaired: order.Repaired, found: list[StampFault]) -> Series:
     found += repaired.faults
     return repaired.series
+
+
+def _beside(disorder: Disorder, spikes: order.Repaired) -> order.Repaired:
+    """Stamps out of order, where they are more than where a clock is set while messages overtake
+    one another, and not of those that were put in order."""
+    few = sum(float(f.parameters["count"]) for f in spikes.faults) < _AT_EDGES * disorder.falls
+    return replace(spikes, faults=()) if few else spikes
+
+
+def _copied(one: Examined) -> bool:
+    """Whether every receipt equals its stamp though nothing was stamped on arrival."""
+    raw = one.raw
+    alike = raw.receive is not None and bool(np.array_equal(raw.stamp, raw.receive))
+    return alike and not any(f.fault == "stamped_on_arrival" for f in one.faults)
+
+
+def _at_edges(fault: StampFault, disorder: Disorder) -> bool:
+    """Losses that are so few that they may be messages put in order where a clock was set."""
+    lost = fault.fault == "lost_messages"
+    return lost and float(fault.parameters["count"]) < _STRAY * disorder.falls
 
 
 def _grain(series: Series, step_ns: float, found: list[StampFault]) -> grains.Grain | None:

@@ -1,0 +1,161 @@
+"""What transport does to sound stamps: it overtakes, loses, waits; and stamps that only look like it.
+
+Every world says itself when a sensor measured, what it stamped and when the message came.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from syncline_design.auditing.result import StampFault, StreamAudit
+from syncline_design.auditing.run import audit
+
+BEGAN = 1_755_000_000
+
+
+def said(
+    folder: Path, stamp: np.ndarray, receive: np.ndarray, *, file_order: bool = True
+) -> StreamAudit:
+    """The audit of messages in the order of their receipts."""
+    order = np.argsort(receive, kind="stable") if file_order else np.arange(stamp.size)
+    path = folder / "x.csv"
+    rows = ["stamp_ns,receive_ns"]
+    for s, r in zip(np.rint(stamp * 1e9)[order], np.rint(receive * 1e9)[order], strict=True):
+        rows.append(f"{int(s) + BEGAN * 10**9},{int(r) + BEGAN * 10**9}")
+    path.write_text("\n".join(rows) + "\n", "utf-8")
+    return audit([path]).streams[0]
+
+
+def found(row: StreamAudit) -> dict[str, StampFault]:
+    return {fault.fault: fault for fault in row.faults if fault.counts}
+
+
+def queued(t: np.ndarray, scale: float, seed: int) -> np.ndarray:
+    delay = np.random.default_rng(seed).gamma(2.0, scale, t.size)
+    return np.maximum.accumulate(t + 0.003 + delay)
+
+
+def even(rate: float, length: float) -> np.ndarray:
+    return 0.0171 + np.arange(int(rate * length)) / rate
+
+
+# ---- messages that overtake one another -----------------------------------------------------
+
+
+@pytest.mark.parametrize(("rate", "scale"), [(100.0, 0.005), (200.0, 0.03), (50.0, 0.1)])
+def test_messages_that_overtake_one_another_have_right_stamps(
+    tmp_path: Path, rate: float, scale: float
+) -> None:
+    t = even(rate, 60.0)
+    delay = np.random.default_rng(3).exponential(scale, t.size)
+    row = said(tmp_path, t, t + 0.004 + delay)
+    assert not found(row)
+    assert row.residual_s.bound == pytest.approx(np.ptp(delay), rel=0.05)
+    falls = int(np.sum(np.diff(t[np.argsort(t + delay)]) < 0))
+    assert any(f"why {falls} messages came after" in words for words in row.cannot_show)
+
+
+def test_faults_of_a_stream_that_transport_disorders_are_named_alone(tmp_path: Path) -> None:
+    t = even(50.0, 70.0)
+    receive = t + 0.004 + 0.1 * np.random.default_rng(5).random(t.size)
+    slipped = np.where((t > 30.0) & (t < 42.0), t - 1.0, t)
+    assert set(found(said(tmp_path, slipped, receive))) == {"whole_second_slip"}
+    stepped = np.where(t > 40.0, t + 0.2, t)
+    row = found(said(tmp_path, stepped, receive))
+    assert set(row) == {"step"}
+    assert row["step"].parameters["seconds"] == pytest.approx(0.2, abs=0.01)
+
+
+@pytest.mark.parametrize("rate", [20.0, 200.0])
+def test_stamps_that_two_messages_exchanged_are_wrong(tmp_path: Path, rate: float) -> None:
+    t = even(rate, 60.0)
+    at = np.arange(40, t.size - 5, 75)
+    stamp = t.copy()
+    stamp[at], stamp[at + 1] = t[at + 1], t[at]
+    row = found(said(tmp_path, stamp, queued(t, 0.15 / rate, 6), file_order=False))
+    assert set(row) == {"backward_jump"}
+    assert row["backward_jump"].parameters["count"] == at.size
+    assert row["backward_jump"].parameters["seconds"] == pytest.approx(-1.0 / rate)
+
+
+# ---- messages that are lost ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("share", [0.2, 0.35])
+def test_many_messages_lost_at_random_are_lost(tmp_path: Path, share: float) -> None:
+    t = even(50.0, 60.0)
+    kept = np.random.default_rng(7).random(t.size) >= share
+    kept[[0, -1]] = True
+    row = found(said(tmp_path, t[kept], queued(t, 1e-3, 8)[kept]))
+    assert set(row) == {"lost_messages"}
+    assert row["lost_messages"].parameters["count"] == np.sum(~kept)
+
+
+def test_messages_left_out_by_a_pattern_are_not_lost(tmp_path: Path) -> None:
+    t = even(90.0, 60.0)
+    kept = np.cumsum(np.tile([3, 3, 4], t.size))
+    kept = kept[kept < t.size]
+    assert not found(said(tmp_path, t[kept], queued(t[kept], 1e-3, 9)))
+
+
+# ---- receipts that say nothing -------------------------------------------------------------
+
+
+def test_receipts_copied_from_even_stamps_are_no_arrivals(tmp_path: Path) -> None:
+    t = even(20.0, 60.0)
+    row = said(tmp_path, t, t)
+    assert not found(row)
+    assert any("copy of its stamp" in words for words in row.cannot_show)
+    uneven = t + np.random.default_rng(2).exponential(2e-3, t.size)
+    assert set(found(said(tmp_path, uneven, uneven))) == {"stamped_on_arrival"}
+
+
+def test_a_bus_with_few_kinds_of_delay_shows_no_drift(tmp_path: Path) -> None:
+    """Six places of 0.25 ms in the order of a CAN bus."""
+    t = even(400.0, 50.0)
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        delay = 0.001 + 2.5e-4 * rng.integers(0, 6, t.size) + rng.exponential(1e-5, t.size)
+        assert not found(said(tmp_path, t, t + delay))
+
+
+# ---- how a sensor measures ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("apart", [0.0042, 0.00515, 0.0081])
+def test_two_publishers_in_turn_are_no_packets(tmp_path: Path, apart: float) -> None:
+    one = even(50.0, 60.0)
+    t = np.sort(np.concatenate([one, one + apart]))
+    assert not found(said(tmp_path, t, queued(t, 2e-4, 10)))
+
+
+@pytest.mark.parametrize("later", [100.0, 25.0])
+def test_another_rate_from_some_moment_on_is_no_step(tmp_path: Path, later: float) -> None:
+    first = even(50.0, 30.0)
+    t = np.concatenate([first, first[-1] + np.arange(1, int(30 * later)) / later])
+    for seed in (11, 12):
+        assert not found(said(tmp_path, t, queued(t, 2e-3, seed)))
+
+
+# ---- several at once -----------------------------------------------------------------------
+
+
+def test_a_lock_that_settles_while_no_message_comes(tmp_path: Path) -> None:
+    t = even(200.0, 75.0)
+    stamp = t - np.where(t > 20.0, 0.011 * np.exp(-(t - 20.0) / 4.7), 0.0)
+    kept = (t < 24.2) | (t > 37.4)
+    row = found(said(tmp_path, stamp[kept], queued(t, 4e-4, 13)[kept]))
+    assert set(row) == {"relock", "gap"}
+    assert row["relock"].parameters["settling_s"] == pytest.approx(4.7, rel=0.1)
+    assert row["relock"].parameters["seconds"] == pytest.approx(-0.011, rel=0.1)
+
+
+def test_a_slip_within_a_slip_is_two_stretches_of_whole_seconds(tmp_path: Path) -> None:
+    t = even(50.0, 75.0)
+    stamp = t - np.where((t > 40.0) & (t < 59.0), 2.0, 0.0) - np.where(t > 50.0, 1.0, 0.0)
+    row = said(tmp_path, stamp, queued(t, 1e-3, 14))
+    assert {f.fault for f in row.faults} == {"whole_second_slip"}
+    assert [f.parameters["seconds"] for f in row.faults] == [-2.0, -3.0, -1.0]
