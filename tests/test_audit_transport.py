@@ -1,4 +1,4 @@
-"""What transport does to sound stamps: it overtakes, loses, waits; and stamps that only look like it.
+"""What transport does to sound stamps: it overtakes, loses, waits; and stamps that look like it.
 
 Every world says itself when a sensor measured, what it stamped and when the message came.
 """

@@ -1,9 +1,9 @@
 """Messages that come in another order than they were measured in.
 
-Transport without a queue (datagrams, threads that share a topic) lets one message overtake another:
-each stamp is right, and put in order they keep the sensor's rhythm.  A wrong stamp lies where another
-message was measured already.  Where two messages exchanged their stamps the rhythm is whole as well,
-but the first of them comes before it can have been measured.
+Transport without a queue (datagrams, threads that share a topic) lets one message overtake
+another: each stamp is right, and put in order they keep the sensor's rhythm.  A wrong stamp lies
+where another message was measured already.  Where two messages exchanged their stamps the rhythm
+is whole as well, but the first of them comes before it can have been measured.
 """
 
 from __future__ import annotations

@@ -276,8 +276,9 @@ def _changes_rate(time_s: Array, shape: Shape, blocks: Blocks) -> bool:
     another more, or less, from then on."""
     edges = (shape.begin_s,) if shape.kind == "step" else (shape.begin_s, shape.end_s)
     for edge in edges:
-        near = [time_s[(time_s > a) & (time_s < b)] for a, b in (
-            (edge - 3.0 * blocks.length_s, edge), (edge, edge + 3.0 * blocks.length_s))]  # fmt: skip
+        width = 3.0 * blocks.length_s
+        spans = ((edge - width, edge), (edge, edge + width))
+        near = [time_s[(time_s > a) & (time_s < b)] for a, b in spans]
         if min(part.size for part in near) < 8:
             continue
         one, other = (float(np.mean(np.diff(part))) for part in near)
