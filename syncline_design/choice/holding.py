@@ -7,12 +7,14 @@ place alone makes a part of the design space, and the best of their best designs
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from syncline_design.choice.decide import choose
 from syncline_design.choice.evaluate import evaluate, rank
+from syncline_design.choice.exclusions import Exclusions
 from syncline_design.choice.narrowed import Narrowed, kept, narrowed
 from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Choice, Infeasible, TooLarge, Unfinished
@@ -54,11 +56,23 @@ def parts_with(problem: Problem, kind: EntryKind, identity: str) -> Iterator[Nar
     for r, table in enumerate(problem.roles):
         rows = np.flatnonzero(hold(table.options, kind, identity))
         if len(rows):
-            yield narrowed(problem, [*options[:r], rows, *options[r + 1 :]], clocks)
+            part = narrowed(problem, [*options[:r], rows, *options[r + 1 :]], clocks)
+            yield replace(part, problem=_for_good(part.problem, r, kind, identity))
     for v, vehicle in enumerate(problem.vehicles):
         mine = [i for i, one in enumerate(vehicle.clocks) if holds(one, kind, identity)]
         if mine:
             yield narrowed(problem, options, [*clocks[:v], mine, *clocks[v + 1 :]])
+
+
+def _for_good(part: Problem, r: int, kind: EntryKind, identity: str) -> Problem:
+    """The part that holds an entry in a role under other limits too: a relaxed one brings back
+    options of that role only where they hold it."""
+    gone = part.roles[r].excluded
+    poor, beyond = (
+        own.take(np.flatnonzero(hold(own, kind, identity))) for own in (gone.poor, gone.beyond)
+    )
+    table = replace(part.roles[r], excluded=Exclusions.in_turn(gone.rest, poor, beyond))
+    return replace(part, roles=(*part.roles[:r], table, *part.roles[r + 1 :]))
 
 
 def best_with(problem: Problem, kind: EntryKind, identity: str) -> Design | None:
