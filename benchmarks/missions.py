@@ -1,6 +1,8 @@
 """One payload for several missions: agreement with plain enumeration, and time at full size.
 
 python benchmarks/missions.py agree FIRST COUNT     random families against every design tried
+python benchmarks/missions.py specs FIRST COUNT     random specs, each mission tried by itself
+python benchmarks/missions.py hinges FIRST COUNT    slack ledger and what to measure next, likewise
 python benchmarks/missions.py time MISSIONS SENSORS METHODS [ROLES]
 """
 
@@ -22,6 +24,7 @@ import yaml
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 
 from checked import check_file
+from family_specs import Tried, drawn, is_tied
 from plain_enumeration import Enumeration, number, read_catalog
 from random_families import plain_front, plain_order, random_family
 from syncline_design.choice.evaluate import error_key
@@ -33,6 +36,8 @@ from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.table import NO_CLOCK, Limits, Pair, Problem, RoleTable, VehicleTable
 from syncline_design.verdict.verify import CheckSettings
 from test_missions import written_out
+from test_missions_slack import Family as SaidAndTried
+from test_missions_slack import compare_measurements, compare_slack
 
 
 def agree(first: int, count: int) -> int:
@@ -82,6 +87,24 @@ def specs(first: int, count: int) -> int:
                 wrong += 1
                 print(f"spec {seed} disagrees: {found.verdict} {cost}, enumeration {cheapest}")
     print(f"{count} specs from {first}, {met} with a payload: {wrong} disagree")
+    return wrong
+
+
+def hinges(first: int, count: int) -> int:
+    """How many small families' slack and figures to measure trying every payload sees otherwise."""
+    wrong = met = compared = 0
+    with tempfile.TemporaryDirectory() as folder:
+        for seed in range(first, first + count):
+            if is_tied(Tried(*drawn(seed))):
+                continue  # no payload, or two that nothing tells apart
+            met += 1
+            try:
+                one = SaidAndTried(Path(folder), seed)
+                compared += compare_slack(one) + compare_measurements(one)
+            except AssertionError as error:
+                wrong += 1
+                print(f"family {seed} disagrees: {error}")
+    print(f"{met} families from {first}, {compared} figures: {wrong} disagree")
     return wrong
 
 
@@ -208,9 +231,9 @@ def timed(missions: int, sensors: int, methods: int, roles: int) -> None:
 
 def main() -> None:
     numbers = [int(text) for text in sys.argv[2:]]
-    if sys.argv[1] in ("agree", "specs"):
-        tried = agree if sys.argv[1] == "agree" else specs
-        sys.exit(1 if tried(*numbers) else 0)
+    studies = {"agree": agree, "specs": specs, "hinges": hinges}
+    if sys.argv[1] in studies:
+        sys.exit(1 if studies[sys.argv[1]](*numbers) else 0)
     timed(*(numbers if len(numbers) > 3 else (*numbers, 5)))
 
 

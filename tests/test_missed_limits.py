@@ -1,4 +1,4 @@
-"""By how much designs with an entry miss a limit: the least over designs that hold it, tried out."""
+"""By how much designs with an entry miss a limit, against all designs that hold it."""
 
 from __future__ import annotations
 

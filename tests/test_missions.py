@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import csv
+import io
 import itertools
 import json
 import math
@@ -16,13 +18,13 @@ import yaml
 
 from checked import check_file
 from command import run
-from plain_enumeration import Enumeration, Outcome, number
+from plain_enumeration import Enumeration, Outcome, number, read_catalog
 from syncline_design.machine.records import read_as
 from syncline_design.report.checks import render_checks
 from syncline_design.report.result_schemas import result_schema
 from syncline_design.spec.load import BadInput, load, load_text
 from syncline_design.verdict.tree import Verdict
-from syncline_design.verdict.verify import CheckSettings
+from syncline_design.verdict.verify import CheckSettings, check_loaded
 
 ROOT = Path(__file__).parents[1]
 SHIPPED = ROOT / "examples" / "uav_three_heights.yaml"
@@ -306,6 +308,32 @@ def test_what_works_on_one_system_refuses_missions() -> None:
         done = run(command, str(SHIPPED))
         assert done.returncode == 2
         assert "several missions" in done.stderr
+
+
+def test_the_bill_as_a_table_adds_up_with_shared_and_owned_hardware() -> None:
+    """Two lidars, one of them owned, one board: the union once, and who takes what."""
+    spec = yaml.safe_load(BOARDED)
+    spec["owned"] = ["livox_mid360"]
+    spec["timestamping"]["candidates"] = ["hardware"]
+    spec["missions"][0]["stages"]["uav"]["ranging"] = {"candidates": ["livox_mid360"]}
+    verdict = check_loaded(load_text(yaml.safe_dump(spec), "boarded.yaml"), QUICK)
+    rows = list(csv.DictReader(io.StringIO(render_checks("bill", [verdict]), newline="")))
+    shared = read_catalog()
+    board = shared["infrastructure"]["timing_board"]
+    lidars = {row["entry"]: row for row in rows if row["use"] == "ranging sensor"}
+    assert (lidars["livox_mid360"]["cost"], lidars["livox_mid360"]["basis"]) == ("0.0", "owned")
+    assert {name: row["missions"] for name, row in lidars.items()} == {
+        "livox_mid360": "near", "livox_tele15": "far",
+    }  # fmt: skip
+    (shelf,) = [row for row in rows if row["entry"] == "timing_board"]
+    assert (shelf["quantity"], shelf["missions"]) == ("1", "")
+    assert float(shelf["cost"]) == number(board["cost"])
+    # One way of stamping for each of the four sensors, though each mission uses three.
+    assert sum(row["entry"] == "hardware" for row in rows) == 4
+    cents = sum(round(100 * float(row["cost"])) for row in rows)
+    assert verdict.design is not None
+    assert verdict.design.cost is not None
+    assert cents == round(100 * verdict.design.cost)
 
 
 def test_what_is_no_sum_is_asked_in_every_mission(tmp_path: Path) -> None:

@@ -42,7 +42,7 @@ from syncline_design.choice.what_if import (
 )
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.machine.records import Record
+from syncline_design.machine.records import Record, optional
 from syncline_design.spec.case import Case
 
 # Values tried, over the term's own: from a nudge that only settles ties to a million times.
@@ -71,6 +71,7 @@ class Slack(Record):
     payload_changes_at: float | None
     searched_to: float | None = None
     never: tuple[str, ...] = ()
+    mission: str | None = optional()
 
 
 def slack_ledger(
@@ -88,7 +89,7 @@ def slack_ledger(
                 if chosen_options(problem, design)[r].error() > 0:
                     rows.append(_error_slack(asked, r))
                 rows.append(_tau_slack(asked, r))
-        what_if = _platform_what_if(case, problem, build, index)
+        what_if = platform_what_if(case, problem, build, index)
         for figure in PLATFORM_FIGURES:
             row = _platform_slack(
                 asked, float(platform_figure(case, index, figure)), figure, what_if
@@ -124,12 +125,7 @@ def _error_slack(asked: _Asked, r: int) -> Slack:
     """
     problem, design = asked.problem, asked.design
     table, own = problem.roles[r], chosen_options(problem, design)[r]
-    limit, fails = problem.limits.accuracy_m, None
-    if limit is not None:
-        total = evaluate(problem, design).total_m
-        slope = 1 + own.noise_systematic_m / own.error()
-        fails = float(own.error() + (Fraction(limit) - total) / slope)
-
+    limit, fails = problem.limits.accuracy_m, error_limit(problem, design, r)
     rows = of_sensor(problem, r, design.options[r])
 
     def changed(value: float) -> Problem:
@@ -141,11 +137,20 @@ def _error_slack(asked: _Asked, r: int) -> Slack:
     return _with_payload(row, asked, changed, fails_never=sure)
 
 
+def error_limit(problem: Problem, design: Design, r: int) -> float | None:
+    """Value of one sensor's error [m] at which the accuracy limit is reached; None without one."""
+    own, limit = chosen_options(problem, design)[r], problem.limits.accuracy_m
+    if limit is None:
+        return None
+    slope = 1 + own.noise_systematic_m / own.error()
+    return float(own.error() + (Fraction(limit) - evaluate(problem, design).total_m) / slope)
+
+
 def _tau_slack(asked: _Asked, r: int) -> Slack:
     """A timestamp bound may grow until its own tau_crit, the system's, or the accuracy is met."""
     problem, design = asked.problem, asked.design
     table, own = problem.roles[r], chosen_options(problem, design)[r]
-    limits = list(_tau_limits(problem, design, r))
+    limits = list(tau_limits(problem, design, r))
     fails, kind = min(limits) if limits else (None, None)
     row = Slack(f"{table.role} timestamp error", table.stage_name, own.tau_s, "s",
                 None if fails is None else float(fails), kind, None)  # fmt: skip
@@ -159,7 +164,7 @@ def _tau_slack(asked: _Asked, r: int) -> Slack:
     return _with_payload(row, asked, changed, fails_never=sure)
 
 
-def _tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
+def tau_limits(problem: Problem, design: Design, r: int) -> Iterator[Limit]:
     """Values of one tau at which a requirement breaks."""
     options, found = chosen_options(problem, design), evaluate(problem, design)
     own, limits = options[r], problem.limits
@@ -202,9 +207,9 @@ def _platform_slack(
         same = same_design(alone, only, other)
         if same is not None:
             return broken(other, evaluate(other, same))
-        return (_gone(other),)
+        return (gone(other),)
 
-    fails = _first(lambda at: not kinds_broken(at), _tried(value, GROWTHS))
+    fails = first_failing(lambda at: not kinds_broken(at), tried(value, GROWTHS))
     unit = {"v_max": "m/s", "distance": "m", "omega_max": "rad/s"}[figure]
     kind = None if fails is None else next(iter(kinds_broken(fails)), None)
     row = Slack(PLATFORM_FIGURES[figure][0], "", value, unit, fails, kind, None)
@@ -215,7 +220,7 @@ def _platform_slack(
     return _with_payload(row, asked, changed, fails_never=False)
 
 
-def _gone(problem: Problem) -> str:
+def gone(problem: Problem) -> str:
     """Why the one option of a role is no longer there: kind of what is broken."""
     for table in problem.roles:
         beyond = table.excluded.beyond
@@ -238,7 +243,7 @@ def hangs_on_motion(case: Case, problem: Problem) -> bool:
 WhatIf = Callable[[Problem, PlatformFigure, float], Problem]
 
 
-def _platform_what_if(case: Case, problem: Problem, build: Build, stage: int) -> WhatIf:
+def platform_what_if(case: Case, problem: Problem, build: Build, stage: int) -> WhatIf:
     """A problem by the value of a figure of one stage's platform.
 
     Known effects and simulation hang on how a platform moves: there the whole is built anew.
@@ -281,9 +286,11 @@ def _with_payload(
         found = _chosen(other, own, asked.beside)
         return found is not None and payload(other, found) == now
 
-    values = _tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
+    values = tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
     try:
-        at = _first(same, values, row.value, CLOSE if problem.judge is None else SIMULATED_CLOSE)
+        at = first_failing(
+            same, values, row.value, CLOSE if problem.judge is None else SIMULATED_CLOSE
+        )
     except OutOfTime:
         raise
     except NoVerdict:  # what cannot be proven is not claimed
@@ -347,7 +354,7 @@ def _is_sole(problem: Problem) -> bool:
     return True
 
 
-def _tried(value: float, growths: Sequence[float], fails_at: float | None = None) -> list[float]:
+def tried(value: float, growths: Sequence[float], fails_at: float | None = None) -> list[float]:
     """Values to try, rising; just above the one at which the verdict fails is one of them."""
     scale = value or (fails_at or 1.0) * 1e-6
     values = {scale * growth for growth in growths}
@@ -357,7 +364,7 @@ def _tried(value: float, growths: Sequence[float], fails_at: float | None = None
     return sorted(values)
 
 
-def _first(
+def first_failing(
     holds: Callable[[float], bool],
     values: Sequence[float],
     start: float | None = None,

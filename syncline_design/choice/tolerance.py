@@ -76,25 +76,60 @@ def tolerance_verdict(
     case: Case, problem: Problem, design: Design, build: Build = build_problem
 ) -> ToleranceVerdict:
     """The verdict on one design under the tolerances of its own sensors' figures."""
-    selected = selection_of(problem, design).roles
-    sensors = {one.sensor for one in selected}
-    figures = [f for f in sigma_figures(case) if f.sensor in sensors and f.quantity.has_tolerance]
-    names = tuple(figure.name for figure in figures)
+    return tolerance_over([Judged(case, problem, design, build)])
 
-    def built(what_if: Case) -> Problem:
-        return problem if what_if is case else build(what_if)
 
-    word = _word(case, selected, design, figures, built)
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A design of one mission; build: how a changed case of it becomes a problem."""
+
+    case: Case
+    problem: Problem
+    design: Design
+    build: Build
+
+    @property
+    def selected(self) -> tuple[RoleSelection, ...]:
+        """What it takes, in names."""
+        return selection_of(self.problem, self.design).roles
+
+    def built(self, what_if: Case) -> Problem:
+        """The problem of a changed case."""
+        return self.problem if what_if is self.case else self.build(what_if)
+
+
+def tolerance_over(missions: Sequence[Judged]) -> ToleranceVerdict:
+    """The verdict on one payload over all its missions; it meets them at figures as given.
+
+    A figure is the same one in every mission.
+    """
+    found: dict[str, SheetFigure] = {}
+    for mission in missions:
+        sensors = {one.sensor for one in mission.selected}
+        for figure in sigma_figures(mission.case):
+            if figure.sensor in sensors and figure.quantity.has_tolerance:
+                found.setdefault(figure.name, figure)
+    figures, names = list(found.values()), tuple(found)
+
+    def word_of(some: Sequence[SheetFigure]) -> HowOften:
+        words = {_word(one.case, one.selected, one.design, some, one.built) for one in missions}
+        return next(word for word in ("never", "sometimes", "always") if word in words)
+
+    word = word_of(figures)
     if word != "sometimes":
         return ToleranceVerdict(word, names, (), False)
     settles = []
     for figure in figures:
         rest = [other for other in figures if other != figure]
-        if _word(case, selected, design, rest, built) != "sometimes":
+        if word_of(rest) != "sometimes":
             settles.append(figure.name)
     if settles:
         return ToleranceVerdict(word, names, tuple(settles[:1]), True)
-    widest = sorted(figures, key=lambda f: (-_span(case, selected, f, built), f.name))
+
+    def span(figure: SheetFigure) -> float:
+        return max(_span(one.case, one.selected, figure, one.built) for one in missions)
+
+    widest = sorted(figures, key=lambda f: (-span(f), f.name))
     return ToleranceVerdict(word, names, tuple(f.name for f in widest), False)
 
 
@@ -209,20 +244,22 @@ def measure_next(
     given = [figure for figure in figures if figure.quantity.has_tolerance]
     asked = _Asked.of(case, problem, design, build)
     found: list[Measurement] = []
-    for figure in asked.worth_trying([(f, _ends(f, assumed=not given)) for f in given or figures]):
+    for figure in asked.worth_trying(
+        [(f, ends_tried(f, assumed=not given)) for f in given or figures]
+    ):
         try:
             found += _flips(asked, figure, assumed=not given)
         except OutOfTime:
             raise
         except NoVerdict:  # what cannot be proven is not claimed
             continue
-    return tuple(sorted(found, key=lambda m: (-_weight(m), m.figure, m.at)))
+    return tuple(sorted(found, key=lambda m: (-weight(m), m.figure, m.at)))
 
 
 Ends = tuple[float, float]
 
 
-def _ends(figure: SheetFigure, *, assumed: bool) -> Ends:
+def ends_tried(figure: SheetFigure, *, assumed: bool) -> Ends:
     """The values that are tried."""
     value = figure.quantity
     if not assumed:
@@ -276,16 +313,17 @@ class _Asked:
         return other, found.design if isinstance(found, Choice) else None
 
 
-def _weight(one: Measurement) -> float:
+def weight(one: Measurement) -> float:
+    """How much the objective changes; where nothing is left to choose, most."""
     return math.inf if one.objective_change is None else abs(one.objective_change)
 
 
 def _flips(asked: _Asked, figure: SheetFigure, *, assumed: bool) -> Iterator[Measurement]:
     now = payload(asked.problem, asked.design)
-    for end in _ends(figure, assumed=assumed):
+    for end in ends_tried(figure, assumed=assumed):
         other, design = asked.chosen(figure, end)
         if design is None:
-            yield _measurement(figure, end, assumed, "infeasible", None)
+            yield measurement(figure, end, assumed, "infeasible", None)
             continue
         then = payload(other, design)
         if then != now:
@@ -295,12 +333,13 @@ def _flips(asked: _Asked, figure: SheetFigure, *, assumed: bool) -> Iterator[Mea
                 if (sensor, method) != before
             ]
             change = _objective(other, design) - _objective(asked.problem, asked.design)
-            yield _measurement(figure, end, assumed, "; ".join(changes), change)
+            yield measurement(figure, end, assumed, "; ".join(changes), change)
 
 
-def _measurement(
+def measurement(
     figure: SheetFigure, end: float, assumed: bool, becomes: str, change: float | None
 ) -> Measurement:
+    """A figure, the end at which the choice flips, and what it becomes."""
     value = figure.quantity
     return Measurement(
         figure.name, float(value), end, value.text, format_like(value.text, end), assumed, becomes,

@@ -64,7 +64,7 @@ def render_csv(verdicts: Sequence[Checked]) -> str:
 
 
 _BILL = ("spec", "file", "stage", "use", "item", "entry", "quantity", "cost", "currency",
-         "mass_kg", "power_w", "basis")  # fmt: skip
+         "mass_kg", "power_w", "basis", "missions")  # fmt: skip
 
 
 def render_bill(verdicts: Sequence[Checked]) -> str:
@@ -77,6 +77,7 @@ def render_bill(verdicts: Sequence[Checked]) -> str:
         for line in verdict.bill_of_materials or ():
             told = line.to_json()
             told |= {"mass_kg": told.pop("mass"), "power_w": told.pop("power")}
+            told["missions"] = "; ".join(line.missions or ())
             rows.append(head | told)
     return csv_text(_BILL, rows)
 

@@ -374,7 +374,7 @@ def slack_table(rows: Sequence[Slack]) -> Table:
         ("Term", "Now #", "Verdict fails at #", "What then breaks", "Payload changes at #"),
         [
             (
-                f"{row.stage} {row.term}",
+                f"{row.stage} {row.term}" + (f", {row.mission}" if row.mission else ""),
                 Cell(numbers.si_quantity(row.value, row.unit), row.value),
                 _threshold(row, row.fails_at, "verdict"),
                 KINDS.get(row.limited_by or "", row.limited_by or ""),

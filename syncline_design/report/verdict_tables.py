@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers
@@ -130,13 +131,18 @@ def shared(verdict: Verdict, design: NamedDesign) -> Table | None:
     return table("Shared hardware and clocks", heads, rows) if rows else None
 
 
+def _some(missions: Sequence[str]) -> str:
+    """`in mission near`."""
+    return f"in mission {', '.join(missions)}"
+
+
 def bill(verdict: Verdict, lines: tuple[BillLine, ...]) -> Table:
     """What to buy, line by line, and what it comes to."""
     rows = [
         (
             line.stage,
             line.item,
-            line.use,
+            line.use if line.missions is None else f"{line.use}, {_some(line.missions)}",
             Cell(numbers.count(line.quantity), float(line.quantity)),
             *_amounts(verdict, line.cost, line.mass, line.power),
             line.basis,

@@ -83,7 +83,7 @@ def _role(role: RoleCase, option: Option, row: SensorRow) -> NamedRole:
         name=(sensor.name if sensor is not None else "") or option.sensor,
         primitive=option.primitive,
         timestamping=option.method,
-        timestamping_name=method.name if method is not None else "given in the spec",
+        timestamping_name="given in the spec" if method is None else method.name or option.method,
         timeline=option.timeline,
         tau_s=row.tau_s,
         tau_crit_s=finite(row.tau_crit_s),

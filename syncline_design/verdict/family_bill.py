@@ -13,13 +13,15 @@ from syncline_design.verdict.recheck_sums import BUDGETS
 from syncline_design.verdict.tree import Verdict
 
 
-def bill_of(verdicts: Sequence[Verdict]) -> tuple[BillLine, ...]:
-    """What is bought for all missions: each piece once, shared hardware as often as one needs.
+def bill_of(verdicts: Sequence[tuple[str, Verdict]]) -> tuple[BillLine, ...]:
+    """What is bought for all missions (name, verdict): each piece once, shared hardware as often
+    as one needs; what only some of them take says which.
 
     Timestamping belongs to its sensor: two sensors of one role are stamped by two pieces.
     """
     lines: dict[tuple[str, ...], BillLine] = {}
-    for verdict in verdicts:
+    takers: dict[tuple[str, ...], list[str]] = {}
+    for name, verdict in verdicts:
         sensors: dict[str, str] = {}
         for line in verdict.bill_of_materials or ():
             role, _, part = line.use.partition(" ")
@@ -27,9 +29,13 @@ def bill_of(verdicts: Sequence[Verdict]) -> tuple[BillLine, ...]:
                 sensors[f"{line.stage} {role}"] = line.entry
             stamped = sensors.get(f"{line.stage} {role}", "") if part == "timestamping" else ""
             key = (line.stage, line.use, line.entry, stamped)
+            takers.setdefault(key, []).append(name)
             if key not in lines or lines[key].quantity < line.quantity:
                 lines[key] = line
-    return tuple(lines.values())
+    return tuple(
+        line if len(takers[key]) == len(verdicts) else replace(line, missions=tuple(takers[key]))
+        for key, line in lines.items()
+    )
 
 
 def bought(

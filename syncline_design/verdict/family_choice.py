@@ -22,6 +22,7 @@ from syncline_design.verdict.family_named import (
     Sums,
     as_point,
     front_design,
+    front_left_out,
     ranked,
     ruled_out_of,
 )
@@ -63,6 +64,7 @@ def choice_of_family(work: Work, chosen: Chosen, pieces: Pieces) -> ChoiceResult
     found = ChoiceResult(
         proof=chosen.proof,
         front=tuple(front_design(work, point) for point in points),
+        front_left_out=front_left_out(work),
         staircase=staircase([as_point(work, point) for point in points]),
         excluded=excluded,
         excluded_count=count,

@@ -9,7 +9,7 @@ from typing import Any
 from syncline_design.choice.family_best import FamilyPoint
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
-from syncline_design.verdict.choice_data import MOST_EXCLUDED, ruled_out
+from syncline_design.verdict.choice_data import MOST_EXCLUDED, left_out, ruled_out
 from syncline_design.verdict.design_data import full_design
 from syncline_design.verdict.family import Chosen, Work
 from syncline_design.verdict.named import Exclusion, FrontDesign, RankedDesign, StampingRange
@@ -60,3 +60,12 @@ def front_design(work: Work, point: FamilyPoint, resource: ResourceName = "cost"
     shown = full_design(scenario.case, scenario.problem, designs[0])
     amounts: dict[str, Any] = {resource: float(point.amount)}
     return FrontDesign(**amounts, error_m=point.error_m, design=replace(shown, **amounts))
+
+
+def front_left_out(work: Work, resource: ResourceName = "cost") -> tuple[str, ...]:
+    """What has no place on a front of a resource because its entry does not say how much it takes.
+
+    Each once, whichever missions may use it.
+    """
+    labels = (label for s in work.scenarios for label in left_out(s.case, s.problem, resource))
+    return tuple(dict.fromkeys(labels))

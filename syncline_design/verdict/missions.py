@@ -335,7 +335,7 @@ def _assembled(
     """The family's verdict; what only one mission can show is that of the tightest one."""
     words = {one.word for one in judged}
     word: Word = min(words, key=lambda one: _WORST_FIRST[one])
-    bill = bill_of([one.verdict for one in judged])
+    bill = bill_of([(one.mission.name, one.verdict) for one in judged])
     design = shown.verdict.design
     assert design is not None
     several = bool(work.case.missions)

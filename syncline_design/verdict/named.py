@@ -72,6 +72,7 @@ class BillLine(Record):
 
     use: what it is for; item: its name; entry: its id in the catalog; basis: what its figures
     stand on.  Money is in the spec's currency, to the cent.  None: the entry does not say.
+    missions: those that it is bought for, where not for all of several.
     """
 
     stage: str
@@ -83,6 +84,7 @@ class BillLine(Record):
     mass: float | None
     power: float | None
     basis: str
+    missions: tuple[str, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

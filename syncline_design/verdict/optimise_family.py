@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 from syncline_design import __version__
 from syncline_design.choice.front import staircase
 from syncline_design.choice.outcome import PriceStep, Proof
 from syncline_design.choice.problem import selection_of
+from syncline_design.choice.slack import Slack
+from syncline_design.choice.tolerance import Judged as JudgedDesign
+from syncline_design.choice.tolerance import tolerance_over
 from syncline_design.machine.deadline import Pieces
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case
@@ -15,15 +19,24 @@ from syncline_design.spec.edit import pinned_spec_text
 from syncline_design.spec.edit_missions import pinned_missions_text
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.acceptance import Simulations
-from syncline_design.verdict.family import MERGED, Chosen, Work, choose_family, front_of
-from syncline_design.verdict.family_named import as_point, front_design, ranked, ruled_out_of
+from syncline_design.verdict.family import MERGED, Build, Chosen, Work, choose_family, front_of
+from syncline_design.verdict.family_measure import measure_next
+from syncline_design.verdict.family_named import (
+    as_point,
+    front_design,
+    front_left_out,
+    ranked,
+    ruled_out_of,
+)
 from syncline_design.verdict.family_others import next_best, with_stampings
+from syncline_design.verdict.family_slack import family_slack
 from syncline_design.verdict.family_why_not import Question, why_not_in_family
 from syncline_design.verdict.missions import Found as Judged
 from syncline_design.verdict.missions import judged_family
 from syncline_design.verdict.named import FrontDesign, RankedDesign
 from syncline_design.verdict.optimisation import (
     NO_TABLES,
+    Hinged,
     MadeFrom,
     Optimisation,
     Optimised,
@@ -35,10 +48,11 @@ from syncline_design.verdict.tree import Caution, Verdict
 from syncline_design.verdict.why_not import Answer, questions_of
 
 Front = tuple[tuple[FrontDesign, ...], tuple[PriceStep, ...]]
-LEFT_OUT = Caution(
-    "missions",
-    "what the design hinges on (slack, tolerances, what to measure next) is worked out for specs "
-    "of one mission chosen at given figures",
+SUMS = ("accuracy", "sync", "cost", "mass", "power", "sample_spacing")
+_HINGES = "what the design hinges on (slack, tolerances, what to measure next)"
+NOT_JUDGED = Caution("missions", f"{_HINGES} is worked out where every limit is one of sums")
+NOT_INTERVALS = Caution(
+    "missions", f"{_HINGES} is worked out for designs chosen at given figures: choose_for: nominal"
 )
 
 
@@ -68,13 +82,15 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
         answers = tuple(pieces.listed("why not", lambda: why_not_in_family(asked, kinds)))
     excluded, count = ruled_out_of(work)
     has_design = found is not None and found.found is not None
-    result = Optimisation(
+    hinges = _hinges(work, found, verdict, settings, pieces)
+    kind = Optimisation if hinges is None else Hinged
+    result = kind(
         verdict=verdict.verdict,
         spec=SpecName(case.spec.name, str(case.path)),
         proof=MERGED if found is None else found.proof,
         combinations=str(work.family.combinations),
         designs=tuple(designs),
-        warnings=(*_told(verdict, settings), LEFT_OUT),
+        warnings=(*_told(verdict, settings), *_unhinged(case, verdict)),
         excluded=excluded,
         excluded_count=count,
         cut_short=tuple(pieces.cut_short),
@@ -84,13 +100,53 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
         alternatives=choice.alternatives if has_design and choice is not None else None,
         bargains=choice.bargains if has_design and choice is not None else None,
         front=front and front[0],
+        front_left_out=front and front_left_out(work, settings.resource),
         staircase=front and front[1],
         why_not=answers,
+        **(hinges or {}),
     )
     text = _pinned_text(work, found) if designs and found is not None else None
     first = work.scenarios[0].problem
     shown = verdict if settings.report else None
     return Optimised(case, first, settings, (), (), result, shown, text)
+
+
+def _unhinged(case: Case, verdict: Verdict) -> Iterator[Caution]:
+    """Why a design that meets does not say what it hinges on."""
+    if verdict.verdict != "meets":
+        return
+    if case.spec.choose_for != "nominal":
+        yield NOT_INTERVALS
+    elif any(one.kind not in SUMS for one in case.spec.requirements):
+        yield NOT_JUDGED
+
+
+def _hinges(
+    work: Work, found: Chosen | None, verdict: Verdict, settings: OptimizeSettings, pieces: Pieces
+) -> dict[str, Any] | None:
+    """Slack of every figure, tolerances and what to measure, as far as time goes."""
+    if verdict.verdict != "meets" or found is None or found.found is None:
+        return None
+    if next(_unhinged(work.case, verdict), None) is not None:
+        return None
+
+    def build() -> Build:
+        return Simulations(settings.seed).problem_of
+
+    parts = [
+        JudgedDesign(mission.case, problem, design, build())
+        for mission, problem, design in zip(
+            work.missions, found.problems, found.designs, strict=True
+        )
+    ]
+    rows: tuple[Slack, ...] | None = None
+    return {
+        "slack": pieces.made("slack ledger", lambda: tuple(family_slack(work, found, build)), rows),
+        "tolerances": pieces.made("tolerances", lambda: tolerance_over(parts), None),
+        "measure_next": pieces.made(
+            "what to measure next", lambda: measure_next(work, found, build), None
+        ),
+    }
 
 
 def _with_sums(judged: Judged, pieces: Pieces) -> Chosen | None:
