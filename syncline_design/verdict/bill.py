@@ -59,9 +59,9 @@ def _bought(case: Case, problem: Problem, design: Design) -> Iterator[Bought]:
 def _line(
     case: Case, place: str, use: str, identity: str, entry: Product, count: int, owned: bool
 ) -> BillLine:
-    amounts = {name: _amount(case, getattr(entry, name), count) for name in _RESOURCES}
+    cost, mass, power = (_amount(case, getattr(entry, name), count) for name in _RESOURCES)
     basis = _basis(entry, owned)
-    return BillLine(place, use, entry.name or identity, identity, count, **amounts, basis=basis)
+    return BillLine(place, use, entry.name or identity, identity, count, cost, mass, power, basis)
 
 
 def _amount(case: Case, each: Quantity | None, count: int) -> float | None:
