@@ -76,11 +76,11 @@ def tolerance_verdict(
     case: Case, problem: Problem, design: Design, build: Build = build_problem
 ) -> ToleranceVerdict:
     """The verdict on one design under the tolerances of its own sensors' figures."""
-    return tolerance_over([Judged(case, problem, design, build)])
+    return tolerance_over([MissionDesign(case, problem, design, build)])
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class MissionDesign:
     """A design of one mission; build: how a changed case of it becomes a problem."""
 
     case: Case
@@ -98,7 +98,7 @@ class Judged:
         return self.problem if what_if is self.case else self.build(what_if)
 
 
-def tolerance_over(missions: Sequence[Judged]) -> ToleranceVerdict:
+def tolerance_over(missions: Sequence[MissionDesign]) -> ToleranceVerdict:
     """The verdict on one payload over all its missions; it meets them at figures as given.
 
     A figure is the same one in every mission.

@@ -10,8 +10,7 @@ from syncline_design.choice.front import staircase
 from syncline_design.choice.outcome import PriceStep, Proof
 from syncline_design.choice.problem import selection_of
 from syncline_design.choice.slack import Slack
-from syncline_design.choice.tolerance import Judged as JudgedDesign
-from syncline_design.choice.tolerance import tolerance_over
+from syncline_design.choice.tolerance import MissionDesign, tolerance_over
 from syncline_design.machine.deadline import Pieces
 from syncline_design.simulation.results import SpecName
 from syncline_design.spec.case import Case
@@ -134,7 +133,7 @@ def _hinges(
         return Simulations(settings.seed).problem_of
 
     parts = [
-        JudgedDesign(mission.case, problem, design, build())
+        MissionDesign(mission.case, problem, design, build())
         for mission, problem, design in zip(
             work.missions, found.problems, found.designs, strict=True
         )
