@@ -331,6 +331,9 @@ def test_what_turns_the_sync_limit_that_nobody_wrote_turns_the_promise(
     path.write_text(listed, "utf-8")
     verdict = check_loaded(load(path), CheckSettings(monte_carlo=False))
     assert promise.turned([entry]) == (verdict.verdict != "meets") == (latency_s > 2.7e-3)
+    at = promise.turns_at(entry, "latency_s", 4e-3)
+    sides = [replace(entry, parameters=(("latency_s", at * share),)) for share in (1 - 1e-9, 1.0)]
+    assert [promise.turned([one]) for one in sides] == [False, True]
 
 
 def test_a_moment_beyond_the_limit_is_no_proof_that_it_is_kept(

@@ -8,6 +8,7 @@ a requirement.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -68,12 +69,29 @@ class Promise:
         return (found.total_per_sensor_m if self.per_sensor else found.total_m), found.sync_ratio
 
     def turns_at(self, entry: EffectEntry, name: str, most: float) -> float:
-        """Least value of one parameter, up to `most`, that turns a requirement."""
-        low, high, before = 0.0, most, self._broken((), 0.0)
-        for _ in range(HALVINGS):
+        """Least value of one parameter, up to `most`, that turns a requirement.
+
+        A root of how far a requirement that is kept without is passed; halved where `most` has no
+        error that is finite.
+        """
+        from scipy.optimize import brentq
+
+        total, ratio = self._figures(())
+        limits = [limit if total <= limit else np.inf for limit in self.limits_m]
+        ratios = [limit if ratio <= limit else np.inf for limit in self.ratios]
+
+        def past(value: float) -> float:
+            total, ratio = self._figures([_with(entry, name, value)])
+            return max([total / x - 1.0 for x in limits] + [ratio / x - 1.0 for x in ratios])
+
+        finest = most * 2.0**-HALVINGS
+        if math.isfinite(past(most)):
+            root, _ = brentq(past, 0.0, most, xtol=0.25 * finest, full_output=True, disp=False)
+            return min(float(root) + 0.5 * finest, most)
+        low, high = 0.0, most
+        while high - low > finest:
             middle = 0.5 * (low + high)
-            turned = before < self._broken([_with(entry, name, middle)], 0.0)
-            low, high = (low, middle) if turned else (middle, high)
+            low, high = (low, middle) if past(middle) > 0.0 else (middle, high)
         return high
 
 

@@ -40,6 +40,15 @@ def inverse(matrix: Array, lost: float) -> Array:
     if lower is None:
         pseudo: Array = np.asarray(np.linalg.pinv(matrix, rcond=lost, hermitian=True), dtype=float)
         return pseudo
-    half, _ = dpotri(lower, lower=1)
-    low: Array = np.tril(half)
-    return low + np.tril(low, -1).T
+    half, _ = dpotri(lower, lower=1)  # zero above the diagonal, as the factor is
+    whole: Array = half + half.T
+    np.fill_diagonal(whole, np.diag(half))
+    return whole
+
+
+def pseudo_inverse(matrix: Array, lost: float) -> Array:
+    """A^-1 of a symmetric A (m, m), by singular values; of a single number it is quick."""
+    if matrix.shape == (1, 1) and matrix[0, 0] > 0.0:
+        return 1.0 / matrix
+    found: Array = np.asarray(np.linalg.pinv(matrix, rcond=lost), dtype=float)
+    return found

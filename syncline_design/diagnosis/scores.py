@@ -23,6 +23,7 @@ from syncline_design.diagnosis.noise import (
     row_covariance,
     white_covariance,
 )
+from syncline_design.diagnosis.positive import pseudo_inverse
 from syncline_design.effects.kinematics import gauss_markov
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import groups
@@ -102,7 +103,7 @@ def clean_least(scores: Gram, rng: np.random.Generator) -> Array:
     draws = root @ rng.standard_normal((root.shape[1], DRAWS))
     least = np.zeros(DRAWS)
     for g in scores.groups:
-        inverse = np.linalg.pinv(correlation[g, g], rcond=RIDGE)
+        inverse = pseudo_inverse(correlation[g, g], RIDGE)
         squares = np.sum(draws[g] * (inverse @ draws[g]), axis=0)
         least = np.minimum(least, _log_p(squares, g.stop - g.start))
     return least

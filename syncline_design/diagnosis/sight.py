@@ -10,6 +10,7 @@ from scipy.stats import chi2, f
 
 from syncline_design.diagnosis.candidates import Signature, zero_values
 from syncline_design.diagnosis.consequence import Promise, blind_spots
+from syncline_design.diagnosis.positive import pseudo_inverse
 from syncline_design.diagnosis.result import BlindSpot, Informative, Smallest
 from syncline_design.diagnosis.search import Search, SearchResult
 from syncline_design.diagnosis.slow_states import Judged
@@ -93,7 +94,7 @@ def _both(covariance: Array, log_p: float, count: int = 0) -> Array:
     """
     freedom = max(int(np.sum(np.diag(covariance) > 0.0)), 1)
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    inverse = np.linalg.pinv(covariance / scale[:, None] / scale, rcond=1e-10)
+    inverse = pseudo_inverse(covariance / scale[:, None] / scale, 1e-10)
     alone = np.diag(inverse) / scale**2
     chance = math.exp(log_p)
     if count:

@@ -30,7 +30,7 @@ from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model
 from syncline_design.diagnosis.noise import NoiseLevel, Sensor, white_covariance
 from syncline_design.diagnosis.positive import inverse as inverse_of
-from syncline_design.diagnosis.positive import solution
+from syncline_design.diagnosis.positive import pseudo_inverse, solution
 from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
@@ -128,7 +128,7 @@ def _log(chance: float) -> float:
 
 def _square(values: Array, covariance: Array) -> float:
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    inverse = np.linalg.pinv(covariance / scale[:, None] / scale, rcond=1e-10)
+    inverse = pseudo_inverse(covariance / scale[:, None] / scale, 1e-10)
     scaled = values / scale
     return float(scaled @ inverse @ scaled)
 
@@ -353,23 +353,22 @@ class States:
         self, normal: Array, score: Array, width: int, size2: Array, limit: Array
     ) -> tuple[Array, Array, float]:
         """Variances of the channels, the states' values, and the freedom they take."""
-        keep = np.diag(normal) > 0.0
-        share = 1.0 / np.maximum(self.wave, 1)
-        moving = self.wave > 0
-        values = np.zeros(score.shape[0])
-        inverse = np.zeros_like(normal)
+        own = np.diag(normal).copy()
+        share, moving = 1.0 / np.maximum(self.wave, 1), self.wave > 0
+        channel, count = self.channel[moving], np.bincount(self.channel[moving])
+        information = np.full(own.shape, 1e-12)
         for _ in range(STEPS):
-            variance = np.where(moving, size2[self.channel] * share, FLAT)
-            prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
-            scale = np.sqrt(np.diag(normal) + prior)
-            whole = (normal + np.diag(prior)) / scale[:, None] / scale
-            inverse = inverse_of(whole, 1e-12) / scale[:, None] / scale
-            values = inverse @ score
-            energy = (values[width:] ** 2 + np.diag(inverse)[width:]) / share
-            for c in range(size2.shape[0]):
-                own = (self.channel == c) & moving
-                size2[c] = np.clip(np.mean(energy[own]), LEAST**2, limit[c])
-        return size2, values * keep, float(np.sum(inverse * normal))
+            information[width:] = 1.0 / np.where(moving, size2[self.channel] * share, FLAT)
+            scale = 1.0 / np.sqrt(own + information)
+            scaled = normal * scale[:, None] * scale
+            whole = scaled.copy()
+            np.fill_diagonal(whole, (own + information) * scale**2)
+            inverse = inverse_of(whole, 1e-12)
+            values = scale * (inverse @ (scale * score))
+            energy = (values**2 + scale**2 * np.diag(inverse))[width:] / share
+            mean = np.bincount(channel, weights=energy[moving]) / count
+            size2 = np.clip(mean, LEAST**2, limit)
+        return size2, values * (own > 0.0), float(np.sum(inverse * scaled))
 
 
 def _parted(part: NDArray[np.int64], columns: Array, weight: Array, error: Array) -> _Sums:
@@ -501,5 +500,8 @@ def _solved(
     scale = np.sqrt(np.maximum(np.diagonal(normal, axis1=-2, axis2=-1), 0.0))
     scale = np.where(scale == 0.0, 1.0, scale)
     squares = scale[..., :, None] * scale[..., None, :]
-    inverse = np.linalg.pinv(normal / squares, rcond=1e-10, hermitian=True) / squares
+    if normal.shape[-1] == 1 and np.all(normal > 0.0):
+        inverse = 1.0 / normal
+    else:
+        inverse = np.linalg.pinv(normal / squares, rcond=1e-10, hermitian=True) / squares
     return np.einsum("...ab,...b->...a", inverse, score[..., place] * seen[place]), inverse
