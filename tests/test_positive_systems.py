@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from syncline_design.diagnosis.noise import NoiseLevel, Structure, White, precision
-from syncline_design.diagnosis.positive import inverse, solution
+from syncline_design.diagnosis.positive import inverse, pseudo_inverse, solution
 
 LOST = 1e-12
 
@@ -32,6 +32,8 @@ def test_well_enough_told_systems_are_solved_exactly(size: int) -> None:
     rows = [[Fraction(1, i + k + 1) for k in range(size)] for i in range(size)]
     matrix, wanted = np.array([[float(x) for x in row] for row in rows]), exact_inverse(rows)
     np.testing.assert_allclose(inverse(matrix, LOST), wanted, rtol=1e-6)
+    np.testing.assert_allclose(pseudo_inverse(matrix, LOST), wanted, rtol=1e-6)
+    assert pseudo_inverse(matrix[-1:, -1:], LOST) == pytest.approx(2.0 * size - 1.0)
     right = np.arange(2.0 * size).reshape(size, 2)
     np.testing.assert_allclose(solution(matrix, right, LOST), wanted @ right, rtol=1e-6)
 
