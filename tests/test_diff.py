@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 
 import jsonschema
@@ -79,6 +80,38 @@ def test_one_change_names_cause_payload_and_price(files: tuple[Path, Path]) -> N
     words = headline(data)
     assert words.startswith("stages[uav].distance 100 m to 40 m: payload changes, \u2212")
     assert words.endswith("still meets its requirements.")
+
+
+TVU = "  - {id: TVU-1, kind: tvu, limit: {a: AAA, b: 0.002, of: 90 m}}\n"
+
+
+def test_a_decimetre_less_changes_the_payload_and_the_difference_says_why(
+    files: tuple[Path, Path],
+) -> None:
+    """Limits with their unit, sqrt(a^2 + (0.002 90 m)^2), and the value of the
+    payload that the tighter limit rules out."""
+    first = "  - {id: COST-1"
+    for file, a in zip(files, ("0.5 m", "0.4 m"), strict=True):
+        change(file, (first, TVU.replace("AAA", a) + first), ("0.30 m", "2 m"),
+               (", ublox_f9p_pvt", ""), (", riegl_vux1uav", ""), ("hardware, ", ""))  # fmt: skip
+    stored = [file.with_suffix(".json") for file in files]
+    for file, to in zip(files, stored, strict=True):
+        to.write_text(json_text(check_file(file, PLAIN).to_json()), encoding="utf-8")
+    limits = [math.hypot(a, 0.18) for a in (0.5, 0.4)]
+    data = diff(*stored, PLAIN)
+    [cause] = data.causes
+    assert cause.key == "requirements[TVU-1].limit"
+    assert (cause.old, cause.new) == tuple(f"{1e3 * one:.1f} mm" for one in limits)
+    assert data.payload
+    [row] = [one for one in data.requirements if one.id == "TVU-1"]
+    assert row.old is not None
+    assert row.old.value is not None
+    assert limits[1] < row.old.value < limits[0]
+    assert data.outgrown == ("TVU-1",)
+    why = f"What was chosen before has TVU-1 at {1e3 * row.old.value:.1f}\N{NO-BREAK SPACE}mm; the"
+    assert why in " ".join(on_difference(data).sentences)
+    back = diff(*stored[::-1], PLAIN)
+    assert (back.outgrown, back.admitted) == (None, ("TVU-1",))
 
 
 def test_several_changes_say_which_one_does_it(files: tuple[Path, Path]) -> None:

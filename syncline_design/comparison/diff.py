@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from syncline_design.comparison.difference import Cause, Difference, changes, difference
+from syncline_design.comparison.limits import limit_texts
 from syncline_design.comparison.verdict_file import read_verdict, text_of
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -158,11 +159,27 @@ def _verdict_causes(old: Verdict, new: Verdict) -> Found:
     before, after = _asked(old, ids), _asked(new, ids)
     if old.design is not None and new.design is not None:
         before, after = before | _worked_on(old), after | _worked_on(new)
-    found = [*_spec_causes(before, after, (), ""), *_provenance_causes(old, new)]
+    limits = {
+        f"requirements[{one.id}].limit": (one, other)
+        for one in old.requirements
+        for other in new.requirements
+        if one.id == other.id
+    }
+    found = [
+        (_as_limits(cause, *limits[cause.key]) if cause.key in limits else cause, place)
+        for cause, place in _spec_causes(before, after, (), "")
+    ]
+    found += _provenance_causes(old, new)
     hashes = [one.provenance.spec_sha256[:12] for one in (old, new)]
     if not found:  # whatever it is that the verdicts do not repeat
         found = list(_one_cause("spec (hash)", *hashes))
     yield from found
+
+
+def _as_limits(cause: Cause, old: RequirementResult, new: RequirementResult) -> Cause:
+    """A limit that changed, with its unit."""
+    before, after = limit_texts(old, new)
+    return replace(cause, old=before, new=after)
 
 
 def _asked(verdict: Verdict, both: set[str]) -> Json:

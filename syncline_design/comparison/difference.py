@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated
 
+from syncline_design.comparison.limits import beyond
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.verdict.tree import RequirementResult, Status, Verdict, Word
@@ -98,7 +99,11 @@ class RequirementChange(Record):
 
 @dataclass(frozen=True, slots=True)
 class Changes(Record):
-    """What differs between two verdicts."""
+    """What differs between two verdicts.
+
+    outgrown, admitted: where the payload is another one, requirements whose value the old payload
+    had is above the limit of now; whose value the new one has is above the limit before.
+    """
 
     verdict: VerdictChange
     currency: str
@@ -106,6 +111,8 @@ class Changes(Record):
     sums: tuple[FigureChange, ...]  # cost, mass, power
     error: FigureChange
     requirements: tuple[RequirementChange, ...]
+    outgrown: tuple[str, ...] | None = optional()
+    admitted: tuple[str, ...] | None = optional()
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +143,8 @@ class Difference(Record):
     error: FigureChange
     requirements: tuple[RequirementChange, ...]
     exit_code: int
+    outgrown: tuple[str, ...] | None = optional()
+    admitted: tuple[str, ...] | None = optional()
 
 
 def difference(
@@ -146,20 +155,23 @@ def difference(
     return Difference(
         SCHEMA, Compared(old, found.verdict.old), Compared(new, found.verdict.new), causes,
         found.verdict, found.currency, found.payload, found.sums, found.error,
-        found.requirements, exit_code,
+        found.requirements, exit_code, found.outgrown, found.admitted,
     )  # fmt: skip
 
 
 def changes(old: Verdict, new: Verdict) -> Changes:
     """Verdict, payload, sums, error and margins of two verdicts, side by side."""
     before, now = _sums(old), _sums(new)
+    payload = tuple(_payload(old, new))
     return Changes(
         VerdictChange(old.verdict, new.verdict),
         new.spec.currency,
-        tuple(_payload(old, new)),
+        payload,
         tuple(_figure(name, before[name], now[name]) for name in before),
         _figure("error", (_total(old), "m"), (_total(new), "m")),
         tuple(_requirements(old, new)),
+        (tuple(beyond(old, new)) if payload else ()) or None,
+        (tuple(beyond(new, old)) if payload else ()) or None,
     )
 
 

@@ -29,7 +29,7 @@ def render_diff(name: str, data: Difference) -> str:
     if name != "github":
         return rendered(name, data, lambda: on_difference(data))
     level = "notice" if data.exit_code == 0 else "error"
-    text = visible(headline(data)).replace("%", "%25")
+    text = visible(" ".join((headline(data), *reasons(data)))).replace("%", "%25")
     file = visible(data.new.file)
     place = file.replace("%", "%25").replace(":", "%3A").replace(",", "%2C")
     return f"::{level} file={place},line=1::{text}\n"
@@ -44,7 +44,7 @@ def on_difference(data: Difference) -> Document:
         family="Difference",
         outcome=OUTCOMES[data.verdict.new],
         name=f"{data.old.file} \N{RIGHTWARDS ARROW} {data.new.file}",
-        sentences=(headline(data),),
+        sentences=(headline(data), *reasons(data)),
         facts=(
             ("Before", OUTCOMES[data.verdict.old].word),
             ("Now", OUTCOMES[data.verdict.new].word),
@@ -68,6 +68,21 @@ def headline(data: Difference) -> str:
     else:
         lead = f"{len(causes)} changes"
     return f"{lead}: {effect_words(data)}."
+
+
+def reasons(data: Difference | Changes) -> tuple[str, ...]:
+    """`What was chosen before has TVU-1 at 339.8 mm; the limit is now 320.2 mm.`"""
+    rows = {one.id: one for one in data.requirements}
+    told = []
+    for name in data.outgrown or ():
+        if (old := rows[name].old) and (new := rows[name].new):
+            had, limit = numbers.held(old.value, old), numbers.limit(new)
+            told.append(f"What was chosen before has {name} at {had}; the limit is now {limit}.")
+    for name in data.admitted or ():
+        if (old := rows[name].old) and (new := rows[name].new):
+            has, limit = numbers.held(new.value, new), numbers.limit(old)
+            told.append(f"What is chosen now has {name} at {has}; the limit was {limit} before.")
+    return tuple(told)
 
 
 def effect_words(data: Difference | Changes) -> str:
