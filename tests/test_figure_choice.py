@@ -23,6 +23,8 @@ from syncline_design.choice.table import Problem
 from syncline_design.cli.app import app
 from syncline_design.model.system import System
 from syncline_design.model.timing import TimingError, Uniform
+from syncline_design.report.on_verdict import on_verdict
+from syncline_design.report.render_html import html
 from syncline_design.simulation.noise_shares import (
     least_quantile,
     most_noise,
@@ -35,7 +37,9 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import load_text
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.figure_front import drawn_requirement, figure_front
+from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.stated import Certified, stated, value_m, wanted_of
+from syncline_design.verdict.verify import check_loaded
 from syncline_design.verdict.worst_cuts import taught
 from test_statistical_figures import chain
 
@@ -292,3 +296,28 @@ def test_a_front_over_a_figure_is_drawn(tmp_path: Path) -> None:
     title = re.search(r"<title[^>]*>([^<]*)<", drawn)
     assert title is not None
     assert title[1] == "Pareto front of cost against RMS of 3D errors"
+
+
+def test_a_checked_page_shows_the_designs_of_the_front_by_the_figure_that_is_limited(
+    tmp_path: Path,
+) -> None:
+    """Each at the root mean square by hand; what a cheaper one equals is no step of the drawing."""
+    raw = few(0, "rmse", (2, 2, 2))
+    raw["requirements"] = [("rmse", 9.0)]
+    case = load_text(written(raw, tmp_path), tmp_path / "spec.yaml")
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False, cloud=True))
+    assert verdict.choice is not None
+    found = verdict.choice.by_figure
+    assert found is not None
+    assert (found.requirement, found.figure, found.limit_m) == ("R0", "RMS of 3D errors", 9.0)
+    least, steps = math.inf, 0
+    for one in found.designs:
+        names = [role.sensor for _, _, role in one.design.roles]
+        wanted = rmse_3d_m(raw, (str(names[0]), str(names[1]), str(names[2])))
+        assert one.figure_m == pytest.approx(wanted, rel=2e-4)
+        assert one.beaten == (wanted > least * (1.0 - 1e-3))
+        least, steps = min(least, wanted), steps + (not one.beaten)
+    assert steps > 2
+    drawn = html(on_verdict(verdict)).split('aria-labelledby="fig-by-figure-title')
+    assert len(drawn) == 2
+    assert "--pareto --against rmse" in drawn[1]

@@ -262,6 +262,7 @@ def _choice(verdict: Verdict) -> list[Node]:
     proof = _proof(verdict)
     nodes: list[Node] = [Text(proof)] if proof else []
     nodes += verdict_figures.choice_chart(verdict)
+    nodes += verdict_figures.figure_chart(verdict)
     found = verdict.choice.bargains if verdict.choice is not None else None
     nodes += bargain_nodes(found or (), verdict_tables.currency_of(verdict))
     for table in choice_tables.choice_tables(verdict):

@@ -211,3 +211,33 @@ def choice_chart(verdict: Verdict) -> list[Node]:
         "of it."
     ) + _cloud_words(choice.cloud or (), verdict.spec.combinations)
     return [Chart("choice", draw, caption)] if len(points) > 1 else []
+
+
+def figure_chart(verdict: Verdict) -> list[Node]:
+    """The designs of the front by the figure of the error that a requirement limits."""
+    found = None if verdict.choice is None else verdict.choice.by_figure
+    if found is None or len(found.designs) < 2:
+        return []
+    chosen = None if verdict.design is None else verdict.design.cost
+    marks = [
+        (one.cost, one.figure_m, one.cost == chosen, choice_tables.sensors(one.design), one.beaten)
+        for one in found.designs
+    ]
+
+    def draw() -> InlineFigure:
+        from syncline_design.report.figures_results import FrontMark, pareto_front
+
+        drawn = [FrontMark(*mark[:4]) for mark in marks if not mark[4]]
+        around = [FrontMark(*mark[:2], False, mark[3]) for mark in marks if mark[4]]
+        return pareto_front(
+            drawn, verdict_tables.currency_of(verdict), found.limit_m,
+            lowest_limit(verdict, "cost"), "fig-by-figure", cloud=around, over=found.figure,
+        )  # fmt: skip
+
+    kind = next((row.kind for row in verdict.requirements if row.id == found.requirement), "")
+    caption = (
+        f"The designs of that front by the {found.figure} that {found.requirement} limits, each at "
+        "its worst situation. Others may lie between them: the exact front over this figure is "
+        f"`optimize --pareto --against {kind}`."
+    )
+    return [Chart("by-figure", draw, caption)]

@@ -20,6 +20,7 @@ from syncline_design.verdict.named import (
     ChoiceResult,
     Exclusion,
     Figure,
+    FrontByFigure,
     FrontDesign,
     RankedDesign,
     StampingRange,
@@ -39,12 +40,18 @@ def choice_of(
     picked: Picked,
     pieces: Pieces | None = None,
     points: Sequence[FrontPoint] | None = None,
+    *,
+    pictured: bool = False,
 ) -> ChoiceResult:
-    """What was chosen among what; points: the front of cost, where it is known."""
+    """What was chosen among what; points: the front of cost, where it is known.
+
+    pictured: whether to tell the front by a figure of the error too, where one is limited.
+    """
     # late: 20 ms that a pinned spec need not wait
     from syncline_design.choice.decide import best
     from syncline_design.choice.front import front, staircase
     from syncline_design.verdict.alternatives import alternatives, bargains
+    from syncline_design.verdict.front_by_figure import front_by_figure
 
     assert picked.verified is not None
     chosen = picked.verified.design
@@ -59,6 +66,14 @@ def choice_of(
     following = pieces.listed("next best designs", lambda: others(every=False))
     ranked = pieces.listed("next best of every design", lambda: others(every=True))
     excluded, count = ruled_out(problem)
+    by_figure = None
+    if pictured:
+        verified, known = picked.verified, points
+
+        def by_the_tightest() -> FrontByFigure | None:
+            return front_by_figure(case, problem, verified, known)
+
+        by_figure = pieces.made("front by figure", by_the_tightest, None)
     return ChoiceResult(
         picked.choice.proof,
         front_designs(case, problem, points),
@@ -70,6 +85,7 @@ def choice_of(
         count,
         tuple(pieces.listed("alternatives", lambda: alternatives(case, problem, chosen))),
         tuple(bargains(case, problem, chosen, points)),
+        by_figure=by_figure,
     )
 
 

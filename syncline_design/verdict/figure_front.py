@@ -28,7 +28,7 @@ _DEFAULTS: dict[FigureKind, dict[str, Any]] = {
     "quantile": {"of": "3d", "p": 0.95},
 }
 _LOOSE = "1000000000 m"
-_LESS = 1.0 - 1e-3  # figures nearer to each other than their search: the cheaper is on the front
+LESS = 1.0 - 1e-3  # figures nearer to each other than their search: the cheaper is on the front
 
 
 def drawn_requirement(case: Case, kind: FigureKind) -> Requirement:
@@ -82,7 +82,7 @@ def figure_front(
             yield replace(found, design=priced.whole(found.design))
         if found is None or found.undecided or found.figure_m is None:
             return
-        least = found.figure_m * _LESS
+        least = found.figure_m * LESS
 
 
 def _next(

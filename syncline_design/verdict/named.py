@@ -264,6 +264,30 @@ class CloudDesign(Record):
 
 
 @dataclass(frozen=True, slots=True)
+class FiguredDesign(Record):
+    """A design of the front of cost against error by another figure of the error [m].
+
+    beaten: whether one that costs no more has a smaller figure, or one larger by 0.1 % at most.
+    """
+
+    cost: float
+    figure_m: float
+    error_m: float
+    design: NamedDesign
+    beaten: bool
+
+
+@dataclass(frozen=True, slots=True)
+class FrontByFigure(Record):
+    """The designs of the front by the figure of the error that a requirement limits."""
+
+    requirement: str
+    figure: str
+    limit_m: float
+    designs: tuple[FiguredDesign, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class ChoiceResult(Record):
     """The `choice` of a verdict; without a design, only what is known of one.
 
@@ -271,7 +295,8 @@ class ChoiceResult(Record):
     next_best: designs that differ in a sensor; next_best_every: of all designs.  excluded: a
     thousand rows at most, excluded_count: how many there are.  alternatives: without a sensor each;
     bargains: what a little more money, or a little more error, would buy.  cloud: all designs, or
-    a sample of them, where a picture was asked for.
+    a sample of them, by_figure: the designs of the front by the figure that the tightest
+    requirement on one limits, both where a picture was asked for.
     """
 
     proof: Proof | None = optional()
@@ -285,6 +310,7 @@ class ChoiceResult(Record):
     alternatives: tuple[Alternative, ...] | None = optional()
     bargains: tuple[Bargain, ...] | None = optional()
     cloud: tuple[CloudDesign, ...] | None = optional()
+    by_figure: FrontByFigure | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

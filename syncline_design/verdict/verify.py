@@ -117,7 +117,7 @@ def open_verdict(
     if picked.verified is None:
         return infeasible_verdict(case, problem, settings, build)
     pieces = Pieces(lambda: refusals(problem))
-    choice = choice_of(case, problem, picked, pieces, points)
+    choice = choice_of(case, problem, picked, pieces, points, pictured=settings.cloud)
     if settings.cloud:
         choice = replace(
             choice, cloud=tuple(pieces.listed("cloud", lambda: cloud(problem, choice.front or ())))
