@@ -287,7 +287,13 @@ def test_a_log_beyond_the_limits_says_so(
     assert check.share == pytest.approx(np.mean(size > limit), abs=0.12)
 
 
-@pytest.mark.parametrize(("change", "limits"), [(times("velocity_", 1.2), ""),
+def lasting(columns: dict[str, Array]) -> None:
+    """A constant that the places do not follow: times a delay, it would look like a datum."""
+    columns["velocity_north_mps"] += 0.8
+    columns["velocity_east_mps"] -= 0.5
+
+
+@pytest.mark.parametrize(("change", "limits"), [(times("velocity_", 1.2), ""), (lasting, ""),
                                                 (None, "v_max: 1 m/s")])  # fmt: skip
 def test_no_unsound_log_agrees_or_is_explained(
     change: Change | None, limits: str, tmp_path: Path
@@ -300,6 +306,10 @@ def test_no_unsound_log_agrees_or_is_explained(
     assert document["sound"] is False
     said = document["checks"][0]["message"]
     assert text.lower().index(said.lower()) < text.index("What is missing")
+    causes = [one for one in found.findings if one.kind == "cause"]
+    assert [(one.effect, one.sensor) for one in causes] == [("latency", "position")]
+    low, high = causes[0].parameters["latency_s"].interval95 or (0.0, 0.0)
+    assert low <= 0.05 <= high, "the wrong columns have a part in the delay"
     for kind in ("html", "markdown"):
         page = render_diagnose(kind, with_design(found, None))
         assert "contradicts itself" in page

@@ -43,8 +43,21 @@ def log_checks(view: Scene, named: Sequence[Acting] = ()) -> tuple[Check, ...]:
     found: list[Check] = []
     for index, (stage, logged) in enumerate(zip(view.system.stages, view.log.stages, strict=True)):
         found += _limits(view, stage, logged)
-        found += _columns(view, index, stage, logged, _displaced(view, index, named))
+        columns = tuple(_columns(view, index, _displaced(view, index, named)))
+        found += columns
+        moves = all(one.code != "velocity_columns" for one in columns)
+        if moves and not logged.follows_position:
+            found += _scattering(view, index, stage, logged)
     return tuple(sorted(found, key=lambda c: c.severity != "contradiction"))
+
+
+def contradicted_columns(view: Scene, named: Sequence[Acting] = ()) -> tuple[Check, ...]:
+    """Columns of motion that are not the slope of the poses; named: what was found."""
+    return tuple(
+        check
+        for index in range(len(view.system.stages))
+        for check in _columns(view, index, _displaced(view, index, named))
+    )
 
 
 def _limits(view: Scene, stage: Stage, logged: StageLog) -> Iterator[Check]:
@@ -100,11 +113,9 @@ def _displaced(view: Scene, index: int, named: Sequence[Acting]) -> Array:
     return total
 
 
-def _columns(
-    view: Scene, index: int, stage: Stage, logged: StageLog, displaced_m: Array
-) -> Iterator[Check]:
+def _columns(view: Scene, index: int, displaced_m: Array) -> Iterator[Check]:
     """Velocity columns against the positions' motion, rates against the attitudes' turns."""
-    rows = view.rows[index]
+    stage, logged, rows = view.system.stages[index], view.log.stages[index], view.rows[index]
     place = rows.position_m - displaced_m
     if view.log.kind == "position" and bool(np.all(np.isfinite(view.log.truth_m))):
         place = view.log.truth_m  # the velocity is that of the better system
@@ -130,8 +141,6 @@ def _columns(
             subject, own = WORDS[code]
             message = f"{subject} of {stage.name} contradict {own}: {found.words}"
             yield Check(code, stage.name, "contradiction", message, found.factor, 1.0, "", 1.0)
-    if moved is None and not logged.follows_position:
-        yield from _scattering(view, index, stage, logged)
 
 
 def _scattering(view: Scene, index: int, stage: Stage, logged: StageLog) -> Iterator[Check]:

@@ -24,6 +24,13 @@ from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, wind
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
 from syncline_design.diagnosis.identify import unseen
+from syncline_design.diagnosis.motion_columns import (
+    columns_of,
+    contradictions,
+    is_excusable,
+    merged_checks,
+    with_slopes,
+)
 from syncline_design.diagnosis.noise import SLOW_LEAST, SLOW_LIMIT, as_specified
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import (
@@ -110,13 +117,17 @@ def _within_time(progress: Progress) -> Progress:
 
 @dataclass(frozen=True, slots=True)
 class Examined:
-    """A log that was searched: gross faults undone, the model settled."""
+    """A log that was searched: gross faults undone, the model settled.
+
+    replaced: columns of motion that contradict the poses, whose slopes were taken instead.
+    """
 
     inputs: Measured
     faults: tuple[Gross, ...]
     data: Data
     search: Search
     result: SearchResult
+    replaced: tuple[Check, ...] = ()
 
     @property
     def untouched(self) -> Array | None:
@@ -136,6 +147,26 @@ def examined(
         settings.exclude_effects,
         inputs.reread,
     )
+    view = scene(inputs.system, _in_windows(log), inputs.known)
+    wrong = () if is_excusable(view) else contradictions(view)
+
+    def asked(wrong: tuple[Check, ...]) -> Examined:
+        sloped = with_slopes(log, wrong)
+        return replace(_examined(inputs, tuple(faults), sloped, settings, progress), replaced=wrong)
+
+    one = asked(wrong)
+    found = contradictions(view, one.result.model.acting)
+    return one if columns_of(found) == columns_of(wrong) else asked(found)
+
+
+def _examined(
+    inputs: Measured,
+    faults: tuple[Gross, ...],
+    log: Log,
+    settings: DiagnosisSettings,
+    progress: Progress,
+) -> Examined:
+    """Look for what is missing in a log; positions that are off by whole seconds are put back."""
     data, search, result = _searched(inputs, log, settings, progress)
     slip = _slip(result)
     if slip is not None and slip.effect.name not in settings.exclude_effects:
@@ -143,7 +174,7 @@ def examined(
         faults = (*faults, Gross(slip, before / max(usual_size(result.model.error), 1e-300)))
         log = mended(log, slip, inputs.reread)
         data, search, result = _searched(inputs, log, settings, progress)
-    return Examined(inputs, tuple(faults), data, search, result)
+    return Examined(inputs, faults, data, search, result)
 
 
 def diagnose_measured(
@@ -244,9 +275,9 @@ def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
         size_m=rest.size_m,
         material=material,
     )
-    checks = log_checks(data.view, result.model.acting)
+    checks = merged_checks(one.replaced, log_checks(data.view, result.model.acting))
     named = with_system_delay(named, data.view.log.kind)
-    return WeighedUp(named, remaining, tuple(checks), before)
+    return WeighedUp(named, remaining, checks, before)
 
 
 def _with_sizes(
@@ -287,10 +318,13 @@ def _searched(
     inputs: Measured, log: Log, settings: DiagnosisSettings, progress: Progress
 ) -> tuple[Data, Search, SearchResult]:
     """The search over one log; of a long one, over windows of it."""
-    log = log.rows(windows(len(log), MOST_ROWS, WINDOW))
-    search = _started(inputs, log, settings, progress)
+    search = _started(inputs, _in_windows(log), settings, progress)
     result = search.run()
     return search.data, search, result
+
+
+def _in_windows(log: Log) -> Log:
+    return log.rows(windows(len(log), MOST_ROWS, WINDOW))
 
 
 def _started(

@@ -103,7 +103,9 @@ def scene(system: System, log: Log, known: Sequence[Acting] = ()) -> Scene:
             raise ValueError(f"stage {stage.name!r} has no position")
         position = source - rotate(rotation, antenna)
         moved = _of_the_reference_point(log, logged, rotation, antenna)
-        motions.append(_motion(log, moved))
+        motions.append(
+            _motion(log, _of_the_reference_point(log, _quick(log, logged), rotation, antenna))
+        )
         path = _path_velocity(log, logged)
         rows.append(_stage_rows(log, moved, path, rotation, position, antenna, ranging))
         place = position + rotate(rotation, ranging + _logged_vector(logged, len(log)))
@@ -130,6 +132,25 @@ def _of_the_reference_point(
         swept = [np.interp(track.time_s, log.time_s, sweep[:, k]) for k in range(3)]
         track = LogTrack(track.time_s, track.value - np.stack(swept, axis=1))
     return replace(logged, velocity_mps=logged.velocity_mps - sweep, velocity_track=track)
+
+
+def _quick(log: Log, logged: StageLog) -> StageLog:
+    """The stage with slopes of its places that are smoothed by what these ask for.
+
+    Displacements rest on them: smoothed over a fixed time, quick motion would be missing from a
+    delay and not from the lag of a filter.  Accelerations would be mostly noise.
+    """
+    place_m = None
+    if logged.velocity_track is not None:
+        return logged
+    if log.kind == "position" and logged.follows_reference and np.all(np.isfinite(log.truth_m)):
+        place_m = log.truth_m
+    elif logged.follows_position:
+        place_m = logged.antenna_m
+    if place_m is None:
+        return logged
+    times, places = per_stamp(log.time_s, place_m)
+    return replace(logged, velocity_mps=smooth_slope(times, places, log.time_s))
 
 
 def _motion(log: Log, stage: StageLog) -> LoggedMotion:
