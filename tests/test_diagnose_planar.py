@@ -19,6 +19,7 @@ from syncline_design.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 Array = NDArray[np.float64]
 Draw = Callable[[np.random.Generator, int], Array]
 SIGMA_M, ROWS, STEP_S = 0.05, 900, 0.2
+FEW = 500  # rows, for what is far beyond its bound
 TWO_AXES, ONE_AXIS = ("north", "east"), ("north",)
 
 SPEC = f"""syncline: 1
@@ -53,13 +54,13 @@ def student(freedom: float) -> Draw:
     return lambda rng, rows: SIGMA_M * rng.standard_t(freedom, (rows, 2))
 
 
-def drive(rng: np.random.Generator) -> dict[str, Array]:
+def drive(rows: int) -> dict[str, Array]:
     """A robot on wavy ground tracks, level for ever; nothing but zeros in the third axis."""
-    time_s = STEP_S * np.arange(ROWS)
+    time_s = STEP_S * np.arange(rows)
     north, east = 8.0 * np.sin(0.13 * time_s), 11.0 * np.sin(0.087 * time_s + 0.4)
     v_north, v_east = 1.04 * np.cos(0.13 * time_s), 0.957 * np.cos(0.087 * time_s + 0.4)
     yaw = np.unwrap(np.arctan2(v_east, v_north))
-    zero = np.zeros(ROWS)
+    zero = np.zeros(rows)
     return {
         "time_s": time_s, "velocity_north_mps": v_north, "velocity_east_mps": v_east,
         "velocity_down_mps": zero, "roll_deg": zero, "pitch_deg": zero, "yaw_deg": np.degrees(yaw),
@@ -78,21 +79,26 @@ def write(folder: Path, columns: dict[str, Array], scanner: bool) -> tuple[Path,
 
 
 def scanned(
-    folder: Path, draw: Draw, seed: int, height_m: float = 0.0, turned_deg: float = 0.0
+    folder: Path,
+    draw: Draw,
+    seed: int,
+    height_m: float = 0.0,
+    turned_deg: float = 0.0,
+    rows: int = ROWS,
 ) -> tuple[Path, Path]:
     """A plane scan of walls around: range and azimuth, elevation zero, target down zero."""
     rng = np.random.default_rng(seed)
-    moved = drive(rng)
+    moved = drive(rows)
     north, east, yaw = moved.pop("north"), moved.pop("east"), np.radians(moved["yaw_deg"])
-    bearing, distance = rng.uniform(-2.0, 2.0, ROWS), rng.uniform(2.0, 11.0, ROWS)
-    zero = np.zeros(ROWS)
-    noise = draw(rng, ROWS)
+    bearing, distance = rng.uniform(-2.0, 2.0, rows), rng.uniform(2.0, 11.0, rows)
+    zero = np.zeros(rows)
+    noise = draw(rng, rows)
     moved["yaw_deg"] = moved["yaw_deg"] + turned_deg
-    azimuth = bearing + np.radians(0.05) * rng.standard_normal(ROWS)
+    azimuth = bearing + np.radians(0.05) * rng.standard_normal(rows)
     columns = moved | {
         "position_north_m": north + noise[:, 0], "position_east_m": east + noise[:, 1],
         "position_down_m": zero + height_m,
-        "range_m": distance + 0.01 * rng.standard_normal(ROWS),
+        "range_m": distance + 0.01 * rng.standard_normal(rows),
         "azimuth_deg": np.degrees(azimuth), "elevation_deg": zero,
         "target_north_m": north + distance * np.cos(yaw + bearing),
         "target_east_m": east + distance * np.sin(yaw + bearing), "target_down_m": zero,
@@ -100,12 +106,14 @@ def scanned(
     return write(folder, columns, True)
 
 
-def tracked(folder: Path, draw: Draw, seed: int, axes: tuple[str, ...]) -> tuple[Path, Path]:
+def tracked(
+    folder: Path, draw: Draw, seed: int, axes: tuple[str, ...], rows: int = ROWS
+) -> tuple[Path, Path]:
     """A tachymeter knows some axes of the robot's place; the others are not in the log."""
     rng = np.random.default_rng(seed)
-    moved = drive(rng)
-    place = {"north": moved.pop("north"), "east": moved.pop("east"), "down": np.zeros(ROWS)}
-    noise = draw(rng, ROWS)
+    moved = drive(rows)
+    place = {"north": moved.pop("north"), "east": moved.pop("east"), "down": np.zeros(rows)}
+    noise = draw(rng, rows)
     columns = moved | {
         "position_north_m": place["north"] + noise[:, 0],
         "position_east_m": place["east"] + noise[:, 1],
@@ -131,7 +139,7 @@ def test_plane_logs_of_normal_noise_agree(tmp_path: Path) -> None:
     for spec, log in logs:
         found.append(diagnose(spec, [log]))
     for axes in (TWO_AXES, ONE_AXIS):
-        spec, log = tracked(tmp_path, normal, 3, axes)
+        spec, log = tracked(tmp_path, normal, 3, axes, FEW)
         found.append(diagnose(spec, [log]))
     assert not any("heavy_tails" in names(one) for one in found)
     assert sum(one.verdict != "agrees" for one in found) <= 1, [names(one) for one in found]
@@ -158,7 +166,7 @@ def test_tails_of_plane_logs_are_those_of_their_noise(
 @pytest.mark.parametrize("most", [1, 2, 4])
 def test_no_effect_is_named_twice(most: int, tmp_path: Path) -> None:
     """Tails, a hidden latency and a lever arm: each once, and no name uses up two places."""
-    spec, log = scanned(tmp_path, student(2.2), 7)
+    spec, log = scanned(tmp_path, student(2.2), 7, rows=FEW)
     table = np.genfromtxt(log, delimiter=",", names=True)
     yaw = np.radians(table["yaw_deg"])
     table["position_north_m"] -= 0.3 * table["velocity_north_mps"] - 0.4 * np.cos(yaw)
@@ -173,7 +181,7 @@ def test_no_effect_is_named_twice(most: int, tmp_path: Path) -> None:
 
 def test_a_height_that_is_wrong_everywhere_is_still_found(tmp_path: Path) -> None:
     """0.8 m in an axis without any scatter: far beyond the spec's 5 cm, so not left out."""
-    spec, log = scanned(tmp_path, normal, 4, height_m=0.8)
+    spec, log = scanned(tmp_path, normal, 4, height_m=0.8, rows=FEW)
     found = diagnose(spec, [log])
     assert found.verdict != "agrees"
     values = [
@@ -188,7 +196,7 @@ def test_a_height_that_is_wrong_everywhere_is_still_found(tmp_path: Path) -> Non
 def test_what_a_plane_log_does_not_show_has_no_figure(tmp_path: Path) -> None:
     """A lever arm in the plane: its part along the plane's normal is not seen, not 0 +- 0."""
     rng = np.random.default_rng(31)
-    columns = drive(rng)
+    columns = drive(ROWS)
     yaw, noise = np.radians(columns["yaw_deg"]), normal(rng, ROWS)
     north, east = columns.pop("north"), columns.pop("east")
     arm_x, arm_y = 0.20, -0.12
@@ -218,7 +226,7 @@ def test_a_heading_that_is_off_is_not_a_mounting_with_three_angles(tmp_path: Pat
 
     The height that is off beside it is an arm's or a datum's, not that of a mount that bends.
     """
-    spec, log = scanned(tmp_path, normal, 6, height_m=0.4, turned_deg=1.5)
+    spec, log = scanned(tmp_path, normal, 6, height_m=0.4, turned_deg=1.5, rows=FEW)
     found = diagnose(spec, [log])
     turned, height = sorted(found.findings, key=lambda one: one.sensor)
     assert turned.effect == "heading_bias"
