@@ -308,7 +308,7 @@ def test_tables_and_csv(tmp_path: Path) -> None:
     ("value", "text"), [(5.7563287, "5.757 m"), (0.25, "250 mm"), (0.29453366, "294.6 mm")]
 )
 def test_printed_targets_are_ones_that_the_price_buys(value: float, text: str) -> None:
-    assert numbers.target(value) == text.replace(" ", "\u00a0")
+    assert numbers.rounded_up(value) == text.replace(" ", "\u00a0")
 
 
 @pytest.mark.parametrize("name", ["=HYPERLINK(1)", "+1+1", "@SUM(A1)", "-2+3"])

@@ -148,7 +148,7 @@ def test_slider_recolours_the_verdict(browser: Any, report: Path) -> None:
         assert page.is_hidden("#what-if")
         move(page, "#tau-slider", -2.0)
         assert "would not meet" in page.inner_text("#explorer-verdict")
-        assert "the error exceeds the target" in page.inner_text("#explorer-verdict")
+        assert "the error exceeds the limit" in page.inner_text("#explorer-verdict")
         assert page.is_visible("#what-if")
         assert page.eval_on_selector("#banner", colour) != good
         assert page.inner_text("#verdict-word") == "Meets every requirement"  # the proven one stays
@@ -166,13 +166,13 @@ def test_sliders_agree_with_the_model(browser: Any, report: Path) -> None:
     with Opened(browser, report) as opened:
         page = opened.page
         move(page, "#tau-slider", -3.0)
-        assert f"{error * 1000:.4g}\u00a0mm" in page.inner_text("#explorer-verdict")
+        assert f"{error:.4g}\u00a0m " in page.inner_text("#explorer-verdict")
         assert page.inner_text("#tau-value") == "1\u00a0ms"
         page.click("#explorer-reset")
         total = syncline.total_m
         for factor, word in ((1.001, "would meet"), (0.999, "would not meet")):
             page.evaluate("() => 0")
-            move(page, "#target-slider", page.evaluate("v => Math.log10(v)", total * factor))
+            move(page, "#limit-slider", page.evaluate("v => Math.log10(v)", total * factor))
             assert word in page.inner_text("#explorer-verdict")
 
 

@@ -24,6 +24,7 @@ from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
 from syncline_design.report.text import visible
+from syncline_design.simulation.results import ProportionEstimate
 from syncline_design.verdict.tree import FileProblem, Refused
 
 
@@ -317,7 +318,7 @@ def curve(**changes: Any) -> figures.SynclineCurve:
         "tau_crit_s": 0.1 / 45.0,
         "tau_s": 1e-3,
         "total_m": 0.145,
-        "target_m": 0.2,
+        "limit": ProportionEstimate(0.2, 0.9, 0.8, 1.0, "20.0 cm"),
     }
     return figures.SynclineCurve(**(values | changes))
 
@@ -348,13 +349,13 @@ def test_operating_point_lies_where_the_axes_say() -> None:
         {"tau_crit_s": None, "rate_mps": 0.0, "total_m": 0.1},
         {"tau_s": 0.0, "total_m": 0.1},
         {"tau_s": None, "total_m": None},
-        {"target_m": None},
-        {"target_m": 50.0},
-        {"target_m": 1e-6},
+        {"limit": None},
+        {"limit": ProportionEstimate(50.0, 0.9, 0.8, 1.0)},
+        {"limit": ProportionEstimate(1e-6, 0.9, 0.8, 1.0)},
         {"tau_s": 1e3, "total_m": 45_000.1},
         {"tau_s": 1e-12},
         {"floor_m": 1e-9, "tau_crit_s": 1e-9 / 45.0, "total_m": 0.045},
-        {"tau_crit_s": None, "rate_mps": 0.0, "tau_s": None, "total_m": None, "target_m": None},
+        {"tau_crit_s": None, "rate_mps": 0.0, "tau_s": None, "total_m": None, "limit": None},
     ],
 )
 def test_syncline_figure_takes_extreme_systems(changes: dict[str, Any]) -> None:

@@ -367,7 +367,7 @@ def test_summary_says_what_was_found() -> None:
         "Samples 3 000",
         "Seed 0",
         f"95 % {numbers.length(result.monte_carlo.quantile(0.95).value_m)}",
-        "Within the target of 50 mm",
+        "Within the limit of 50 mm",
         f"{numbers.percent(worst.ratio_to_syncline, 4)} of the Syncline's",
         "do not contradict the Syncline",
         "range noise acts along the line of sight",

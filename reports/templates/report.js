@@ -258,17 +258,18 @@
     frame.insertAdjacentElement(over ? "beforebegin" : "afterend", row);
   });
 
-  // Sliders: tau and the target move the operating point and recolour the verdict.
+  // Sliders: tau and the limit move the operating point and recolour the verdict.
   var form = document.getElementById("explorer");
   if (!form) { return; }
   var data = form.dataset;
   var floor = parseFloat(data.floor), rate = parseFloat(data.rate), tau0 = parseFloat(data.tau);
   var crit = data.crit === "" ? Infinity : parseFloat(data.crit);
-  var target0 = data.target === "" ? null : parseFloat(data.target);
+  var limit0 = data.limit === "" ? null : parseFloat(data.limit);
+  var limitSize = parseFloat(data.limitSize);
   var syncLimit = parseFloat(data.syncLimit), othersPass = data.others === "1";
   var box = data.box.split(" ").map(parseFloat);
   var tauSlider = document.getElementById("tau-slider");
-  var targetSlider = document.getElementById("target-slider");
+  var limitSlider = document.getElementById("limit-slider");
   var banner = document.getElementById("banner");
   var bannerTone = banner.className;
   var whatIf = document.getElementById("what-if");
@@ -303,6 +304,12 @@
     return quantity(value, [[1e-9, "nm"], [1e-6, "\u00b5m"], [1e-3, "mm"], [1, "m"], [1e3, "km"]]);
   }
 
+  // In the unit of the limit, where the spec writes one and the figure is readable in it.
+  function besideLimit(value) {
+    var amount = value / limitSize;
+    return amount >= 1e-3 && amount < 1e6 ? quantity(value, [[limitSize, data.limitUnit]]) : length(value);
+  }
+
   // The sliders run over logarithms; without a script they never show.
   function toLog(slider) {
     ["min", "max", "value"].map(function (name) {
@@ -325,28 +332,29 @@
 
   function moved() {
     return Math.abs(parseFloat(tauSlider.value) - Math.log10(tau0)) > 1e-9 ||
-      (target0 !== null && Math.abs(parseFloat(targetSlider.value) - Math.log10(target0)) > 1e-9);
+      (limit0 !== null && Math.abs(parseFloat(limitSlider.value) - Math.log10(limit0)) > 1e-9);
   }
 
   function update() {
     var changed = moved();
     var tau = changed ? Math.pow(10, parseFloat(tauSlider.value)) : tau0;
-    var target = target0 === null ? null : changed ? Math.pow(10, parseFloat(targetSlider.value)) : target0;
+    var limit = limit0 === null ? null : changed ? Math.pow(10, parseFloat(limitSlider.value)) : limit0;
     var error = floor + rate * tau;
-    var accurate = target === null || error <= target * (1 + 1e-12);
+    var accurate = limit === null || error <= limit * (1 + 1e-12);
     var synchronous = tau < syncLimit * crit;
     var met = accurate && synchronous && othersPass;
     var point = element("operating-point");
     shift(point, across(tau) - across(tau0), down(error) - down(floor + rate * tau0));
     paint(point, accurate);
-    if (target !== null) {
-      shift(element("target-line"), 0, down(target) - down(target0));
-      var label = element("target-label");
-      shift(label, 0, down(target) - down(target0));
+    if (limit !== null) {
+      shift(element("limit-line"), 0, down(limit) - down(limit0));
+      var label = element("limit-label");
+      shift(label, 0, down(limit) - down(limit0));
       var text = label ? label.querySelector("text") : null;
-      if (text) { text.textContent = "target " + length(target); }
-      document.getElementById("target-value").textContent = length(target);
-      targetSlider.setAttribute("aria-valuetext", length(target));
+      var said = changed ? besideLimit(limit) : data.limitShown;
+      if (text) { text.textContent = "limit " + said; }
+      document.getElementById("limit-value").textContent = said;
+      limitSlider.setAttribute("aria-valuetext", said);
     }
     document.getElementById("tau-value").textContent = time(tau);
     tauSlider.setAttribute("aria-valuetext", time(tau));
@@ -355,12 +363,12 @@
 
   function tell(changed, met, accurate, synchronous, error, tau) {
     var reasons = [];
-    if (!accurate) { reasons.push("the error exceeds the target"); }
+    if (!accurate) { reasons.push("the error exceeds the limit"); }
     if (!synchronous) { reasons.push("\u03c4 is not below \u03c4_crit"); }
     if (!othersPass) { reasons.push("another requirement fails"); }
     var word = met ? "\u2713 would meet" : "\u2717 would not meet: " + reasons.join("; ");
     var output = document.getElementById("explorer-verdict");
-    output.textContent = "Error " + length(error) + " \u2014 " + word;
+    output.textContent = "Error " + besideLimit(error) + " \u2014 " + word;
     output.className = met ? "good" : "bad";
     whatIf.hidden = !changed;
     whatIf.textContent = changed ? "What if \u03c4 were " + time(tau) + ": " + word : "";
@@ -369,15 +377,15 @@
 
   function reset() {
     tauSlider.value = String(Math.log10(tau0));
-    if (target0 !== null) { targetSlider.value = String(Math.log10(target0)); }
+    if (limit0 !== null) { limitSlider.value = String(Math.log10(limit0)); }
     update();
   }
 
   toLog(tauSlider);
   tauSlider.addEventListener("input", update);
-  if (targetSlider) {
-    toLog(targetSlider);
-    targetSlider.addEventListener("input", update);
+  if (limitSlider) {
+    toLog(limitSlider);
+    limitSlider.addEventListener("input", update);
   }
   document.getElementById("explorer-reset").addEventListener("click", reset);
   form.addEventListener("submit", function (event) { event.preventDefault(); });

@@ -11,10 +11,12 @@ from syncline_design.choice.outcome import NoVerdict
 from syncline_design.choice.parts import FIELDS, SIMULATED, Part, least, parts_of
 from syncline_design.choice.table import Problem
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.written import DIMENSIONS, beside
 from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import LIMIT_DIMENSIONS
 
+_UNITS = {dimension: unit for unit, dimension in DIMENSIONS.items()}
 IMPLIED = "the implied sync requirement"
 
 
@@ -63,14 +65,26 @@ def _limit_of(problem: Problem, part: Part) -> Fraction | None:
 
 
 def shown_figures(case: Case, kind: str, value: Fraction, limit: Fraction) -> tuple[str, str]:
-    """Both figures, in so many digits that they differ."""
+    """Value and limit, in so many digits that they differ; in the limit's unit where it has one."""
     dimension = LIMIT_DIMENSIONS.get(kind, Dimension.DIMENSIONLESS)
+    written = _written(case, kind, limit)
+
+    def shown(figure: Fraction, digits: int) -> str:
+        if written is not None:
+            return beside(written, float(figure), _UNITS[dimension], digits)
+        return format_quantity(float(figure), dimension, digits, case.spec.currency)
+
     texts = ("", "")
     for digits in range(4, 17):
-        texts = (
-            format_quantity(float(value), dimension, digits, case.spec.currency),
-            format_quantity(float(limit), dimension, digits, case.spec.currency),
-        )
-        if texts[0] != texts[1]:
+        texts = (shown(value, digits), written or shown(limit, digits))
+        if texts[0] != texts[1] and not (written and texts[0] == shown(limit, digits)):
             break
     return texts
+
+
+def _written(case: Case, kind: str, limit: Fraction) -> str | None:
+    """A limit as the spec has it; None where none of that kind has a unit of its own."""
+    for one in case.spec.requirements:
+        if one.kind == kind and type(one.limit) is Quantity and one.limit.exact == limit:
+            return one.limit_written
+    return None

@@ -43,13 +43,13 @@ def _staircase(steps: Sequence[PriceStep], currency: str) -> Table | None:
     rows = []
     for step in steps:
         loose = step.looser_than_m
-        below = f" to below {numbers.target(loose)}" if loose is not None else " and looser"
+        below = f" to below {numbers.rounded_up(loose)}" if loose is not None else " and looser"
         rows.append((
-            Cell(numbers.target(step.tightest_m) + below, step.tightest_m),
+            Cell(numbers.rounded_up(step.tightest_m) + below, step.tightest_m),
             _money(step.cost, currency),
             _money(step.extra, currency),
         ))  # fmt: skip
-    heads = ("Accuracy targets", "Price #", "More than the step before #")
+    heads = ("Accuracy limits", "Price #", "More than the step before #")
     return table("Price staircase of accuracy", heads, rows) if rows else None
 
 

@@ -109,8 +109,18 @@ class Chart:
 
 
 @dataclass(frozen=True, slots=True)
+class ExploredLimit:
+    """A limit to be moved: as it is shown at first, and the unit of it, one of which is size_m."""
+
+    limit_m: float
+    shown: str
+    unit: str
+    size_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class Explorer:
-    """Sliders that move tau and the target of the chart so named; None where unknown."""
+    """Sliders that move tau and the limit of the chart so named; None where unknown."""
 
     kind: ClassVar = "explorer"
     chart: str
@@ -118,11 +128,11 @@ class Explorer:
     rate_mps: float
     tau_s: float
     tau_crit_s: float | None
-    target_m: float | None
+    limit: ExploredLimit | None
     sync_limit: float
     others_pass: bool
     tau_span: tuple[float, float]
-    target_span: tuple[float, float]
+    limit_span: tuple[float, float]
     reach: Reach = "page"
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from syncline_design.report import numbers, verdict_figures
 from syncline_design.report.document import Group, Node, Text, show
-from syncline_design.report.table import Cell, Table, Tone, table
+from syncline_design.report.table import Cell, Table, table
 
 if TYPE_CHECKING:
     from syncline_design.simulation.figures import MissionFigures, StageSituation
@@ -29,7 +30,7 @@ def error_figures(verdict: Verdict) -> list[Node]:
     found = verdict.figures
     if found is None or found.worst_case_m is None:
         return []
-    limit = verdict_figures.lowest_limit(verdict, "accuracy")
+    limit = verdict_figures.tightest_limit(verdict, "accuracy")
     return [
         Text(LEAD),
         *show(_figures(found, limit), silent=True),
@@ -46,12 +47,12 @@ def _makers(found: ErrorFigures) -> list[Node]:
     return [Group(shown, "fold", summary="What makes them, where they are worst", reach="page")]
 
 
-def _figures(found: ErrorFigures, limit: float | None) -> Table:
+def _figures(found: ErrorFigures, limit: numbers.Limited | None) -> Table:
     rows = [
         (
             Cell(name),
             _against(over, limit),
-            Cell(numbers.length(one), one) if one is not None else Cell(numbers.MISSING),
+            _cell(one, limit),
             says,
         )
         for name, over, one, says in _rows(found)
@@ -61,13 +62,18 @@ def _figures(found: ErrorFigures, limit: float | None) -> Table:
     return table("Error figures", heads, rows)
 
 
-def _against(value: float | None, limit: float | None) -> Cell:
-    """A figure, marked where it exceeds the accuracy limit."""
+def _cell(value: float | None, limit: numbers.Limited | None) -> Cell:
+    """A figure, in the unit of the accuracy limit where there is one."""
     if value is None:
         return Cell(numbers.MISSING)
-    above = limit is not None and not value <= limit
-    tone: Tone = "warn" if above else ""
-    return Cell(numbers.length(value), value, tone, "!" if above else "")
+    return Cell(numbers.error(value, limit), value)
+
+
+def _against(value: float | None, limit: numbers.Limited | None) -> Cell:
+    """The same, marked where it exceeds that limit."""
+    cell = _cell(value, limit)
+    above = value is not None and limit is not None and not value <= limit.limit
+    return replace(cell, tone="warn", mark="!") if above else cell
 
 
 def _rows(found: ErrorFigures) -> Iterator[Row]:

@@ -31,7 +31,7 @@ class SynclineCurve:
     tau_crit_s: float | None
     tau_s: float | None
     total_m: float | None
-    target_m: float | None
+    limit: numbers.Limited | None
     lever_arm_rate_mps: float | None = None
 
 
@@ -66,7 +66,7 @@ def syncline(
             wider = curve.floor_m + curve.lever_arm_rate_mps * tau
             axes.plot(1 / tau, 1 / wider, color=LINE, linewidth=1, linestyle=(0, (1, 2)))
         axes.plot(1 / tau, 1 / error, color=LINE, linewidth=2.4, zorder=3)[0].set_gid("curve")
-        _target_and_design(axes, curve, low)
+        _limit_and_design(axes, curve, low)
         _syncline_labels(axes)
         return axes
 
@@ -74,7 +74,8 @@ def syncline(
 
 
 def _set_accuracy_limits(axes: Axes, curve: SynclineCurve, worst_m: float) -> None:
-    errors = [curve.floor_m, worst_m, *(e for e in (curve.target_m, curve.total_m) if e)]
+    asked = None if curve.limit is None else curve.limit.limit
+    errors = [curve.floor_m, worst_m, *(e for e in (asked, curve.total_m) if e)]
     axes.set_ylim(1.0 / (max(errors) * 1.3), 2.5 / min(errors))
 
 
@@ -137,25 +138,26 @@ def _asymptotes(axes: Axes, curve: SynclineCurve, low: float, high: float) -> No
         )
 
 
-def _target_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
-    """Target line and operating point, in groups of their own for the page's script."""
+def _limit_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
+    """Line of the limit and operating point, in groups of their own for the page's script."""
     left, right = axes.get_xlim()
-    if curve.target_m:
-        target = axes.plot([left, right], [1 / curve.target_m] * 2, color=WARN, linewidth=1.6)[0]
-        target.set_gid("target-line")
+    asked = None if curve.limit is None else curve.limit.limit
+    if curve.limit is not None and asked:
+        line = axes.plot([left, right], [1 / asked] * 2, color=WARN, linewidth=1.6)[0]
+        line.set_gid("limit-line")
         label = axes.annotate(
-            f"target {numbers.length(curve.target_m, 4)}",
-            (right, 1 / curve.target_m),
-            xytext=(-4, 4 if curve.target_m < curve.floor_m else -4),
+            f"limit {numbers.limit(curve.limit)}",
+            (right, 1 / asked),
+            xytext=(-4, 4 if asked < curve.floor_m else -4),
             textcoords="offset points",
             ha="right",
-            va="bottom" if curve.target_m < curve.floor_m else "top",
+            va="bottom" if asked < curve.floor_m else "top",
             color=WARN,
         )
-        label.set_gid("target-label")
+        label.set_gid("limit-label")
     if curve.total_m is None or curve.tau_s is None:
         return
-    met = curve.target_m is None or curve.total_m <= curve.target_m
+    met = asked is None or curve.total_m <= asked
     point = axes.plot(
         [1.0 / max(curve.tau_s, low)],
         [1.0 / curve.total_m],
@@ -171,7 +173,7 @@ def _target_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
     point.set_gid("operating-point")
     tell(axes, 1.0 / max(curve.tau_s, low), 1.0 / curve.total_m,
          [("Design at \u03c4", numbers.time(curve.tau_s)),
-          ("Error", numbers.length(curve.total_m))])  # fmt: skip
+          ("Error", numbers.error(curve.total_m, curve.limit))])  # fmt: skip
 
 
 def _syncline_labels(axes: Axes) -> None:
@@ -195,10 +197,10 @@ def _describe(curve: SynclineCurve) -> str:
     if curve.total_m is not None and curve.tau_s is not None:
         parts.append(
             f"The design sits at tau {numbers.time(curve.tau_s)} with an error of "
-            f"{numbers.length(curve.total_m)}."
+            f"{numbers.error(curve.total_m, curve.limit)}."
         )
-    if curve.target_m:
-        parts.append(f"The target is {numbers.length(curve.target_m)}.")
+    if curve.limit is not None:
+        parts.append(f"The limit is {numbers.limit(curve.limit)}.")
     return " ".join(parts)
 
 
@@ -269,11 +271,11 @@ _HATCH = {"sensor": "", "sync": "///", "systematic": "xxx", "underway": "..."}
 
 def ledger(
     terms: Sequence[LedgerBar],
-    target_m: float | None,
+    limit: numbers.Limited | None,
     name: str = "fig-ledger",
     total_m: float | None = None,
 ) -> InlineFigure:
-    """The terms as a waterfall that adds up to the total, with the target.
+    """The terms as a waterfall that adds up to the total, with the limit.
 
     total_m: with terms that are too small to be shown; by default the sum of those that are.
     """
@@ -281,11 +283,11 @@ def ledger(
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
-        _waterfall(axes, terms, total)
+        _waterfall(axes, terms, total, numbers.error(total, limit))
         axes.set_ylim(len(terms) + 0.6, -0.6)
-        axes.set_xlim(0, 1.04 * max(total, target_m or 0.0) or 1.0)
-        if target_m:
-            _mark_target(axes, target_m)
+        axes.set_xlim(0, 1.04 * max(total, 0.0 if limit is None else limit.limit) or 1.0)
+        if limit is not None:
+            _mark_limit(axes, limit)
         labels = [*(t.label for t in terms), "total"]
         scales.set_ticks(axes, "y", range(len(labels)), lambda row: labels[int(row)])
         scales.hide_ticks(axes, "y")
@@ -293,14 +295,14 @@ def ledger(
         scales.grid(axes, "x")
 
     spoken = "; ".join(f"{t.label} {numbers.length(t.value_m)}" for t in terms)
-    spoken += f"; total {numbers.length(total)}"
-    if target_m:
-        spoken += f"; target {numbers.length(target_m)}"
+    spoken += f"; total {numbers.error(total, limit)}"
+    if limit is not None:
+        spoken += f"; limit {numbers.limit(limit)}"
     size = (WIDTH, 54.0 + 20.0 * (len(terms) + 1))
     return draw(name, "Terms that add up to the total error", spoken, size, build)
 
 
-def _waterfall(axes: Axes, terms: Sequence[LedgerBar], total: float) -> None:
+def _waterfall(axes: Axes, terms: Sequence[LedgerBar], total: float, said: str) -> None:
     """Each term's bar starts where the one before ends; the last bar is the total."""
     start = 0.0
     for row, term in enumerate(terms):
@@ -319,9 +321,9 @@ def _waterfall(axes: Axes, terms: Sequence[LedgerBar], total: float) -> None:
             [("Term", term.label), ("Error", numbers.length(term.value_m)), ("Share", share)],
         )
     axes.barh(len(terms), total, height=0.62, color=INK, zorder=3)
-    beside(axes, len(terms), numbers.length(total, 4))
+    beside(axes, len(terms), said)
     tell(axes, (0.0, total), (len(terms) - 0.31, len(terms) + 0.31),
-         [("Term", "total"), ("Error", numbers.length(total))])  # fmt: skip
+         [("Term", "total"), ("Error", said)])  # fmt: skip
 
 
 def beside(axes: Axes, row: float, text: str) -> None:
@@ -332,11 +334,11 @@ def beside(axes: Axes, row: float, text: str) -> None:
     )  # fmt: skip
 
 
-def _mark_target(axes: Axes, target_m: float) -> None:
-    axes.axvline(target_m, color=WARN, linewidth=1.6, zorder=4)
+def _mark_limit(axes: Axes, limit: numbers.Limited) -> None:
+    axes.axvline(limit.limit, color=WARN, linewidth=1.6, zorder=4)
     axes.annotate(
-        f"target {numbers.length(target_m, 4)}",
-        (target_m, 1.0),
+        f"limit {numbers.limit(limit)}",
+        (limit.limit, 1.0),
         xycoords=("data", "axes fraction"),
         xytext=(0, 2),
         textcoords="offset points",

@@ -29,12 +29,38 @@ class DensityBars:
     edges_m: tuple[float, ...]
     density: tuple[float, ...]
     marks: tuple[tuple[str, float], ...]  # (word, error) of the quantiles
-    target_m: float | None
+    limit: numbers.Limited | None
     syncline_m: float | None
 
 
+@dataclass(frozen=True, slots=True)
+class _Mark:
+    """A vertical line and its label."""
+
+    error_m: float
+    label: str
+    spoken: str
+    colour: str
+
+
+def _marks(data: DensityBars) -> list[_Mark]:
+    found = [_mark(word, value, INK, data.limit) for word, value in data.marks]
+    if data.limit is not None:
+        words = numbers.limit(data.limit)
+        found.append(_Mark(data.limit.limit, f"limit {words}", f"limit at {words}", WARN))
+    if data.syncline_m is not None:
+        found.append(_mark("Syncline", data.syncline_m, BAD, data.limit))
+    return found
+
+
+def _mark(word: str, value_m: float, colour: str, limit: numbers.Limited | None) -> _Mark:
+    label, spoken = numbers.error(value_m, limit, 3), numbers.error(value_m, limit)
+    return _Mark(value_m, f"{word} {label}", f"{word} at {spoken}", colour)
+
+
 def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineFigure:
-    """Distribution of the simulated error, target, Syncline and quantiles marked."""
+    """Distribution of the simulated error, limit, Syncline and quantiles marked."""
+    marks = _marks(data)
 
     def build(figure: Figure) -> None:
         axes = add_axes(figure)
@@ -46,49 +72,29 @@ def error_histogram(data: DensityBars, name: str = "fig-mc") -> InlineFigure:
             ])  # fmt: skip
         axes.stairs(data.density, data.edges_m, fill=True, color=SERIES[0], alpha=0.35, zorder=2)
         axes.stairs(data.density, data.edges_m, color=SERIES[0], linewidth=1.4, zorder=3)
-        vertical = [*data.marks]
-        colours = [INK] * len(vertical)
-        for word, value, colour in (
-            ("target", data.target_m, WARN),
-            ("Syncline", data.syncline_m, BAD),
-        ):
-            if value is not None:
-                vertical.append((word, value))
-                colours.append(colour)
-        axes.set_ylim(0, top / (0.96 - LEVEL * len(vertical)))
-        axes.set_xlim(min(data.edges_m[0], 0.0), _room_for(vertical, data.edges_m[-1]))
-        _vertical_marks(axes, vertical, colours)
+        axes.set_ylim(0, top / (0.96 - LEVEL * len(marks)))
+        axes.set_xlim(min(data.edges_m[0], 0.0), _room_for(marks, data.edges_m[-1]))
+        _vertical_marks(axes, marks)
         _plain_length_axis(axes)
         axes.set_yticks([])
         axes.spines["left"].set_visible(False)
         axes.set_xlabel("georeferencing error")
 
-    spoken = "; ".join(f"{word} at {numbers.length(value)}" for word, value in data.marks)
-    for word, value in (("target", data.target_m), ("Syncline", data.syncline_m)):
-        if value is not None:
-            spoken += f"; {word} at {numbers.length(value)}"
+    spoken = "; ".join(mark.spoken for mark in marks)
     return draw(name, "Distribution of the simulated error", spoken, (WIDTH, 205.0), build)
 
 
-def _room_for(marks: Sequence[tuple[str, float]], last: float) -> float:
+def _room_for(marks: Sequence[_Mark], last: float) -> float:
     """Right end of an axis from 0 on which every mark's label has room to its right."""
-    ends = [
-        value / (1.0 - LETTER * (len(_label(*mark)) + 1)) for mark in marks for value in mark[1:]
-    ]
+    ends = [mark.error_m / (1.0 - LETTER * (len(mark.label) + 1)) for mark in marks]
     return max([1.02 * last, *ends])
 
 
-def _label(word: str, value_m: float) -> str:
-    return f"{word} {numbers.length(value_m, 3)}"
-
-
-def _vertical_marks(
-    axes: Axes, marks: Sequence[tuple[str, float]], colours: Sequence[str]
-) -> None:  # fmt: skip
+def _vertical_marks(axes: Axes, marks: Sequence[_Mark]) -> None:
     """Labelled vertical lines; each label right of its own, above every line further right."""
     top = axes.get_ylim()[1]
-    ordered = sorted(zip(marks, colours, strict=True), key=lambda item: item[0][1])
-    for index, ((word, value), colour) in enumerate(ordered):
+    for index, mark in enumerate(sorted(marks, key=lambda one: one.error_m)):
+        value, colour = mark.error_m, mark.colour
         level = 0.985 - LEVEL * index
         solid = colour != INK
         axes.plot(
@@ -96,7 +102,7 @@ def _vertical_marks(
             linestyle="-" if solid else (0, (3, 2)), zorder=4,
         )  # fmt: skip
         axes.annotate(
-            _label(word, value), (value, level * top), xytext=(4, 1), textcoords="offset points",
+            mark.label, (value, level * top), xytext=(4, 1), textcoords="offset points",
             ha="left", va="top", color=colour, zorder=6,
         )  # fmt: skip
 
@@ -192,7 +198,7 @@ class FrontMark:
 def pareto_front(
     points: Sequence[FrontMark],
     currency: str,
-    target_m: float | None,
+    limit: numbers.Limited | None,
     cost_limit: float | None,
     name: str = "fig-front",
     beside: tuple[float, float] | None = None,
@@ -210,7 +216,7 @@ def pareto_front(
         _staircase(axes, points, cost_limit)
         for point in points:
             tell(axes, point.cost, point.error_m, _says(point, currency))
-        errors = [*(p.error_m for p in points), *([target_m] if target_m else [])]
+        errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
         around = _near(cloud, points, axes.get_xlim()[1])
         errors += [p.error_m for p in around]
         _cloud(axes, around, currency)
@@ -218,7 +224,7 @@ def pareto_front(
             errors.append(beside[1])
             _named_mark(axes, *beside, "nearest", WARN)
         axes.set_ylim(min(errors) / 1.5, max(errors) * 1.6)
-        _limits(axes, target_m, cost_limit, currency)
+        _limits(axes, limit, cost_limit, currency)
         low, high = axes.get_ylim()
         scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
         _money_ticks(axes)
@@ -294,10 +300,12 @@ def _front_words(
     return spoken
 
 
-def _limits(axes: Axes, target_m: float | None, cost_limit: float | None, currency: str) -> None:
-    if target_m:
-        axes.axhline(target_m, color=WARN, linewidth=1.6,
-                     label=f"target {numbers.length(target_m, 4)}")  # fmt: skip
+def _limits(
+    axes: Axes, limit: numbers.Limited | None, cost_limit: float | None, currency: str
+) -> None:
+    if limit is not None:
+        axes.axhline(limit.limit, color=WARN, linewidth=1.6,
+                     label=f"limit {numbers.limit(limit)}")  # fmt: skip
     if cost_limit:
         axes.axvline(cost_limit, color=WARN, linewidth=1.6, linestyle=(0, (5, 3)),
                      label=f"limit {numbers.money(cost_limit, currency)}")  # fmt: skip

@@ -60,8 +60,8 @@ def length(value: Any, digits: int = 4) -> str:
     return _shown(value, Dimension.LENGTH, digits)
 
 
-def target(value_m: float) -> str:
-    """A length rounded up to four figures: a target that the printed price does buy."""
+def rounded_up(value_m: float) -> str:
+    """A length rounded up to four figures: an accuracy that the printed price does buy."""
     if not value_m > 0.0 or not math.isfinite(value_m):
         return length(value_m)
     scale = Fraction(10) ** (3 - math.floor(math.log10(value_m)))
@@ -165,6 +165,11 @@ def held(value: Any, row: Limited, digits: int = 4) -> str:
     if written is None or amount is None:
         return in_unit(value, row.unit, digits)
     return typeset(beside(written, amount, row.unit, digits))
+
+
+def error(value: Any, limit: Limited | None, digits: int = 4) -> str:
+    """An error [m] in the unit of the limit that it is held against, where there is one."""
+    return length(value, digits) if limit is None else held(value, limit, digits)
 
 
 _DIMENSIONS: Final = {

@@ -31,7 +31,7 @@ from syncline_design.report.on_alternatives import (
     ways_cell,
 )
 from syncline_design.report.on_infeasibility import infeasibility_nodes
-from syncline_design.report.on_nearest import nearest_nodes
+from syncline_design.report.on_nearest import asked_limit, nearest_nodes
 from syncline_design.report.on_why_not import why_not_nodes
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.verdict_words import qualification, warning_nodes
@@ -60,7 +60,7 @@ def on_choice(found: Optimised) -> Document:
         sentences=tuple(_sentences(found)),
         facts=(),
         sections=(
-            *_why_not(result, currency),
+            *_why_not(found, currency),
             *section("designs", "Best designs", show(designs, silent=True)),
             *why_not_section(result, currency),
             *section("alternatives", "If a sensor cannot be had", show(without, silent=True)),
@@ -135,12 +135,16 @@ def incomplete_lines(result: Optimisation) -> list[str]:
     return lines
 
 
-def _why_not(result: Optimisation, currency: str) -> list[Section]:
+def _why_not(found: Optimised, currency: str) -> list[Section]:
+    result, case = found.result, found.case
     if result.infeasibility is None:
         return []
+    limits = asked_limit(case, "accuracy"), asked_limit(case, "cost")
+    price = None if limits[1] is None else limits[1].limit
     nodes = [
-        *infeasibility_nodes(result.infeasibility), *nearest_nodes(result.nearest, currency)
-    ]  # fmt: skip
+        *infeasibility_nodes(result.infeasibility),
+        *nearest_nodes(result.nearest, currency, limits[0], price),
+    ]
     return section("infeasibility", "Why no design meets the requirements", nodes)
 
 
@@ -336,14 +340,14 @@ def staircase_table(
     rows = []
     for step in steps:
         loose = step.looser_than_m
-        upto = "and looser" if loose is None else f"to below {numbers.target(loose)}"
+        upto = "and looser" if loose is None else f"to below {numbers.rounded_up(loose)}"
         more = Cell("") if step.extra is None else amount_cell(step.extra, resource, currency)
         rows.append([
-            Cell(f"{numbers.target(step.tightest_m)} {upto}", step.tightest_m),
+            Cell(f"{numbers.rounded_up(step.tightest_m)} {upto}", step.tightest_m),
             amount_cell(step.cost, resource, currency), more,
         ])  # fmt: skip
-    target = "Accuracy target #" if figure is None else f"Limit of {figure} #"
-    heads = (target, f"{resource.capitalize()} #", "More than the step before #")
+    limits = "Accuracy limit #" if figure is None else f"Limit of {figure} #"
+    heads = (limits, f"{resource.capitalize()} #", "More than the step before #")
     return table("What accuracy costs" if figure is None else "What it costs", heads, rows)
 
 

@@ -2,19 +2,40 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from syncline_design.report import numbers
 from syncline_design.report.document import Chart, Heading, Node, Text
 from syncline_design.report.words import KINDS
 from syncline_design.verdict.named import MissedLimit, Nearest
+from syncline_design.verdict.tree import UNITS
 
 if TYPE_CHECKING:
     from syncline_design.report.svg import InlineFigure
+    from syncline_design.spec.case import Case
+
+
+class AskedLimit(NamedTuple):
+    """A limit of a spec, as a verdict would hold it."""
+
+    limit: float
+    unit: str
+    limit_written: str | None
+
+
+def asked_limit(case: Case, kind: str) -> AskedLimit | None:
+    """The tightest limit of a kind that a spec asks for."""
+    asked = (one for one in case.spec.requirements if one.kind == kind)
+    unit = UNITS.get(kind, case.spec.currency)
+    limits = (AskedLimit(float(case.limit(one)), unit, one.limit_written) for one in asked)
+    return min(limits, key=lambda one: one.limit, default=None)
 
 
 def nearest_nodes(
-    found: Nearest | None, currency: str, target_m: float | None = None, price: float | None = None
+    found: Nearest | None,
+    currency: str,
+    limit: numbers.Limited | None = None,
+    price: float | None = None,
 ) -> list[Node]:
     """What it is, what it misses and by how much; drawn with the limits of accuracy and cost."""
     if found is None:
@@ -24,10 +45,10 @@ def nearest_nodes(
         for stage, role, one in found.design.roles
     )
     cost = "a price that is not told" if found.cost is None else numbers.money(found.cost, currency)
-    error = numbers.length(found.error_m)
+    error = numbers.error(found.error_m, limit)
     missed = " and ".join(_missed(one) for one in found.misses)
     text = f"{sensors}. It costs {cost} and errs by {error}; it misses {missed}."
-    return [Heading("The nearest design"), Text(text), *_chart(found, currency, target_m, price)]
+    return [Heading("The nearest design"), Text(text), *_chart(found, currency, limit, price)]
 
 
 def _missed(one: MissedLimit) -> str:
@@ -36,7 +57,7 @@ def _missed(one: MissedLimit) -> str:
 
 
 def _chart(
-    found: Nearest, currency: str, target_m: float | None, price: float | None
+    found: Nearest, currency: str, limit: numbers.Limited | None, price: float | None
 ) -> list[Node]:
     points = [point for point in found.front if point.error_m]
     if found.cost is None or not points:
@@ -47,7 +68,7 @@ def _chart(
         from syncline_design.report.figures_results import FrontMark, pareto_front
 
         drawn = [FrontMark(point.cost, point.error_m, False) for point in points]
-        return pareto_front(drawn, currency, target_m, price, beside=at)
+        return pareto_front(drawn, currency, limit, price, beside=at)
 
     caption = (
         "Every design on the line is the cheapest with that error of those that keep every other "

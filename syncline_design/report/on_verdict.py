@@ -143,24 +143,23 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     if design is not None and design.cost is not None:
         currency = verdict_tables.currency_of(verdict)
         facts.append(("Price", numbers.money(design.cost, currency)))
-    target = verdict_figures.tightest_limit(verdict, "accuracy")
+    limit = verdict_figures.tightest_limit(verdict, "accuracy")
     if verdict.syncline is not None:
-        error = verdict.syncline.total_m
-        if target is not None:
-            shown = f"{numbers.held(error, target)} of {numbers.limit(target)}"
-        facts.append(("Syncline error", numbers.length(error) if target is None else shown))
+        error = numbers.error(verdict.syncline.total_m, limit)
+        asked = "" if limit is None else f" of {numbers.limit(limit)}"
+        facts.append(("Syncline error", error + asked))
     figures = verdict.figures
     if figures is not None and figures.quantile95_3d_m is not None:
-        facts.append(("95 % of errors within", numbers.length(figures.quantile95_3d_m)))
+        facts.append(("95 % of errors within", numbers.error(figures.quantile95_3d_m, limit)))
     if figures is not None and figures.worst_case_m is not None:
         at = f"Worst case at {figures.worst_case_k:g} \u03c3"
-        facts.append((at, numbers.length(figures.worst_case_m)))
+        facts.append((at, numbers.error(figures.worst_case_m, limit)))
     row = verdict_words.tightest(verdict.requirements)
     if row is not None:
         facts.append(("Tightest margin", f"{row.id}: {verdict_words.margin_text(row)}"))
     within = verdict.monte_carlo and verdict.monte_carlo.probability_within_target
     if within:
-        facts.append(("Simulated within target", numbers.percent(within.value, 4)))
+        facts.append(("Simulated within limit", numbers.percent(within.value, 4)))
     if design is not None and design.mass is not None:
         facts.append(("Mass", numbers.mass(design.mass)))
     if design is not None and design.power is not None:
@@ -182,7 +181,10 @@ def _why_not(verdict: Verdict) -> list[Node]:
     why = verdict.infeasibility
     if why is None:
         return []
-    limits = (verdict_figures.lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
+    limits = (
+        verdict_figures.tightest_limit(verdict, "accuracy"),
+        verdict_figures.lowest_limit(verdict, "cost"),
+    )
     currency = verdict_tables.currency_of(verdict)
     return [*infeasibility_nodes(why), *nearest_nodes(verdict.nearest, currency, *limits)]
 
@@ -250,9 +252,8 @@ def _simulation(verdict: Verdict) -> list[Node]:
     if monte_carlo is None:
         return []
     told = (certificate(monte_carlo), ensemble(monte_carlo), BEYOND)
-    target = verdict_figures.tightest_limit(verdict, "accuracy")
     return [
-        Facts(tuple(simulation_facts(monte_carlo, target))),
+        Facts(tuple(simulation_facts(monte_carlo))),
         *(Text(text, quiet=True) for text in told),
         *show(quantiles(monte_carlo)),
     ]

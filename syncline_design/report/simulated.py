@@ -19,13 +19,8 @@ BEYOND: Final = (
 )
 
 
-def simulation_facts(
-    found: MonteCarlo, asked: numbers.Limited | None = None
-) -> list[tuple[str, str]]:
-    """Samples, envelope, probability and worst case of a Monte Carlo part.
-
-    asked: the requirement whose limit is the target.
-    """
+def simulation_facts(found: MonteCarlo) -> list[tuple[str, str]]:
+    """Samples, envelope, probability and worst case of a Monte Carlo part."""
     facts = [
         ("Samples", numbers.count(found.samples)),
         ("Motion", ENVELOPES[found.envelope]),
@@ -37,15 +32,13 @@ def simulation_facts(
     within, worst = found.probability_within_target, found.worst_case
     if within is not None:
         low, high = (numbers.percent(end, 5) for end in (within.low, within.high))
-        is_its = asked is not None and asked.limit == within.target_m
-        target = numbers.limit(asked) if asked and is_its else numbers.length(within.target_m)
-        label = f"Within the target of {target}"
+        label = f"Within the limit of {numbers.limit(within)}"
         facts.append((label, f"{numbers.percent(within.value, 5)} (95 %: {low} to {high})"))
     ratio = numbers.percent(worst.ratio_to_syncline)
     return [
         *facts,
-        ("Worst case found", f"{numbers.length(worst.value_m)}, {ratio} of the Syncline"),
-        ("Upper bound", numbers.length(worst.bound_m)),
+        ("Worst case found", f"{numbers.error(worst.value_m, within)}, {ratio} of the Syncline"),
+        ("Upper bound", numbers.error(worst.bound_m, within)),
     ]
 
 
@@ -65,11 +58,12 @@ def _sentence(text: str) -> str:
 
 def quantiles(found: MonteCarlo) -> Table:
     """Quantiles of the simulated error with their confidence intervals."""
+    within = found.probability_within_target
     rows = [
         (
             Cell(numbers.percent(float(key), 4), float(key)),
-            Cell(numbers.length(entry.value_m), numbers.finite(entry.value_m)),
-            _interval(entry),
+            Cell(numbers.error(entry.value_m, within), numbers.finite(entry.value_m)),
+            _interval(entry, within),
         )
         for key, entry in found.quantiles.items()
     ]
@@ -78,10 +72,10 @@ def quantiles(found: MonteCarlo) -> Table:
     return table("Quantiles of the simulated error", heads, rows)
 
 
-def _interval(entry: QuantileEstimate) -> str:
+def _interval(entry: QuantileEstimate, limit: numbers.Limited | None) -> str:
     """Both ends; of an interval from few samples the upper one may be unknown."""
-    low, high = numbers.length(entry.low_m), numbers.finite(entry.high_m)
-    return f"{low} or more" if high is None else f"{low} to {numbers.length(high)}"
+    low, high = numbers.error(entry.low_m, limit), numbers.finite(entry.high_m)
+    return f"{low} or more" if high is None else f"{low} to {numbers.error(high, limit)}"
 
 
 def span(first: str, last: str) -> str:
@@ -92,7 +86,6 @@ def span(first: str, last: str) -> str:
 def histogram_chart(found: MonteCarlo, syncline_m: float | None) -> list[Node]:
     """The distribution of the simulated error."""
     bins, within = found.histogram, found.probability_within_target
-    target = None if within is None else within.target_m
     marks = tuple(
         (numbers.percent(float(key), 4), entry.value_m)
         for key, entry in found.quantiles.items()
@@ -102,10 +95,10 @@ def histogram_chart(found: MonteCarlo, syncline_m: float | None) -> list[Node]:
     def draw() -> InlineFigure:
         from syncline_design.report.figures_results import DensityBars, error_histogram
 
-        return error_histogram(DensityBars(bins.edges_m, bins.density, marks, target, syncline_m))
+        return error_histogram(DensityBars(bins.edges_m, bins.density, marks, within, syncline_m))
 
     caption = (
-        "Density of the error of the simulated samples, with quantiles, target and Syncline where "
+        "Density of the error of the simulated samples, with quantiles, limit and Syncline where "
         "known."
     )
     return [Chart("histogram", draw, caption)]

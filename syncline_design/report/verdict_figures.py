@@ -6,8 +6,9 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from syncline_design.report import choice_tables, verdict_tables, verdict_words
-from syncline_design.report.document import Chart, Explorer, Node
+from syncline_design.model.quantity import Dimension, parse_quantity
+from syncline_design.report import choice_tables, numbers, verdict_tables, verdict_words
+from syncline_design.report.document import Chart, ExploredLimit, Explorer, Node
 from syncline_design.report.text import shortened
 from syncline_design.report.words import PRIMITIVES
 
@@ -47,7 +48,7 @@ def syncline_chart(verdict: Verdict) -> list[Node]:
                 tau_crit_s=syncline.tau_crit_s,
                 tau_s=syncline.tau_s,
                 total_m=syncline.total_m,
-                target_m=lowest_limit(verdict, "accuracy"),
+                limit=tightest_limit(verdict, "accuracy"),
                 lever_arm_rate_mps=syncline.lever_arm.sync_rate_mps,
             )
         )
@@ -71,10 +72,10 @@ def explorer(verdict: Verdict) -> list[Node]:
     if syncline is None or not syncline.sensor_error_m or not syncline.tau_s:
         return []
     floor, tau, total = _floor_m(syncline), syncline.tau_s, syncline.total_m
-    crit, target = syncline.tau_crit_s, lowest_limit(verdict, "accuracy")
+    crit, limit = syncline.tau_crit_s, tightest_limit(verdict, "accuracy")
     simulated = ("accuracy", "sync", "monte_carlo")
     fixed = [row for row in verdict.requirements if row.kind not in simulated]
-    centre, middle = crit or tau, target or total
+    centre, middle = crit or tau, total if limit is None else limit.limit
     return [
         Explorer(
             chart="syncline",
@@ -82,13 +83,21 @@ def explorer(verdict: Verdict) -> list[Node]:
             rate_mps=(total - floor) / tau,
             tau_s=tau,
             tau_crit_s=crit,
-            target_m=target,
+            limit=None if limit is None else explored(limit),
             sync_limit=lowest_limit(verdict, "sync") or 1.0,
             others_pass=all(verdict_words.status_of(r).word in ("pass", "waived") for r in fixed),
             tau_span=(min(centre / 1e3, tau / 2), max(centre * 1e2, tau * 2)),
-            target_span=(min(middle, floor) / 4, max(middle, total) * 10),
+            limit_span=(min(middle, floor) / 4, max(middle, total) * 10),
         )
     ]
+
+
+def explored(limit: RequirementResult) -> ExploredLimit:
+    """A limit as the page's script moves it: in the unit that it is shown in."""
+    shown = numbers.limit(limit)
+    unit = shown.split()[1]
+    size_m = float(parse_quantity(f"1 {unit}", Dimension.LENGTH))
+    return ExploredLimit(limit.limit, shown, unit, size_m)
 
 
 def timing_chart(verdict: Verdict) -> list[Node]:
@@ -160,7 +169,7 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
             label = stage + shortened(verdict_words.term_text(entry))
             terms.append(figures.LedgerBar(label, entry.value_m, entry.kind))
         total = math.fsum(entry.value_m for entry in entries)
-        return figures.ledger(terms, lowest_limit(verdict, "accuracy"), total_m=total)
+        return figures.ledger(terms, tightest_limit(verdict, "accuracy"), total_m=total)
 
     caption = (
         "Terms add up to the total. Plain: sensor noise. Hatched: synchronisation. Crossed: known "
@@ -196,7 +205,7 @@ def choice_chart(verdict: Verdict) -> list[Node]:
     def draw() -> InlineFigure:
         from syncline_design.report.figures_results import FrontMark, pareto_front
 
-        target, price = (lowest_limit(verdict, kind) for kind in ("accuracy", "cost"))
+        limit, price = tightest_limit(verdict, "accuracy"), lowest_limit(verdict, "cost")
         drawn = [FrontMark(*point) for point in sorted(points, key=lambda point: point[0])]
         around = [
             FrontMark(one.cost, one.error_m, False, one.payload, bool(one.breaks))
@@ -204,7 +213,7 @@ def choice_chart(verdict: Verdict) -> list[Node]:
             if one.error_m
         ]
         currency = verdict_tables.currency_of(verdict)
-        return pareto_front(drawn, currency, target, price, cloud=around)
+        return pareto_front(drawn, currency, limit, price, cloud=around)
 
     caption = (
         "Every design on the line is the cheapest with that error; nothing exists below and left "

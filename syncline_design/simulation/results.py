@@ -33,12 +33,26 @@ class QuantileEstimate(Record):
 
 @dataclass(frozen=True, slots=True)
 class ProportionEstimate(Record):
-    """P(|error| <= target_m) with its confidence interval."""
+    """P(|error| <= target_m) with its confidence interval.
+
+    limit_written: the limit as the spec has it, `0.30 m`.
+    """
 
     target_m: float
     value: float
     low: float
     high: float
+    limit_written: str | None = optional()
+
+    @property
+    def limit(self) -> float:
+        """The limit that it is held against [m]."""
+        return self.target_m
+
+    @property
+    def unit(self) -> str:
+        """Of the limit."""
+        return "m"
 
 
 @dataclass(frozen=True, slots=True)

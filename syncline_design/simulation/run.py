@@ -135,7 +135,8 @@ def _monte_carlo(
     if settings.limit_m is not None:
         count = found.within(settings.limit_m)
         low, high = proportion_interval(count, found.count, settings.confidence)
-        within = ProportionEstimate(settings.limit_m, count / found.count, low, high)
+        share = count / found.count
+        within = ProportionEstimate(settings.limit_m, share, low, high, settings.limit_written)
     return MonteCarlo(
         samples=settings.samples,
         seed=settings.seed,

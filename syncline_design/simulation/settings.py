@@ -25,7 +25,8 @@ class SimulationSettings:
     samples: Monte Carlo draws.  seed: of the one
     SeedSequence behind every stream.  envelope: `limits` (|v| = v_max, |w| = omega_max, free
     directions), `inside` (|v|, |w| uniform below), `trajectory` (from `trajectory`: a manoeuvre's
-    name or a CSV file).  quantiles: of |error|.  limit_m: target of P(|error| <= target).
+    name or a CSV file).  quantiles: of |error|.  limit_m: the limit
+    of P(|error| <= limit), as a spec has it in `limit_written`.
     confidence: of every interval.  workers: processes for long runs, None for all cores; the
     result does not depend on it.  tau_grid_s: for the worst case against the Syncline.
     """
@@ -35,6 +36,7 @@ class SimulationSettings:
     envelope: Envelope = "limits"
     quantiles: tuple[float, ...] = DEFAULT_QUANTILES
     limit_m: float | None = None
+    limit_written: str | None = None
     workers: int | None = None
     trajectory: str | Path | FileContent | None = None
     tau_grid_s: tuple[float, ...] | None = None

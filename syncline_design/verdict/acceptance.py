@@ -49,10 +49,11 @@ MOST_SIMULATED = 1000  # different systems simulated for one command before it g
 
 
 def simulation_settings(case: Case, seed: int) -> SimulationSettings:
-    """How a spec wants to be simulated; the target is its tightest accuracy (or other) limit."""
+    """How a spec wants to be simulated; held against its tightest accuracy (or other) limit."""
     choice = case.spec.monte_carlo
-    limits = [float(r.limit) for r in case.spec.requirements if r.kind == "accuracy"]
-    limits = limits or [float(r.limit) for r in case.spec.requirements if r.kind == "monte_carlo"]
+    asked = [r for r in case.spec.requirements if r.kind == "accuracy"]
+    asked = asked or [r for r in case.spec.requirements if r.kind == "monte_carlo"]
+    limit = min(asked, key=lambda r: float(r.limit), default=None)
     trajectory: str | FileContent | None = case.trajectory
     if trajectory is None and choice.trajectory is not None:
         trajectory = choice.trajectory.manoeuvre
@@ -60,7 +61,8 @@ def simulation_settings(case: Case, seed: int) -> SimulationSettings:
         samples=choice.samples,
         seed=seed,
         envelope=choice.envelope,
-        limit_m=min(limits) if limits else None,
+        limit_m=None if limit is None else float(limit.limit),
+        limit_written=None if limit is None else limit.limit_written,
         trajectory=trajectory,
     )
 
@@ -103,7 +105,7 @@ class Simulations:
 
         what_if: the system or the limit is not one of the spec itself; what is close stays open.
         """
-        settings = replace(simulation_settings(case, self.seed), limit_m=None)
+        settings = replace(simulation_settings(case, self.seed), limit_m=None, limit_written=None)
         nameless = _nameless(system)
         key = (nameless, settings, quantile, limit_m)
         if key in self.known:
