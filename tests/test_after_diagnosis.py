@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 from diagnosis_samples import diagnosis
 from syncline_design.cli.app import app
 from syncline_design.comparison.meaning import DesignMeaning, meaning
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 from syncline_design.report import numbers
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.render_console import console

@@ -24,7 +24,7 @@ from syncline_design.diagnosis.result import Rival
 from syncline_design.diagnosis.scene import scene
 from syncline_design.diagnosis.system import measured
 from syncline_design.effects import registry
-from syncline_design.model.quantity import format_estimate
+from syncline_design.model.figure_text import format_estimate
 from syncline_design.report.on_diagnosis import on_diagnosis
 from syncline_design.report.render_console import console
 from syncline_design.report.render_markdown import markdown

@@ -29,7 +29,7 @@ from syncline_design.diagnosis.trajectory import pieces
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import gauss_markov
 from syncline_design.effects.record import Target
-from syncline_design.model.quantity import format_estimate
+from syncline_design.model.figure_text import format_estimate
 
 Array = NDArray[np.float64]
 

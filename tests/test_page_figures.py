@@ -100,7 +100,7 @@ def test_a_datasheet_figure_reads_as_it_was_written() -> None:
     ],
 )
 def test_a_figure_in_the_unit_of_another(written: str, value_si: float, shown: str) -> None:
-    from syncline_design.model.quantity import format_like
+    from syncline_design.model.figure_text import format_like
 
     assert format_like(written, value_si) == shown
 

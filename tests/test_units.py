@@ -16,6 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from syncline_design.model.figure_text import format_quantity
 from syncline_design.model.quantity import (
     CURRENCIES,
     EXAMPLES,
@@ -24,7 +25,6 @@ from syncline_design.model.quantity import (
     Dimension,
     Quantity,
     UnitError,
-    format_quantity,
     parse_number,
     parse_quantity,
     si_name,

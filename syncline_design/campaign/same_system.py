@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any, Final
 
 from syncline_design.machine.records import Json
-from syncline_design.model.quantity import Dimension, format_quantity, split_suffix, suffix_unit
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension, split_suffix, suffix_unit
 from syncline_design.model.roles import ROLES
 from syncline_design.model.system import UTC, System
 

@@ -15,7 +15,8 @@ from syncline_design.choice.parts import SIMULATED, Part, is_feasible, least, pa
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build, with_methods
 from syncline_design.choice.written import in_unit_of, money, plain
-from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.case import Case, usable_primitives
 from syncline_design.spec.requirement import JUDGED_KINDS, LIMIT_DIMENSIONS, Requirement
 

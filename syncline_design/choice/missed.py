@@ -11,7 +11,8 @@ from syncline_design.choice.outcome import NoVerdict
 from syncline_design.choice.parts import FIELDS, SIMULATED, Part, least, parts_of
 from syncline_design.choice.table import Problem
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.written import DIMENSIONS, beside
 from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import LIMIT_DIMENSIONS

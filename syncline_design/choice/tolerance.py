@@ -39,7 +39,7 @@ from syncline_design.choice.what_if import (
 )
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
-from syncline_design.model.quantity import format_like
+from syncline_design.model.figure_text import format_like
 from syncline_design.spec.case import Case
 from syncline_design.spec.selection import RoleSelection
 

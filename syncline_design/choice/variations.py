@@ -10,7 +10,8 @@ from typing import Any, Literal
 from syncline_design.choice.table import Problem
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.roles import RoleName
 from syncline_design.spec.case import IN_PLACE, Case, ends_of
 from syncline_design.spec.catalog import SensorEntry

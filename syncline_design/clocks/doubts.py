@@ -11,7 +11,7 @@ import numpy as np
 from syncline_design.clocks.series import Series
 from syncline_design.clocks.sessions import ClockSession, is_leap, went_back
 from syncline_design.clocks.times import moment, shown
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 
 TAI_MINUS_UTC_S: Final = 37.0  # since 2017
 WHOLE_STEP_S: Final = 0.5

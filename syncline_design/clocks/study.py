@@ -39,7 +39,7 @@ from syncline_design.clocks.tolerance import (
 )
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 
 MOST_EVENTS: Final = 1000
 MOST_BINS: Final = 1500

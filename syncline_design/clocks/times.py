@@ -5,7 +5,8 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 from syncline_design.clocks.series import Stamps
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension
 
 
 def moment(time_s: float, stamps: Stamps) -> str:

@@ -10,7 +10,7 @@ from syncline_design.comparison.acceptance import MeasuredFigure, Status
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 from syncline_design.spec.case import Case
 from syncline_design.verdict.measured import COMMONLY, coverage_of, coverage_words
 

@@ -19,7 +19,7 @@ from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 
 # what undoes a departure, so that neither the log nor the objects' places show both together
 _ALONE: Final = {

@@ -10,7 +10,7 @@ from syncline_design.auditing.result import Audit, StampFault, StreamAudit
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 
 # faults of the recorder and of the way to it, not of the stamps
 _ON_THE_WAY: Final = ("recorder_clock", "batched_by_recorder", "lost_messages", "gap", "duplicates")

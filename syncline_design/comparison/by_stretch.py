@@ -15,7 +15,7 @@ from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 
 SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show
 TOLD_S: Final = 1.0  # a short stretch whose size is told beside

@@ -13,7 +13,8 @@ from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
-from syncline_design.model.quantity import Dimension, format_duration, format_quantity
+from syncline_design.model.figure_text import format_duration, format_quantity
+from syncline_design.model.quantity import Dimension
 from syncline_design.model.written import beside, limit_as_written
 from syncline_design.simulation.results import QuantileEstimate
 from syncline_design.spec.case import Case

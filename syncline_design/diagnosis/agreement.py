@@ -20,7 +20,7 @@ from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import format_estimate
+from syncline_design.model.figure_text import format_estimate
 
 LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 LEAST_STEPS = 4  # rows in a window

@@ -19,7 +19,7 @@ from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import LogTrack, StageLog
-from syncline_design.model.quantity import format_estimate
+from syncline_design.model.figure_text import format_estimate
 from syncline_design.model.system import Stage
 
 USUAL, RARE = 0.95, 0.99  # quantiles that decide on a contradiction and on a caution

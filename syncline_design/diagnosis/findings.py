@@ -32,8 +32,8 @@ from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
+from syncline_design.model.figure_text import format_estimate
 from syncline_design.model.known import EffectEntry
-from syncline_design.model.quantity import format_estimate
 
 Label = tuple[str, str, int]
 Rivals = tuple[tuple[Rival, ...], tuple[Rival, ...], tuple[Rival, ...]]

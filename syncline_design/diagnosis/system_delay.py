@@ -9,7 +9,7 @@ from dataclasses import replace
 from syncline_design.diagnosis.result import Estimate, Finding
 from syncline_design.effects import plain_delay
 from syncline_design.logs.log import Kind
-from syncline_design.model.quantity import format_estimate
+from syncline_design.model.figure_text import format_estimate
 
 SPREADS = 3.0  # standard deviations by which the two may differ
 LEAST_S = 1e-3  # and at least this much: stamps of two systems agree no better

@@ -27,7 +27,8 @@ from syncline_design.logs.runs import demand_one_run
 from syncline_design.logs.sources import NANOSECONDS, Clock, Mask, RowSource, opened
 from syncline_design.logs.surveys import Survey, has_places, is_survey, joined, survey_of
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import format_estimate, si_name, suffix_unit
+from syncline_design.model.figure_text import format_estimate
+from syncline_design.model.quantity import si_name, suffix_unit
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.load import BadInput
 

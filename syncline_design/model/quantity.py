@@ -7,15 +7,14 @@ The table is closed: what it does not list is refused, with the nearest entry as
 
 from __future__ import annotations
 
-import math
 import re
 from fractions import Fraction
 from typing import Any, NoReturn
 
 from syncline_design.model.unit_table import CURRENCIES as CURRENCIES
-from syncline_design.model.unit_table import DEG, LADDERS, SI_SUFFIX, SPELLINGS, SUFFIXES
 from syncline_design.model.unit_table import EXAMPLES as EXAMPLES
 from syncline_design.model.unit_table import PI as PI
+from syncline_design.model.unit_table import SI_SUFFIX, SPELLINGS, SUFFIXES
 from syncline_design.model.unit_table import UNITS as UNITS
 from syncline_design.model.unit_table import Dimension as Dimension
 
@@ -31,15 +30,6 @@ _EXPONENT = re.compile(r"[eE]([-+]?[0-9]+)$")
 _LEADING_ZERO = re.compile(r"[-+]?0[0-9]")
 _PLUS_MINUS = re.compile(r"\+/-|\u00b1")
 _TO = re.compile(r"\s\.\.\s")
-# units of an estimate and what one of each is in SI, largest first
-_ESTIMATE_LADDERS: dict[str, tuple[tuple[str, float], ...]] = {
-    "s": (("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)),
-    "m": (("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6)),
-    "rad": (("deg", math.pi / 180.0),),
-    "rad/s": (("deg/s", math.pi / 180.0), ("deg/h", math.pi / 648e3)),
-    "m/(m/s2)": (("m/(m/s2)", 1.0), ("mm/(m/s2)", 1e-3)),
-    "": (("", 1.0), ("ppm", 1e-6)),
-}
 
 
 class UnitError(ValueError):
@@ -300,94 +290,6 @@ def plain_number(value: Any) -> Quantity:
     if exact and not SMALLEST <= abs(exact) <= LARGEST:
         raise UnitError("a magnitude outside 1e-30 to 1e30", expected, _shorten(text))
     return Quantity(exact, text)
-
-
-def format_quantity(
-    si_value: float, dimension: Dimension, digits: int = 4, currency: str = "EUR"
-) -> str:
-    """`2.5 ms` for 0.0025 s: the largest unit that leaves a figure of 1 or more, `digits` figures.
-
-    The figure is rounded before the unit is picked, so 999.96 us reads 1 ms.  Money keeps two
-    decimals at most and groups thousands by a space; infinity reads `unlimited`.
-    """
-    if math.isnan(si_value):
-        return "not a number"
-    if math.isinf(si_value):
-        return "unlimited" if si_value > 0 else "-unlimited"
-    if dimension is Dimension.MONEY:
-        return f"{si_value:,.2f}".removesuffix(".00").replace(",", " ") + f" {currency}"
-    if dimension is Dimension.DIMENSIONLESS:
-        return _figure(si_value, digits)
-    ladder = LADDERS[dimension]
-    chosen = ladder[-1] if si_value == 0.0 else ladder[0]
-    for unit in ladder:
-        scaled = abs(si_value) / float(UNITS[unit][1])
-        if float(f"{scaled:.{digits - 1}e}") >= 1.0:
-            chosen = unit
-    if si_value == 0.0:
-        chosen = next(u for u in reversed(ladder) if UNITS[u][1] in (1, DEG, Fraction(1, 10**6)))
-    return f"{_figure(si_value / float(UNITS[chosen][1]), digits)} {chosen}"
-
-
-def format_like(written: str, si_value: float, digits: int = 4) -> str:
-    """A figure in the unit in which another one was written: `0.04 deg` beside `0.05 deg +/- 20 %`.
-
-    Text without a known unit gives the bare figure.
-    """
-    unit = next((part for part in written.split() if part in UNITS and part != "%"), None)
-    if unit is None:
-        return _figure(si_value, digits)
-    return f"{_figure(si_value / float(UNITS[unit][1]), digits)} {unit}"
-
-
-def format_duration(duration_s: float) -> str:
-    """`1.5 h`, `100 s`, `100 min`: the first of h, min and s that gives a short multiple of a half.
-
-    Else in the largest of them that is reached, to four figures; below a second as other times.
-    """
-    units = [one for one in (("h", 3600.0), ("min", 60.0), ("s", 1.0)) if duration_s >= one[1]]
-    for unit, size in units:
-        if (duration_s / size) % 0.5 == 0.0 and duration_s < 1e4 * size:
-            return f"{duration_s / size:g} {unit}"
-    if not units:
-        return format_quantity(duration_s, Dimension.TIME)
-    unit, size = units[0]
-    return f"{_figure(duration_s / size, 4)} {unit}"
-
-
-def format_estimate(value: float, uncertainty: float | None = None, unit: str = "") -> str:
-    """`87.1 ± 0.3 ms`: the uncertainty to one or two figures (GUM 7.2.6), the value to the same
-    place, both in the unit that reads best.
-    """
-    name, scale = _rung(abs(value), unit)
-    shown = value / scale
-    if uncertainty is None or not uncertainty > 0.0 or not math.isfinite(uncertainty):
-        return f"{shown:.4g} {name}".strip()
-    spread = uncertainty / scale
-    mantissa, exponent = f"{spread:.1e}".split("e")
-    digits = 1 if float(mantissa) < 3.0 else 0  # two figures of 1.0 to 2.9, else one
-    places = max(0, digits - int(exponent))
-    return f"{shown:.{places}f} ± {spread:.{places}f} {name}".strip()
-
-
-def _rung(size: float, unit: str) -> tuple[str, float]:
-    ladder = _ESTIMATE_LADDERS.get(unit, ((unit, 1.0),))
-    for name, scale in ladder:
-        if size >= scale:
-            return name, scale
-    return ladder[-1] if size > 0.0 else ladder[0]
-
-
-def _figure(value: float, digits: int) -> str:
-    """`digits` significant figures without exponent where that stays readable, zeros trimmed."""
-    rounded = float(f"{value:.{digits - 1}e}")
-    if rounded == 0.0:
-        return "0"
-    power = math.floor(math.log10(abs(rounded)))
-    if not -4 <= power < 9:
-        return f"{rounded:.{digits - 1}e}"
-    text = f"{rounded:.{max(0, digits - 1 - power)}f}"
-    return text.rstrip("0").rstrip(".") if "." in text else text
 
 
 def split_suffix(name: str) -> tuple[str, str]:

@@ -5,13 +5,8 @@ from __future__ import annotations
 
 from typing import Final
 
-from syncline_design.model.quantity import (
-    Dimension,
-    UnitError,
-    format_like,
-    format_quantity,
-    parse_quantity,
-)
+from syncline_design.model.figure_text import format_like, format_quantity
+from syncline_design.model.quantity import Dimension, UnitError, parse_quantity
 
 DIMENSIONS: Final = {"m": Dimension.LENGTH, "kg": Dimension.MASS, "W": Dimension.POWER}
 _LEAST, _MOST = 1e-3, 1e6  # of the written unit: beyond them the ladder reads better

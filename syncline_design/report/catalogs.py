@@ -9,13 +9,8 @@ from typing import Annotated, Any, Final
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.conversion import conversion_of
-from syncline_design.model.quantity import (
-    Dimension,
-    Quantity,
-    UnitError,
-    format_like,
-    format_quantity,
-)
+from syncline_design.model.figure_text import format_like, format_quantity
+from syncline_design.model.quantity import Dimension, Quantity, UnitError
 from syncline_design.report.render_console import aligned
 from syncline_design.report.text import visible
 from syncline_design.spec.catalog import SECTIONS as SECTIONS

@@ -6,12 +6,8 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from syncline_design.model.quantity import (
-    Dimension,
-    format_duration,
-    format_estimate,
-    format_quantity,
-)
+from syncline_design.model.figure_text import format_duration, format_estimate, format_quantity
+from syncline_design.model.quantity import Dimension
 from syncline_design.model.written import beside, limit_as_written
 
 if TYPE_CHECKING:

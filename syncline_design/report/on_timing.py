@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Final
 
 from syncline_design.clocks.result import Timing
 from syncline_design.comparison.clock_meaning import TimingAndSpec, TimingMeaning
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,

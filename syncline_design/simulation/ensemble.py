@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from syncline_design.effects.acting import acting_of, implied, listed, tilts
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 from syncline_design.model.system import System
 from syncline_design.simulation.draws import entering
 from syncline_design.simulation.results import Ensemble

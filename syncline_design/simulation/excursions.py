@@ -9,7 +9,7 @@ import numpy as np
 from syncline_design.effects.acting import by_stage
 from syncline_design.effects.kinematics import bearing, rotate
 from syncline_design.effects.record import Array
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation.settings import SimulationSettings
 from syncline_design.simulation.track import Track

@@ -14,7 +14,8 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, Unbounded, optional
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension
 from syncline_design.simulation.distribution import Binned, Values
 from syncline_design.simulation.settings import Envelope
 

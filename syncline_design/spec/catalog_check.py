@@ -18,7 +18,8 @@ from typing import Annotated, Any, Final, Literal
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.conversion import conversion_of, printed_value
-from syncline_design.model.quantity import UnitError, format_like
+from syncline_design.model.figure_text import format_like
+from syncline_design.model.quantity import UnitError
 from syncline_design.spec.catalog import SECTIONS, Catalog, Entry, Product, SensorEntry
 from syncline_design.spec.facts import (
     AXES,

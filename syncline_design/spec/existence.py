@@ -12,7 +12,8 @@ from collections.abc import Iterator, Sequence
 from typing import Literal, get_args
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.catalog import Product, SensorEntry
 from syncline_design.spec.exact import fraction_of
 from syncline_design.spec.facts import FULL_TURN, FieldOfView, Medium

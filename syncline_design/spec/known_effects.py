@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from syncline_design.model.figure_text import format_estimate
 from syncline_design.model.known import EffectEntry
-from syncline_design.model.quantity import format_estimate
 from syncline_design.spec.fields import did_you_mean
 from syncline_design.spec.files import problem_at
 from syncline_design.spec.spec import EffectChoice, Spec

@@ -13,7 +13,8 @@ from statistics import median
 from typing import Final
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.roles import ROLES
 from syncline_design.spec.case import Candidate, Case, StageCase
 from syncline_design.spec.catalog import PlatformEntry, SensorEntry

@@ -11,7 +11,8 @@ from typing import Any, Final, Literal
 from pydantic import ValidationInfo, model_validator
 from pydantic import field_validator as reads_field
 
-from syncline_design.model.quantity import Dimension, Quantity, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.fields import (
     FileRecord,
     Text,

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from syncline_design.choice.outcome import Proof
 from syncline_design.effects import registry
 from syncline_design.model.budget import differs
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
 from syncline_design.model.written import beside, limit_as_written

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator
 from itertools import islice
 
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension
 from syncline_design.model.system import System
 from syncline_design.spec.barred import path_medium, surroundings
 from syncline_design.spec.case import Case, StageCase

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from syncline_design.machine.input_files import FileRead
-from syncline_design.model.quantity import format_duration
+from syncline_design.model.figure_text import format_duration
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry, TimestampError, TimestampingEntry
 from syncline_design.spec.exact import tau_bound
