@@ -10,6 +10,7 @@ from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import PointTimes
+from syncline_design.model.figure_text import signed, to_digits
 
 _TIGHT: Final = 0.2  # scatter of receipt minus stamp against that of the stamps' rhythm
 _LEAST_JITTER_S: Final = 5e-6
@@ -97,7 +98,8 @@ def scan(series: Series, points: PointTimes | None) -> StampFault | None:
     if declared == "start_of_scan" and _too_early(series, points):
         return StampFault(
             "end_of_scan", {**parameters, "kind": "contradicted"}, None, None,
-            f"points reach {points.last_s * 1e3:.4g} ms beyond the stamp, but messages come sooner "
+            f"points reach {to_digits(points.last_s * 1e3, 4)} ms beyond the stamp, but "
+            f"messages come sooner "
             "than that: the stamp is of the scan's end",
         )  # fmt: skip
     if declared is None:
@@ -106,8 +108,8 @@ def scan(series: Series, points: PointTimes | None) -> StampFault | None:
     name = "start_of_scan" if declared == "start_of_scan" else "end_of_scan"
     return StampFault(
         name, {**parameters, "kind": "declared"}, None, None,  # type: ignore[arg-type]
-        f"stamps are of the scan's {words}: points from {points.first_s * 1e3:+.4g} to "
-        f"{points.last_s * 1e3:+.4g} ms", counts=False,
+        f"stamps are of the scan's {words}: points from {signed(points.first_s * 1e3, 4)} to "
+        f"{signed(points.last_s * 1e3, 4)} ms", counts=False,
     )  # fmt: skip
 
 

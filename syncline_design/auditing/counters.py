@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, in_words, scatter
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 # ranges by name [ns]: bits of a unit, first what is most often met; parts of the calendar
 _UNITS: Final = (
@@ -113,7 +114,7 @@ def _fault(wrap: Range, count: int, first_s: float, last_s: float) -> StampFault
     name = f": {wrap.name}" if wrap.name else ""
     return StampFault(
         "counter_wrap", {"wrap_s": seconds, "count": float(count)}, first_s, last_s,
-        f"stamps fall by {seconds:.9g} s {said} while receipts go on{name}", (back,),
+        f"stamps fall by {to_digits(seconds, 9)} s {said} while receipts go on{name}", (back,),
     )  # fmt: skip
 
 

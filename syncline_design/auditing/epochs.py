@@ -11,6 +11,7 @@ import numpy as np
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, UNIX_S, Array, Series, in_words, seconds
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import rounded, signed, to_digits
 
 GPS_EPOCH_S: Final = 315_964_800.0  # 1980-01-06 since 1970
 LEAP_S: Final = 18.0  # GPS minus UTC since 2017
@@ -88,7 +89,7 @@ def in_one_unit(series: Series, known: float = 1.0) -> InSeconds:
     elif factor != 1.0:
         stamp[good] = np.round(stamp[good].astype(np.longdouble) / factor).astype(np.int64)
     whole = factor * known
-    runs = f"{(ratio or 1.0) * known:.7g}"
+    runs = to_digits((ratio or 1.0) * known, 7)
     fault = StampFault(
         "epoch_offset", {"kind": "unit", "factor": whole}, None, None,
         f"stamps run {runs} times as fast as receipts: {_unit_words(whole)}",
@@ -110,7 +111,7 @@ def _factor(series: Series, ratio: float) -> float:
     if min(rates) < _FASTEST and max(rates) > _SLOWEST:
         return 1.0
     near = [one for one in _FACTORS if abs(rates[-1] / one - 1.0) < _STEADY]
-    return near[0] if near else float(f"{rates[-1]:.5g}")
+    return near[0] if near else rounded(rates[-1], 5)
 
 
 def _unit_words(factor: float) -> str:
@@ -119,7 +120,7 @@ def _unit_words(factor: float) -> str:
         return "they count another unit than the one that was read"
     names = {-3: "seconds read as nanoseconds", -2: "milliseconds read as nanoseconds, or the like",
              -1: "a unit a thousand times too small was read"}  # fmt: skip
-    return names.get(round(power), f"a unit {factor:.0e} times too large was read".replace("+", ""))
+    return names.get(round(power), f"a unit {to_digits(factor, 1)} times too large was read")
 
 
 def _rate(series: Series) -> float | None:
@@ -243,9 +244,9 @@ def _zone(middle: float) -> tuple[float, str, str] | None:
     for extra in (0.0, TAI_S, LEAP_S, -TAI_S, -LEAP_S):
         quarters = round((middle - extra) / 900.0)
         if quarters and _fits(middle, quarters * 900.0 + extra, 2.0):
-            words = f"{quarters / 4:+g} h: local time against UTC"
+            words = f"{signed(quarters / 4)} h: local time against UTC"
             if extra:
-                words += f", and {extra:+g} leap seconds"
+                words += f", and {signed(extra)} leap seconds"
             return quarters * 900.0 + extra, "time_zone", words
     return None
 
@@ -291,4 +292,7 @@ def _local_day(stamp: np.ndarray, receive: np.ndarray) -> tuple[str, str] | None
     if not _fits(off, quarters * _QUARTER_S):
         return None
     hours = (quarters / 4 + 12.0) % 24.0 - 12.0
-    return "day_seconds", f"stamps are seconds of the day of a time zone, {hours:+g} h from UTC"
+    return (
+        "day_seconds",
+        f"stamps are seconds of the day of a time zone, {signed(hours)} h from UTC",
+    )

@@ -10,6 +10,7 @@ from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, spread
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 GRAINS: Final = (
     10**9, 5 * 10**8, 2 * 10**8, 10**8, 5 * 10**7, 2 * 10**7, 15_625_000, 10**7, 5 * 10**6,
@@ -170,7 +171,8 @@ def _grain(series: Series, pace: Cadence, grain: int) -> Grain:
     name = " (1/64 s, the tick of a system clock)" if grain == 15_625_000 else ""
     fault = StampFault(
         "truncated_stamps", {"resolution_s": size}, None, None,
-        f"every stamp is a multiple of {size * 1e3:.6g} ms{name}, though messages are not",
+        f"every stamp is a multiple of {to_digits(size * 1e3, 6)} ms{name}, though messages are "
+        f"not",
         (twice,) if same else (),
     )  # fmt: skip
     return Grain(fault, size, same > 0)
@@ -308,10 +310,10 @@ def _packets(
     twice = Consequence("duplicates", {"count": float(same)},
                         f"{same} messages share their packet's stamp")  # fmt: skip
     known = " (the latency timer of FTDI's serial chips)" if abs(grid - 0.016) < 1e-5 else ""
-    words = f"stamps are ticks of {grid * 1e3:.4g} ms{known}" if sure else (
-        f"stamps come in bunches, {grid * 1e3:.4g} ms apart in the median")  # fmt: skip
+    words = f"stamps are ticks of {to_digits(grid * 1e3, 4)} ms{known}" if sure else (
+        f"stamps come in bunches, {to_digits(grid * 1e3, 4)} ms apart in the median")  # fmt: skip
     if size > 1.05:
-        words += f", {size:.3g} messages to a packet"
+        words += f", {to_digits(size, 3)} messages to a packet"
     fault = StampFault("packetised", {"interval_s": grid}, None, None, words,
                        (twice,) if same else ())  # fmt: skip
     return Grain(fault, grid, same > 0)

@@ -18,6 +18,7 @@ from syncline_design.auditing.cadence import LONG_GAP, Cadence, at_another_rate
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Series, in_words, scatter, seconds, spread
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 _BESIDE: Final = 12  # messages on each side that tell a level
 _BESIDE_MORE: Final = (_BESIDE, 4 * _BESIDE, 16 * _BESIDE)
@@ -222,7 +223,7 @@ def _replays(jump: Jump, stamp: NDArray[np.int64]) -> bool:
 def _fault(jump: Jump, times: Array) -> StampFault:
     begin = float(times[jump.place])
     end = float(times[-1] if jump.end is None else times[jump.end])
-    lasts = "and stay so" if jump.end is None else f"until {end:.4g} s"
+    lasts = "and stay so" if jump.end is None else f"until {to_digits(end, 4)} s"
     sign = "+" if jump.size_s >= 0 else "-"
     return StampFault(
         "step", {"seconds": jump.size_s}, begin, end,

@@ -10,6 +10,7 @@ import numpy as np
 from syncline_design.auditing.levels import Shape, course
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, in_words
+from syncline_design.model.figure_text import signed, to_digits
 
 _SMALL: Final = 0.1  # of the largest stretch: rates that are hardly another
 _LEAST_S: Final = 2e-5
@@ -39,8 +40,9 @@ def _pieces(slow: tuple[Shape, ...], time_s: Array) -> Iterator[StampFault]:
         ppm = 1e6 * float(size) / float(end - begin)
         yield StampFault(
             "drift", {"ppm": ppm}, float(begin), float(end),
-            f"stamps run {abs(ppm):.4g} ppm {'fast' if ppm > 0 else 'slow'} against receipts from "
-            f"{begin:.4g} to {end:.4g} s: {in_words(abs(float(size)))}",
+            f"stamps run {to_digits(abs(ppm), 4)} ppm {'fast' if ppm > 0 else 'slow'} against "
+            f"receipts from "
+            f"{to_digits(begin, 4)} to {to_digits(end, 4)} s: {in_words(abs(float(size)))}",
         )  # fmt: skip
 
 
@@ -52,24 +54,26 @@ def _drift(slow: tuple[Shape, ...], time_s: Array) -> StampFault:
     ppm = 1e6 * float(moved[-1] - moved[0]) / length
     sure = max(abs(s.size_s) / max(s.sigma_s, 1e-12) for s in slow)
     parameters: dict[str, float | str] = {"ppm": ppm}
-    words = f"stamps run {abs(ppm):.4g} ppm {'fast' if ppm > 0 else 'slow'} against receipts"
+    words = (
+        f"stamps run {to_digits(abs(ppm), 4)} ppm {'fast' if ppm > 0 else 'slow'} against receipts"
+    )
     if len(slow) > 1 or slow[0].kind == "bend":
         rate = 1e6 * np.diff(moved) / np.diff(grid)
         parameters |= {"kind": "wandering", "ppm_low": float(rate.min()),
                        "ppm_high": float(rate.max())}  # fmt: skip
-        words += f" in the mean, between {rate.min():+.3g} and {rate.max():+.3g} ppm"
+        words += f" in the mean, between {signed(rate.min(), 3)} and {signed(rate.max(), 3)} ppm"
     span = in_words(float(np.ptp(moved)))
-    words += f": {span} over the log, {sure:.3g} times its uncertainty"
+    words += f": {span} over the log, {to_digits(sure, 3)} times its uncertainty"
     return StampFault("drift", parameters, None, None, words)
 
 
 def _named(shape: Shape, time_s: Array) -> StampFault:
     end = float(time_s[-1])
     size = -shape.size_s
-    sure = f"{abs(shape.size_s) / max(shape.sigma_s, 1e-12):.3g} times its uncertainty"
+    sure = f"{to_digits(abs(shape.size_s) / max(shape.sigma_s, 1e-12), 3)} times its uncertainty"
     if shape.kind in ("step", "episode"):
         stop = end if shape.kind == "step" else shape.end_s
-        lasts = "and stay so" if shape.kind == "step" else f"until {stop:.4g} s"
+        lasts = "and stay so" if shape.kind == "step" else f"until {to_digits(stop, 4)} s"
         return StampFault(
             "step", {"seconds": size}, shape.begin_s, stop,
             f"stamps move by {_signed(size)} against receipts {lasts}, {sure}",
@@ -78,7 +82,7 @@ def _named(shape: Shape, time_s: Array) -> StampFault:
     stop = min(end, shape.end_s + 5.0 * shape.settle_s)
     return StampFault(
         "relock", {"seconds": size, "settling_s": shape.settle_s}, shape.begin_s, stop,
-        f"stamps {away} again: {_signed(size)}, time constant {shape.settle_s:.3g} s",
+        f"stamps {away} again: {_signed(size)}, time constant {to_digits(shape.settle_s, 3)} s",
     )  # fmt: skip
 
 

@@ -13,6 +13,7 @@ from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Mask, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import UNSET
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 WEEK_NS: Final = 604_800 * 10**9
 BACK_NS: Final = 100_000  # no clock is set by less
@@ -261,7 +262,7 @@ def without_spikes(series: Series) -> Repaired:
     fault = StampFault(
         "backward_jump", {"count": float(count), "seconds": deepest / NS}, float(times[0]),
         float(times[-1]), f"{count} times a stamp lies before the one of the message before, by "
-        f"up to {-deepest / NS:.6g} s, and the next go on as if nothing were",
+        f"up to {to_digits(-deepest / NS, 6)} s, and the next go on as if nothing were",
     )  # fmt: skip
     return Repaired(replace(series, good=good), (fault,))
 
@@ -335,7 +336,7 @@ def remaining_falls(series: Series) -> StampFault | None:
     deepest = int(change[falls].min())
     begin, end = float(times[falls[0] + 1]), float(times[falls[-1] + 1])
     back = f"{falls.size} times a stamp lies before the one of the message before, by up to "
-    evidence = f"{back}{-deepest / NS:.6g} s"
+    evidence = f"{back}{to_digits(-deepest / NS, 6)} s"
     parameters: dict[str, float | str] = {"count": float(falls.size), "seconds": deepest / NS}
     weeks = round(-deepest / (1024 * WEEK_NS))
     if weeks and abs(-deepest - weeks * 1024 * WEEK_NS) < 3600 * NS:

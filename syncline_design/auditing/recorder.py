@@ -19,6 +19,7 @@ from syncline_design.auditing.series import NS, Array, in_words
 from syncline_design.auditing.stream import Examined, examined
 from syncline_design.logs.readers.stream import UNSET
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 _SHARE: Final = 0.6  # of the streams that could show a shape
 _ALIKE: Final = 0.25  # of a size
@@ -219,7 +220,8 @@ def _fault(shape: Shape, among: int, end_s: float) -> StampFault:
         ppm = 1e6 * size / length
         return StampFault(
             "recorder_clock", {"seconds": size, "ppm": ppm, "kind": "slew"}, shape.begin_s,
-            shape.end_s, f"{by}within {length:.3g} s ({abs(ppm):.4g} ppm), {keep}slewed",
+            shape.end_s, f"{by}within {to_digits(length, 3)} s ({to_digits(abs(ppm), 4)} ppm), "
+                         f"{keep}slewed",
         )  # fmt: skip
     kind = "step" if shape.kind in ("step", "episode") else "slew"
     stop = shape.end_s if shape.kind == "episode" else end_s

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits, to_places
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -60,9 +61,9 @@ def in_words(length_s: float) -> str:
     size = abs(length_s)
     for unit, factor in (("ns", 1e9), ("us", 1e6), ("ms", 1e3)):
         if size * factor < 999.95 and (size > 0.0 or unit == "ms"):
-            return f"{length_s * factor:.4g} {unit}"
+            return f"{to_digits(length_s * factor, 4)} {unit}"
     digits = 3 if size >= 10.0 else 4
-    return f"{length_s:.{digits}f}".rstrip("0").rstrip(".") + " s"
+    return to_places(length_s, digits).rstrip("0").rstrip(".") + " s"
 
 
 def spread(values: Array) -> float:

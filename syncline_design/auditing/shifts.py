@@ -24,6 +24,7 @@ from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds, spread
 from syncline_design.auditing.witness import Side
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_places
 
 _WHOLE: Final = 0.1  # s that a slip may be from whole seconds
 _LEAST_RUN: Final = 3  # messages of a slip
@@ -177,7 +178,7 @@ def _slip(times: Array, turns: Array, run: tuple[int, int], stamp: np.ndarray) -
     return StampFault(
         "whole_second_slip", {"seconds": size, "count": float(end - begin)}, float(times[begin]),
         float(times[end] if ends else times[-1]),
-        f"{end - begin} messages are stamped {abs(size):.0f} s "
+        f"{end - begin} messages are stamped {to_places(abs(size), 0)} s "
         f"{'ahead' if size > 0 else 'behind'}" + ("" if ends else ", to the end of the log"),
         (back,) if falls else (),
     )  # fmt: skip

@@ -16,6 +16,7 @@ from syncline_design.auditing.series import NS, Array, Series, in_words
 from syncline_design.auditing.shifts import Shift, common
 from syncline_design.auditing.stream import Examined, without_clock_step
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import signed, to_digits
 
 _ALIKE: Final = 0.25  # of a size, among streams
 _SHARE: Final = 0.6  # of the streams that could show a shift
@@ -124,7 +125,8 @@ def _clock_drift(streams: list[Examined]) -> list[Examined]:
     for k in drifts:
         fault = StampFault(
             "recorder_clock", {"ppm": ppm, "kind": "drift"}, None, None,
-            f"all {len(drifts)} streams drift alike, {ppm:+.4g} ppm: one clock for all of them, "
+            f"all {len(drifts)} streams drift alike, {signed(ppm, 4)} ppm: one clock for all of "
+            f"them, "
             "the recorder's or the one that stamps them",
         )  # fmt: skip
         others = tuple(f for f in streams[k].faults if f.fault != "drift")
@@ -200,7 +202,8 @@ def _with_batches(one: Examined, flush: _Flushes, among: int) -> Examined:
     shared = f", {among} streams at the same moments" if among > 1 else ""
     fault = StampFault(
         "batched_by_recorder", {"interval_s": flush.interval_s, "messages": flush.size}, None, None,
-        f"receipts come {flush.size:.3g} at once every {flush.interval_s:.3g} s{shared}; stamps "
+        f"receipts come {to_digits(flush.size, 3)} at once every "
+        f"{to_digits(flush.interval_s, 3)} s{shared}; stamps "
         "keep their rhythm: how the recorder writes, no fault of the stream", counts=False,
     )  # fmt: skip
     return replace(one, faults=(*one.faults, fault))

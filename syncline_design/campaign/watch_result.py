@@ -7,6 +7,7 @@ from typing import Annotated, Final, Literal
 from syncline_design.diagnosis.result import LogOutcome, SpecRead
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
+from syncline_design.model.figure_text import to_digits
 
 SCHEMA: Final = "syncline-design/watch/v1"
 WatchOutcome = Literal["unchanged", "alarm"]
@@ -15,7 +16,7 @@ MOST_EVIDENCE: Final = 1e299  # beyond it evidence is not told apart
 
 def e_value_text(value: float) -> str:
     """An e-value to two figures, everywhere alike: `40`, `1.6e+03`, `more than 1e+299`."""
-    return "more than 1e+299" if value >= MOST_EVIDENCE else f"{value:.2g}"
+    return "more than 1e+299" if value >= MOST_EVIDENCE else to_digits(value, 2)
 
 
 @dataclass(frozen=True, slots=True)

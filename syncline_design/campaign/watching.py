@@ -49,6 +49,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.normal import NORMAL_95
 from syncline_design.spec.case import Case
 
@@ -233,7 +234,7 @@ class _Watching:
             value, sigma = float(change.values[k]), float(spread[k])
             half = NORMAL_95 * sigma
             e_value = math.exp(min(one.log_evidence, 690.0))
-            alarm_from = f"alarm from {1.0 / self.request.rate:.3g} on"
+            alarm_from = f"alarm from {to_digits(1.0 / self.request.rate, 3)} on"
             yield Alarm(
                 effect=term.effect.name,
                 sensor=term.sensor,
@@ -319,7 +320,7 @@ class _Watching:
             if own and factor > NOISIER * float(np.median(own)):
                 yield (
                     f"noise of {sensor.replace('/', ', ')} in run {last.number} is "
-                    f"{factor / float(np.median(own)):.2g} times that of the runs before"
+                    f"{to_digits(factor / float(np.median(own)), 2)} times that of the runs before"
                 )
 
 

@@ -9,6 +9,7 @@ from syncline_design.choice.evaluate import Evaluation, broken, evaluate, rank
 from syncline_design.choice.outcome import Deadline, TooLarge
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import in_force
+from syncline_design.model.figure_text import to_digits
 
 MOST_COMBINATIONS = 300_000
 
@@ -17,7 +18,7 @@ def demand_few(combinations: int) -> None:
     """TooLarge where trying every one of them would take too long."""
     if combinations > MOST_COMBINATIONS:
         raise TooLarge(
-            f"{combinations:.3g} combinations are too many to enumerate "
+            f"{to_digits(combinations, 3)} combinations are too many to enumerate "
             f"(at most {MOST_COMBINATIONS})"
         )
 

@@ -13,6 +13,7 @@ from fractions import Fraction
 from syncline_design.choice.options import RESOURCES, Option, ResourceName, Resources
 from syncline_design.choice.table import ClockOption, Design, Nearer, Pair, Problem
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import rounded
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,7 +226,7 @@ def broken(problem: Problem, found: Evaluation, *, accuracy: bool = True) -> tup
 
 def error_key(error_m: float) -> float:
     """An error as ties see it: errors that agree to 12 figures are the same."""
-    return float(f"{error_m:.12g}") if math.isfinite(error_m) else error_m
+    return rounded(error_m, 12) if math.isfinite(error_m) else error_m
 
 
 def known_or_more(amount: Fraction | None) -> Fraction | float:

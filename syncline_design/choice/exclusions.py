@@ -11,6 +11,7 @@ import numpy as np
 
 from syncline_design.choice.options import Indices, Option, Options, sync_ratio
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 NO_OPTIONS = Options.of(())
 
@@ -38,7 +39,8 @@ def breaks_own_tau_crit(option: Option) -> Excluded:
     """The record of an option whose timestamps are too poor for its own noise."""
     ratio = sync_ratio(option)
     reason = (
-        f"its timestamp error reaches {ratio:.3g} times its own tau_crit: the sensor would be "
+        f"its timestamp error reaches {to_digits(ratio, 3)} times its own tau_crit: the sensor "
+        f"would be "
         "limited by its timestamps, not by its noise"
     )
     limit = option.tau_s / ratio if 0.0 < ratio < math.inf else option.tau_crit_s

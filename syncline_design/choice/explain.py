@@ -29,6 +29,7 @@ from syncline_design.choice.problem import build_problem
 from syncline_design.choice.table import Problem, RoleTable, VehicleTable
 from syncline_design.choice.variations import Build
 from syncline_design.machine.deadline import in_force
+from syncline_design.model.figure_text import to_digits
 from syncline_design.spec.case import Case
 
 Found = TypeVar("Found")
@@ -186,7 +187,7 @@ def _excess(misses: float) -> str:
     """How far a timestamp error is from what is allowed, in as many digits as show it."""
     if misses == 1.0:
         return "has exactly the timestamp error that its own tau_crit bids it stay below"
-    shown = next(t for n in range(3, 18) if float(t := f"{misses:.{n}g}") != 1.0)
+    shown = next(t for n in range(3, 18) if float(t := to_digits(misses, n)) != 1.0)
     return f"has {shown} times the timestamp error that its own tau_crit allows"
 
 

@@ -15,7 +15,7 @@ from syncline_design.choice.parts import SIMULATED, Part, is_feasible, least, pa
 from syncline_design.choice.table import Problem
 from syncline_design.choice.variations import Build, with_methods
 from syncline_design.choice.written import in_unit_of, money, plain
-from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.figure_text import format_quantity, to_digits
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.spec.case import Case, usable_primitives
 from syncline_design.spec.requirement import JUDGED_KINDS, LIMIT_DIMENSIONS, Requirement
@@ -133,12 +133,12 @@ def fix_of(case: Case, move: Move) -> Fix:
     requirement, before, after = move
     if requirement is None:
         text = (
-            f"the implied sync limit from {before:.6g} to {after.text}: "
+            f"the implied sync limit from {to_digits(before, 6)} to {after.text}: "
             f"write {{kind: sync, limit: {after.text}}}"
         )
         return Fix("sync", None, None, None, before, float(after), "1", text)
     name, kind = requirement.id, requirement.kind
-    written = getattr(requirement.limit, "text", f"{before:.6g}")
+    written = getattr(requirement.limit, "text", to_digits(before, 6))
     unit = UNITS_OF.get(kind, case.spec.currency)
     if kind != "cost":
         text = f"{name} from {written} to {after.text}"

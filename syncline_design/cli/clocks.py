@@ -23,6 +23,7 @@ from syncline_design.cli.shared import (
 )
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.streams import say
+from syncline_design.model.figure_text import to_digits
 
 if TYPE_CHECKING:
     from syncline_design.clocks.entry import EntryFiles
@@ -178,7 +179,7 @@ def _written(told: _Told, settings: TimingSettings, wanted: _Entry) -> TimingAnd
 
 def _share(value: float, option: str) -> float:
     if not (0.0 < value < 1.0):
-        refuse(f"syncline-design: {option} {value:g}: expected {_SHARE}")
+        refuse(f"syncline-design: {option} {to_digits(value)}: expected {_SHARE}")
     return value
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from syncline_design.clocks.series import Series
 from syncline_design.clocks.sessions import ClockSession, is_leap, went_back
 from syncline_design.clocks.times import moment, shown
-from syncline_design.model.figure_text import format_duration
+from syncline_design.model.figure_text import format_duration, to_digits
 
 TAI_MINUS_UTC_S: Final = 37.0  # since 2017
 WHOLE_STEP_S: Final = 0.5
@@ -102,7 +102,7 @@ def _units(sessions: Sequence[ClockSession]) -> Iterator[str]:
         ratio = float(np.median(above)) / float(np.median(below))
         apart = small.series.files != large.series.files
         if apart and high > 100.0 * low and any(0.3 < ratio / t < 3.0 for t in _THOUSANDS):
-            yield (f"offsets in {large.series.files[0]} are {ratio:.3g} times those in "
+            yield (f"offsets in {large.series.files[0]} are {to_digits(ratio, 3)} times those in "
                    f"{small.series.files[0]}: are the units the same?")  # fmt: skip
             return
 

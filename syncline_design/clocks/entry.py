@@ -14,6 +14,7 @@ from syncline_design.clocks.study import TimingStudy
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.result_files import write_files
 from syncline_design.machine.streams import harmless
+from syncline_design.model.figure_text import to_digits
 from syncline_design.spec.load import load_builtin
 
 _ID: Final = re.compile(r"[A-Za-z][A-Za-z0-9_.-]{0,79}")
@@ -192,4 +193,4 @@ def _primitive(timing: Timing) -> str:
 def _source(timing: Timing) -> str:
     claim = timing.claim
     return (f"measured: {timing.source.name}, {claim.sessions} sessions, "
-            f"{claim.hours:.3g} h")  # fmt: skip
+            f"{to_digits(claim.hours, 3)} h")  # fmt: skip

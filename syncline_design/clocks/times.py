@@ -5,20 +5,20 @@ from __future__ import annotations
 from datetime import UTC, datetime
 
 from syncline_design.clocks.series import Stamps
-from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.figure_text import format_quantity, to_places
 from syncline_design.model.quantity import Dimension
 
 
 def moment(time_s: float, stamps: Stamps) -> str:
     """ISO 8601 in UTC, or seconds since boot where no date is known."""
     if stamps == "boot":
-        return f"{time_s:.3f} s since start"
+        return f"{to_places(time_s, 3)} s since start"
     try:
         return (
             datetime.fromtimestamp(time_s, UTC).isoformat(timespec="seconds").replace("+00:00", "Z")
         )
     except (ValueError, OverflowError, OSError):
-        return f"{time_s:.3f} s"
+        return f"{to_places(time_s, 3)} s"
 
 
 def shown(time_s: float) -> str:

@@ -10,7 +10,7 @@ from syncline_design.comparison.acceptance import MeasuredFigure, Status
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.judgement import Judgement
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration
+from syncline_design.model.figure_text import format_duration, to_digits
 from syncline_design.spec.case import Case
 from syncline_design.verdict.measured import COMMONLY, coverage_of, coverage_words
 
@@ -44,7 +44,7 @@ def by_clock(one: Assumed, study: TimingStudy, resting: Resting) -> Judgement:
                 "beyond that: more sessions would narrow the bound")  # fmt: skip
         return Judgement("not_shown", said, figure)
     if found.bound_s > one.value:
-        times = f"{found.bound_s / one.value:.3g} times" if one.value else "not"
+        times = f"{to_digits(found.bound_s / one.value, 3)} times" if one.value else "not"
         said = f"measured bound {measured}, {times} the {asked} assumed"
         return Judgement("broken", said, figure)
     why = _why_not(one.value, found, resting)

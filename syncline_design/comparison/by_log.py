@@ -19,7 +19,7 @@ from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration
+from syncline_design.model.figure_text import format_duration, rounded, to_digits
 
 # what undoes a departure, so that neither the log nor the objects' places show both together
 _ALONE: Final = {
@@ -232,12 +232,12 @@ def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
         return Judgement("holds", words, figure)
     length_s, sizes = least
     if not length_s <= SPOKEN_OF * log.found.log.duration_s:
-        begins = "half" if math.isinf(length_s) else format_duration(float(f"{length_s:.2g}"))
+        begins = "half" if math.isinf(length_s) else format_duration(rounded(length_s, 2))
         shows = f" (it shows {sizes})" if sizes else ""
         words = (f"what turns the verdict and acts for less than {begins} of this log would not "
                  f"have shown{shows}; a longer log would do")  # fmt: skip
         return Judgement("not_shown", words)
-    stretch = format_duration(float(f"{length_s:.2g}"))
+    stretch = format_duration(rounded(length_s, 2))
     words = (f"not found, and what turns the verdict would have shown wherever it had acted for "
              f"{stretch} or longer ({sizes}){alone}")  # fmt: skip
     return Judgement("holds", words, figure, least_stretch_s=length_s)
@@ -319,11 +319,14 @@ def _noise(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
     factor = figure.value or 0.0
     most = max(factor, figure.high or 0.0)
     if log.paper.noisier(one.role, one.stage, most):
-        words = (f"up to {most:.3g} times the spec's figure is nothing unusual on this log, but "
+        words = (f"up to {to_digits(most, 3)} times the spec's figure is nothing unusual on "
+                 f"this log, but "
                  "turns the verdict")  # fmt: skip
         return Judgement("not_shown", words, figure)
     return Judgement(
-        "holds", f"{factor:.3g} times the spec's figure, nothing material beyond it", figure
+        "holds",
+        f"{to_digits(factor, 3)} times the spec's figure, nothing material beyond it",
+        figure,
     )
 
 
@@ -357,8 +360,9 @@ def _of_platform(one: Assumed, log: LogEvidence) -> Judgement:
 
 def _over(one: Assumed, mean: Beyond) -> Judgement:
     share = mean.share((1.0 + READ) * (one.value or 0.0))
-    words = (f"beyond the limit in {100.0 * share:.2g} % of the log, by means over "
-             f"{format_duration(float(f'{mean.over_s:.2g}'))} and more than the readings' noise "
+    words = (f"beyond the limit in {to_digits(100.0 * share, 2)} % of the log, by means over "
+             f"{format_duration(rounded(mean.over_s, 2))} and more than the "
+             f"readings' noise "
              "can do")  # fmt: skip
     return Judgement("broken", words, MeasuredFigure(mean.most, mean.low, mean.high))
 

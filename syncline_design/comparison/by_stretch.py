@@ -15,7 +15,7 @@ from syncline_design.diagnosis.stretches import ShownSize, Stands, Stretches
 from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration
+from syncline_design.model.figure_text import format_duration, rounded, to_digits
 
 SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show
 TOLD_S: Final = 1.0  # a short stretch whose size is told beside
@@ -46,7 +46,7 @@ class InStretches:
         also = any(self.is_of(other, (by,), s.stage, one) for other, by, _ in s.others)
         if not (own or also) or not self.paper.turned(name, sensor, s.stage, _values(s)):
             return None
-        place = f"from {s.from_s:.6g} s to {s.to_s:.6g} s"
+        place = f"from {to_digits(s.from_s, 6)} s to {to_digits(s.to_s, 6)} s"
         if own and s.sure:
             others = [f"{name} ({sensor})" for name, sensor, _ in s.others]
             rivals = f" (or {', '.join(others)}: this log cannot tell)" if others else ""
@@ -55,7 +55,7 @@ class InStretches:
         if s.sure:
             words = f"this log cannot tell it from what stands out {place}: {name} ({sensor})"
         else:
-            by_chance = f"{math.exp(s.log_p):.1g}"
+            by_chance = to_digits(math.exp(s.log_p), 1)
             words = (f"{_amounts(s)} seems to stand out {place}: a sound log shows as much "
                      f"anywhere with a chance of {by_chance}; a longer log would tell")  # fmt: skip
         return Judgement("not_shown", words, None, s.from_s, s.to_s)
@@ -115,7 +115,7 @@ def _sizes(lengths: Sequence[float], worst: Sequence[ShownSize], at: int) -> Ite
     """What shows in the least stretch, and in one of about a second."""
     short = next((k for k, length in enumerate(lengths) if length >= TOLD_S), 0)
     for k in sorted({short, min(at, len(lengths) - 1)}):
-        size, lasts = worst[k].sizes[k], format_duration(float(f"{lengths[k]:.2g}"))
+        size, lasts = worst[k].sizes[k], format_duration(rounded(lengths[k], 2))
         if math.isfinite(size):
             yield f"in {lasts} from {amount(size, worst[k].unit)} on"
 
@@ -146,9 +146,9 @@ def _figure(s: Stands, one: Assumed) -> MeasuredFigure | None:
 
 def amount(value: float, unit: str) -> str:
     """Two digits are enough of what is an estimate."""
-    rounded = float(f"{value:.2g}")
+    shown = rounded(value, 2)
     if unit == "s":
-        return format_duration(rounded)
+        return format_duration(shown)
     if unit.startswith("rad"):
-        return f"{math.degrees(rounded):.2g} deg{unit[3:]}"
-    return f"{rounded:g} {unit}".rstrip()
+        return f"{to_digits(math.degrees(shown), 2)} deg{unit[3:]}"
+    return f"{to_digits(shown)} {unit}".rstrip()

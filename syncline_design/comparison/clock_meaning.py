@@ -9,6 +9,7 @@ from syncline_design.clocks.result import EntryKind, Timing
 from syncline_design.clocks.study import TimingStudy
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
+from syncline_design.model.figure_text import to_digits
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry
 from syncline_design.spec.choices import ClockChoice
@@ -107,7 +108,7 @@ def on_clock(case: Case, study: TimingStudy, identity: str) -> Case:
         "name": f"{identity}, measured",
         "offset": {
             "distribution": "empirical",
-            "values": tuple(f"{value:.9g} s" for value in values_of(study, "clock")),
+            "values": tuple(f"{to_digits(value, 9)} s" for value in values_of(study, "clock")),
             "bound": f"{study.timing.bound_s!r} s",
             "claim": {"coverage": study.timing.claim.coverage},
         },

@@ -20,7 +20,7 @@ from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_estimate
+from syncline_design.model.figure_text import format_estimate, to_digits, to_places
 
 LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 LEAST_STEPS = 4  # rows in a window
@@ -248,7 +248,10 @@ def _missing(moved: Array, own: Array, sigma: float) -> str:
         part = float(np.sum(along[:, k] * (own @ right[k]))) / float(np.sum(along[:, k] ** 2))
         if abs(part) < LEAST_PART:
             axis = AXES[int(np.argmax(np.abs(right[k])))]
-            return f"they show {100.0 * max(part, 0.0):.0f} % of the motion along the {axis} axis"
+            return (
+                f"they show {to_places(100.0 * max(part, 0.0), 0)} % of the motion along "
+                f"the {axis} axis"
+            )
     return ""
 
 
@@ -304,7 +307,7 @@ def _described(
         best = (exact or near)[0]
         return Disagreement(best.factor, best.words)
     factor = float(np.sqrt(np.sum(own**2) / max(whole, 1e-300)))
-    size = "as large" if abs(factor - 1.0) < _AS_LARGE else f"{factor:.3g} times in size"
+    size = "as large" if abs(factor - 1.0) < _AS_LARGE else f"{to_digits(factor, 3)} times in size"
     return Disagreement(factor, f"{size}, and in another direction")
 
 
@@ -335,7 +338,7 @@ def _relations(
 
 
 def _factor_words(factor: float, units: dict[float, str]) -> str:
-    words = f"{factor:.4g} times what these say"
+    words = f"{to_digits(factor, 4)} times what these say"
     for known, name in units.items():
         if abs(abs(factor) / known - 1.0) < 0.03:
             words += f" ({name}?)"

@@ -19,7 +19,7 @@ from syncline_design.effects.acting import Acting
 from syncline_design.effects.kinematics import rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.log import LogTrack, StageLog
-from syncline_design.model.figure_text import format_estimate
+from syncline_design.model.figure_text import format_estimate, to_places
 from syncline_design.model.system import Stage
 
 USUAL, RARE = 0.95, 0.99  # quantiles that decide on a contradiction and on a caution
@@ -96,9 +96,9 @@ def _limit(
     reached = USUAL if severity == "contradiction" else RARE
     message = (
         f"{word} of {stage} reaches {format_estimate(value, None, unit)} "
-        f"({100.0 * reached:.0f} % of the log is below), the spec's {key} is "
+        f"({to_places(100.0 * reached, 0)} % of the log is below), the spec's {key} is "
         f"{format_estimate(limit, None, unit)}; "
-        f"{100.0 * share:.0f} % of the log is beyond it"
+        f"{to_places(100.0 * share, 0)} % of the log is beyond it"
     )
     yield Check(code, stage, severity, message, value, limit, unit, share)
 

@@ -28,6 +28,7 @@ from syncline_design.effects.kinematics import (
 from syncline_design.effects.record import Array, Target
 from syncline_design.logs.log import Log, LogTrack, StageLog
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_places
 from syncline_design.model.system import System
 
 ROWS = 200  # on which all are tried
@@ -254,7 +255,7 @@ def _eulers(euler: Array) -> Iterator[tuple[Array, str, Mend, int]]:
                 scale, turn = factor * np.array(signs), np.array([0.0, 0.0, math.radians(quarter)])
                 turned = [n for n, s in zip(("roll", "pitch", "yaw"), signs, strict=True) if s < 0]
                 words = [f"{' and '.join(turned)} turned round"] if turned else []
-                words += [f"yaw off by {_held(quarter):.0f} deg"] if quarter else []
+                words += [f"yaw off by {to_places(_held(quarter), 0)} deg"] if quarter else []
                 words += [unit] if unit else []
                 words = [ENU_WORDS] if (factor, signs, quarter) == ENU_ANGLES else words
 
@@ -285,7 +286,7 @@ def _polar_ways() -> Iterator[tuple[Array, Array, str, int]]:
     for azimuth, elevation, quarter, (zero, zero_words), (factor, unit) in senses:
         words = ["azimuth turned round"] if azimuth < 0.0 else []
         words += ["elevation turned round"] if elevation < 0.0 and not zero else []
-        words += [f"azimuth off by {_held(quarter):.0f} deg"] if quarter else []
+        words += [f"azimuth off by {to_places(_held(quarter), 0)} deg"] if quarter else []
         words += [zero_words] if zero else []
         words += [unit] if unit else []
         if not words or (zero and elevation * zero > 0.0):

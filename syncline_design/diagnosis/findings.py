@@ -32,7 +32,7 @@ from syncline_design.effects import registry
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
-from syncline_design.model.figure_text import format_estimate
+from syncline_design.model.figure_text import format_estimate, to_places
 from syncline_design.model.known import EffectEntry
 
 Label = tuple[str, str, int]
@@ -106,7 +106,7 @@ def evidence_words(gain: float, log10_p: float | None) -> str:
         power = math.floor(log10_p)
         digit = round(10.0 ** (log10_p - power))
         chance = f"{digit}e{power:03d}" if digit < 10 else f"1e{power + 1:03d}"
-    return f"saves {gain:.1f} nat; noise alone does that with a chance of {chance}"
+    return f"saves {to_places(gain, 1)} nat; noise alone does that with a chance of {chance}"
 
 
 def is_noise(effect: Effect) -> bool:
@@ -155,7 +155,7 @@ def _undone(one: Finding, other: Label | None) -> Finding:
 
 
 def _without_chance(one: Finding) -> Finding:
-    words = f"leaving it out costs {one.gain_nat:.1f} nat"
+    words = f"leaving it out costs {to_places(one.gain_nat, 1)} nat"
     return replace(one, evidence=words, log10_p=None)
 
 
@@ -277,7 +277,7 @@ def _gross(view: Scene, fault: Gross) -> Finding:
     found = {p.name: estimate(fault.acting.values[p.name], unit=p.unit) for p in effect.parameters}
     stage = view.system.stages[label[2]].name
     gain = math.log(fault.falls_by)
-    words = f"undoing it makes the usual error {math.exp(gain):.0f} times smaller"
+    words = f"undoing it makes the usual error {to_places(math.exp(gain), 0)} times smaller"
     return finding(effect, label[1], stage, found, words + _of_a_clock(view, fault), gain)
 
 
@@ -345,7 +345,7 @@ def _tails(final: Settled, opened: Opened, weights: Weights) -> list[Finding]:
     }
     values = ((wider.parameters[0].name, tails.scale),)
     material = weights.material(core_m, EffectEntry(wider.name, label[1], stage, values))
-    words = f"a core as wide as the spec's costs {tails.wider:.1f} nat"
+    words = f"a core as wide as the spec's costs {to_places(tails.wider, 1)} nat"
     size_m = math.sqrt(max(size_m**2 - core_m**2, 0.0))
     return [
         _finding(final, effect, label, shown, size_m, weights),
@@ -368,7 +368,7 @@ def episode_finding(data: Data, one: Episode, weights: Weights) -> Finding:
     stage, sensor = one.sensor
     values = tuple((name, e.value) for name, e in shown.items())
     material = weights.material(size_m, EffectEntry(effect.name, sensor, stage, values))
-    words = f"saves {one.gain:.1f} nat in its part of the log"
+    words = f"saves {to_places(one.gain, 1)} nat in its part of the log"
     found = finding(effect, sensor, stage, shown, words, one.gain, None,
                     material=material, size_m=size_m)  # fmt: skip
     return replace(found, from_s=one.from_s, to_s=one.to_s)

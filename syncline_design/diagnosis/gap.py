@@ -23,6 +23,7 @@ from syncline_design.diagnosis.regimes import covariates
 from syncline_design.diagnosis.result import Fit, Gap, HeldOut, Saved
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.normal import NORMAL_95
 
 BLOCKS = 5
@@ -100,7 +101,7 @@ def regime_fold(data: Data) -> tuple[str, Folds]:
     unit = "m/s" if varied else "deg/s"
     if held.shape[0] < LEAST_TRAINING or training.shape[0] < LEAST_TRAINING:
         return name, Folds(())
-    return f"{name} above {limit:.3g} {unit}", Folds(((training, held),))
+    return f"{name} above {to_digits(limit, 3)} {unit}", Folds(((training, held),))
 
 
 def gap(

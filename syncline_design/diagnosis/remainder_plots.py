@@ -18,6 +18,7 @@ from syncline_design.diagnosis.regimes import covariates
 from syncline_design.diagnosis.search import SearchResult
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import per_stamp
+from syncline_design.model.figure_text import rounded
 
 ARROWS = 60  # stretches of the log, an arrow each
 BANDS = 60  # of the spectrum
@@ -28,7 +29,7 @@ DIGITS = 6
 
 def listed(values: Array) -> tuple[float, ...]:
     """Plain numbers, as precise as a plot can show."""
-    return tuple(float(f"{v:.{DIGITS}g}") for v in values)
+    return tuple(rounded(v, DIGITS) for v in values)
 
 
 def track_of(data: Data, before: Array, after: Array, index: Array) -> Track:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.roles import RoleName
 from syncline_design.model.system import Stage
@@ -161,10 +162,12 @@ class Parameter:
         """The values that `holds` takes, in words."""
         kind = "a whole number" if self.whole else "a number"
         least = (
-            "at least 0" if not self.signed and self.above < 0.0 else f"more than {self.above:g}"
+            "at least 0"
+            if not self.signed and self.above < 0.0
+            else f"more than {to_digits(self.above)}"
         )
         bounds = [least] if not self.signed or self.above > -math.inf else []
-        bounds += [f"at most {self.most:g}"] if self.most < math.inf else []
+        bounds += [f"at most {to_digits(self.most)}"] if self.most < math.inf else []
         return " ".join([kind, " and ".join(bounds)]).strip()
 
 

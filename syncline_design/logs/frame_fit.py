@@ -17,6 +17,7 @@ import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 Turns = Literal["none", "heading", "any"]
 FREE: Final[Mapping[Turns, int]] = {"none": 0, "heading": 1, "any": 3}
@@ -82,7 +83,7 @@ def laid(moved: Track, onto: Array, turns: Turns) -> Laid | None:
     if _rms(own.place - b) < max(ONE_FRAME * extent, ONE_FRAME * LEAST_EXTENT_M):
         return None
     if extent < LEAST_EXTENT_M and turns != "none":
-        raise StillError(f"the positions extend over {extent:.2g} m")
+        raise StillError(f"the positions extend over {to_digits(extent, 2)} m")
     begun = _kabsch(own.place, b, turns)
     best = _fitted(own, b, begun, turns, WIDTHS[0])
     for width in WIDTHS[1:]:

@@ -21,6 +21,7 @@ from syncline_design.logs.stream_sources import is_pose_pair, sources_of
 from syncline_design.logs.stream_values import ASSUMED_BODY, ASSUMED_FRAME
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Json, Named, Record, optional
+from syncline_design.model.figure_text import to_places
 from syncline_design.spec.edit import flow_text
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
@@ -259,7 +260,8 @@ def _outside(found: Sequence[Stream]) -> dict[str, tuple[str, ...]]:
     for name, middle in middles.items():
         if not low - far <= middle <= high + far:
             apart = (middle - high if middle > high else middle - low) / NANO
-            words = f"its stamps lie {apart:+.3f} s off those of the file's other streams"
+            words = (f"its stamps lie {to_places(apart, 3, sign=True)} s off those of the "
+                     f"file's other streams")
             notes[name] = (*notes.get(name, ()), words)
     return notes
 

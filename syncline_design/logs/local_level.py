@@ -16,6 +16,7 @@ from syncline_design.effects.kinematics import euler_to_rotation, rotation_to_eu
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import ATTITUDE, TIME, VELOCITY
 from syncline_design.logs.log import LogTrack
+from syncline_design.model.figure_text import to_places
 
 WORTH_SAYING_RAD = np.radians(0.001)
 
@@ -102,5 +103,6 @@ def _said(turn: Array) -> list[str]:
         return []
     return [
         "attitudes and velocities, true north and down at the vehicle, were turned to those of the "
-        f"origin: heading by up to {np.degrees(heading):.3f} deg, tilt {np.degrees(tilt):.3f} deg"
+        f"origin: heading by up to {to_places(np.degrees(heading), 3)} deg, tilt "
+        f"{to_places(np.degrees(tilt), 3)} deg"
     ]

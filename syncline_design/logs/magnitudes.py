@@ -20,6 +20,7 @@ from syncline_design.logs.columns import (
 )
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 MOST_SPEED_MPS = 2000.0
 MOST_LENGTH_M = 1e8  # a quarter of the way to the Moon; Earth-centred coordinates stay below 1e7
@@ -61,8 +62,8 @@ def demand_possible(path: Path, columns: Mapping[str, Array], prefixes: Sequence
                 path,
                 bound.problem,
                 field=shown(name),
-                expected=f"at most {bound.most * bound.per_si:.2g} {bound.unit}",
-                found=f"{largest * bound.per_si:.4g} {bound.unit}",
+                expected=f"at most {to_digits(bound.most * bound.per_si, 2)} {bound.unit}",
+                found=f"{to_digits(largest * bound.per_si, 4)} {bound.unit}",
                 hint="is the unit in the column's name right?",
             )
 

@@ -28,6 +28,7 @@ from syncline_design.logs.refusals import refuse
 from syncline_design.logs.tables import LogTable
 from syncline_design.logs.twins import one_a_stamp, without_twins
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import percent, to_places
 
 Index = NDArray[np.intp]
 TURNING = ("yaw_rad", "azimuth_rad", "longitude_rad")  # where 180 deg and -180 deg are neighbours
@@ -69,14 +70,16 @@ def merged(tables: Sequence[LogTable], prefixes: Sequence[str]) -> Merged:
         columns |= found
         tracks |= _tracks(table, taken, prefixes)
         share = float(np.mean(covered))
-        notes.append(f"{table.path.name}: {share:.1%} of the rows matched")
+        notes.append(f"{table.path.name}: {percent(share)} of the rows matched")
         if not np.any(covered):
             raise refuse(
                 table.path,
                 "no row of the log is matched",
                 field=TIME,
-                expected=f"stamps between {stamps[0]:.3f} and {stamps[-1]:.3f} s",
-                found=f"{table.columns[TIME][0]:.3f} to {table.columns[TIME][-1]:.3f} s",
+                expected=f"stamps between {to_places(stamps[0], 3)} and "
+                f"{to_places(stamps[-1], 3)} s",
+                found=f"{to_places(table.columns[TIME][0], 3)} to "
+                f"{to_places(table.columns[TIME][-1], 3)} s",
                 hint="are both files on the same time scale?",
             )
     table = replace(base, columns=columns, notes=tuple(notes))

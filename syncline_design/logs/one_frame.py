@@ -23,6 +23,7 @@ from syncline_design.logs.stream_values import (
     height_of,
     separation_of,
 )
+from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.spec.log_block import LogChoice
 
 WORTH_SAYING_RAD: Final = 1e-4
@@ -41,10 +42,11 @@ def on_one_datum(
     for one in placed:
         told[id(one)] = height_of(one, separation) if one.has(GLOBE) else None
         if one.origin is not None:
-            known = separation is not None
             one.origin = one.origin + np.array([0.0, 0.0, separation or 0.0])
-            told[id(one)] = known
-            above = f"plus {separation:.2f} m" if known else "as it is, though above sea level"
+            told[id(one)] = separation is not None
+            above = "as it is, though above sea level"
+            if separation is not None:
+                above = f"plus {to_places(separation, 2)} m"
             one.note(f"the height of its origin was taken {above}")
     if True in told.values() and False in told.values():
         for one in placed:
@@ -99,8 +101,8 @@ def _with_fitting_axes(one: Values, globe: Values, origin: Array) -> None:
     one.notes[:] = [n for n in one.notes if "the frame is not told" not in n and
                     "positions in east, north, up" not in n]  # fmt: skip
     one.note(
-        f"the frame is not told: as east, north, up it is {left[0]:.3g} m from "
-        f"{globe.offer.name}, as north, east, down {left[1]:.3g} m: taken as the latter "
+        f"the frame is not told: as east, north, up it is {to_digits(left[0], 3)} m from "
+        f"{globe.offer.name}, as north, east, down {to_digits(left[1], 3)} m: taken as the latter "
         "(log: {frame: ned})"
     )
 
@@ -132,7 +134,10 @@ def _about(one: Values, origin: Array, where: str) -> None:
     one.put(POSITION, local)
     if heights is None:
         del one.columns[POSITION[2]]
-    at = f"{np.degrees(origin[0]):.7f} deg, {np.degrees(origin[1]):.7f} deg, {origin[2]:.3f} m"
+    at = (
+        f"{to_places(np.degrees(origin[0]), 7)} deg, {to_places(np.degrees(origin[1]), 7)} "
+        f"deg, {to_places(origin[2], 3)} m"
+    )
     one.note(f"WGS 84 positions were made north, east, down about {where}, {at}")
 
 
@@ -220,15 +225,16 @@ def _move(one: Values, fit: Laid) -> None:
 
 
 def _say_laid(reference: Values, tested: Values, fit: Laid) -> None:
-    turn = f"turned by {np.degrees(fit.heading_rad):.3f} deg about down"
+    turn = f"turned by {to_places(np.degrees(fit.heading_rad), 3)} deg about down"
     if _know_north(reference, tested):
         turn = "kept to its north"
     elif fit.tilt_rad > WORTH_SAYING_RAD:
-        turn += f" and {np.degrees(fit.tilt_rad):.3f} deg of tilt"
+        turn += f" and {to_places(np.degrees(fit.tilt_rad), 3)} deg of tilt"
     reference.note(
         f"nothing relates its frame to that of {tested.offer.name}: it was {turn} and "
-        f"shifted by {np.linalg.norm(fit.shift_m):.3f} m onto it (left: {fit.rms_m:.3f} m RMS over "
-        f"{fit.extent_m:.1f} m); a constant shift or turn between the two cannot be found"
+        f"shifted by {to_places(float(np.linalg.norm(fit.shift_m)), 3)} m onto it (left: "
+        f"{to_places(fit.rms_m, 3)} m RMS over "
+        f"{to_places(fit.extent_m, 1)} m); a constant shift or turn between the two cannot be found"
     )
 
 
@@ -250,7 +256,7 @@ def _lay_bodies(reference: Values, tested: Values, delay_s: float) -> None:
     reference.put(ATTITUDE, rotation_to_euler(whole))
     angle = np.degrees(np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0)))
     reference.note(
-        f"its body axes were turned by {angle:.3f} deg, constant, onto those of "
+        f"its body axes were turned by {to_places(angle, 3)} deg, constant, onto those of "
         f"{tested.offer.name}: a constant mounting error between the two cannot be found"
     )
 

@@ -12,6 +12,7 @@ from syncline_design.logs.columns import GEODETIC, POSITION, REFERENCE, TARGET, 
 from syncline_design.logs.local_level import turned_to_origin
 from syncline_design.logs.log import LogTrack
 from syncline_design.logs.refusals import refuse
+from syncline_design.model.figure_text import to_digits, to_places
 
 Origin = tuple[float, float, float]  # latitude, longitude [rad], height above the ellipsoid [m]
 
@@ -41,7 +42,9 @@ def made_local(
     for names in used.values():
         if names[2] not in columns:
             columns[names[2]] = np.full(columns[names[0]].shape, level)
-            notes.append(f"{names[2]} is not in the log: taken as {level:.3f} m, down not compared")
+            notes.append(
+                f"{names[2]} is not in the log: taken as {to_places(level, 3)} m, down not compared"
+            )
     _demand_one_kind(path, columns, pairs, used, origin)
     start = np.array(_first_row(path, columns, used)) if origin is None else np.array(origin)
     for prefix, names in used.items():
@@ -52,7 +55,10 @@ def made_local(
         if any(names[2] in note for note in notes):
             del columns[pairs[prefix][2]]
     where = "at the first row" if origin is None else "at the spec's origin"
-    at = f"{np.degrees(start[0]):.7f} deg, {np.degrees(start[1]):.7f} deg, {start[2]:.3f} m"
+    at = (
+        f"{to_places(np.degrees(start[0]), 7)} deg, {to_places(np.degrees(start[1]), 7)} deg, "
+        f"{to_places(start[2], 3)} m"
+    )
     notes.append(f"WGS 84 positions were made local (north, east, down) {where}, {at}")
     own = next((p for p in (first, "reference_") if p in used), None)
     if own is None:  # only targets are in WGS 84: the vehicle's frame is that of its places
@@ -124,7 +130,7 @@ def _demand_globe(path: Path, place: Array, names: tuple[str, ...]) -> None:
             "no latitude",
             field=shown(names[0]),
             expected="at most 90 deg",
-            found=f"{worst:.6g} deg",
+            found=f"{to_digits(worst, 6)} deg",
             hint="is the unit in the column's name right?",
         )
 

@@ -16,6 +16,7 @@ import numpy as np
 from syncline_design.effects.kinematics import euler_to_rotation, rotate
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import RANGING, REFERENCE, REFERENCE_ATTITUDE, TARGET
+from syncline_design.model.figure_text import to_places
 from syncline_design.model.system import Sensor
 
 SHORTEST_M, LONGEST_M = 1.0, 100.0
@@ -46,6 +47,7 @@ def with_points(columns: MutableMapping[str, Array], prefix: str, lever: float) 
     columns[prefix + RANGING[1]] = np.arctan2(points[:, 1], points[:, 0])
     columns[prefix + RANGING[2]] = -np.arcsin(np.clip(points[:, 2] / lever, -1.0, 1.0))
     return (
-        f"places and attitudes were compared at points {lever:.2f} m from the reference point, "
+        f"places and attitudes were compared at points {to_places(lever, 2)} m from the "
+        f"reference point, "
         "along each axis of the body in turn"
     )

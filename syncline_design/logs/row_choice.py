@@ -14,6 +14,7 @@ from syncline_design.logs.columns import TIME
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.runs import pieces_of
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 MOST_KEPT = 500_000  # rows of one file that are held in memory
 WINDOWS = 40
@@ -91,14 +92,16 @@ def _demand_sense(path: Path, finite: Array) -> None:
     if back > BACKWARDS * (finite.shape[0] - 1):  # half of them is a file in no order at all
         raise refuse(path, "time runs backwards", field=TIME, hint="reverse the rows")
     if finite.max() == finite.min():
-        raise refuse(path, "time stands still", field=TIME, found=f"{finite[0]:.9g} s throughout")
+        raise refuse(
+            path, "time stands still", field=TIME, found=f"{to_digits(finite[0], 9)} s throughout"
+        )
     length = float(finite.max() - finite.min())
     if length > LONGEST_S:
         raise refuse(
             path,
             "the log is years long",
             field=TIME,
-            found=f"{length:.3g} s",
+            found=f"{to_digits(length, 3)} s",
             hint="are the stamps in nanoseconds? Then call the column time_ns",
         )
 

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from syncline_design.effects.record import Array
 from syncline_design.logs.columns import NED, TIME
 from syncline_design.logs.refusals import refuse
+from syncline_design.model.figure_text import to_digits
 
 Index = NDArray[np.intp]
 MOST_PIECES = 20  # of rising stamps; a file in more of them is shuffled, not a few runs
@@ -50,7 +51,7 @@ def demand_one_run(path: Path, columns: Mapping[str, Array], order: Index, piece
                         f"two runs in one file: the stamps start again in row {order[b].min() + 1}",
                         field=TIME,
                         expected="one run, or rows of one run in any order",
-                        found=f"places {apart:.3g} m apart at the same stamps",
+                        found=f"places {to_digits(apart, 3)} m apart at the same stamps",
                         hint="split the file there",
                     )
 

@@ -20,6 +20,7 @@ from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Timeline
 from syncline_design.logs.readers.timelines import EARLIEST_NS
 from syncline_design.logs.refusals import refuse
 from syncline_design.logs.stream_values import Values
+from syncline_design.model.figure_text import to_places
 from syncline_design.spec.log_block import LogChoice
 
 CALENDARS: Final = ("utc", "gps", "tai")
@@ -147,7 +148,9 @@ def _booted(one: Values, several: Sequence[Values]) -> None:
         )
     middle = int(apart[0]) + round(float(np.median(apart - apart[0])))
     one.time_ns = np.where(one.time_ns == UNSET, UNSET, one.time_ns + middle)
-    one.note(f"stamps since boot were made UTC: {middle / NANO:.6f} s added (median of pairs)")
+    one.note(
+        f"stamps since boot were made UTC: {to_places(middle / NANO, 6)} s added (median of pairs)"
+    )
 
 
 def _demand_one_zero(several: Sequence[Values], timelines: Mapping[int, Timeline]) -> None:

@@ -19,6 +19,7 @@ from syncline_design.logs.refusals import refuse
 from syncline_design.logs.roles import Offer
 from syncline_design.logs.run_parts import pieces_of
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_places
 from syncline_design.model.quantity import si_name, suffix_unit
 from syncline_design.spec.log_block import LogChoice
 
@@ -193,7 +194,7 @@ def _position(values: Values, frame: Frame) -> None:
             values.origin = np.median(known, axis=0)
             moved = float(np.max(np.ptp(known[:, :2], axis=0))) * 6.4e6
             if moved > 0.1:
-                values.note(f"its origin moves by up to {moved:.1f} m within the log")
+                values.note(f"its origin moves by up to {to_places(moved, 1)} m within the log")
 
 
 def _velocity(values: Values, frame: Frame, body: Body, turn: Array | None) -> None:
@@ -231,7 +232,10 @@ def height_of(values: Values, separation_m: float | None) -> bool | None:
         return True
     if separation_m is not None:
         columns["height_m"] = columns["height_msl_m"] + separation_m
-        words = f"heights above sea level plus {separation_m:.2f} m, as another stream tells it"
+        words = (
+            f"heights above sea level plus {to_places(separation_m, 2)} m, as another "
+            f"stream tells it"
+        )
         values.note(f"{words}, are above the ellipsoid")
         return True
     columns["height_m"] = columns["height_msl_m"]

@@ -13,6 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
+from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.model.quantity import Dimension, Quantity, UnitError, parse_quantity
 
 
@@ -37,7 +38,9 @@ def within(share: float) -> Conversion:
     figure = z sigma, z = Phi^-1((1 + share) / 2).
     """
     z = normal_quantile((1.0 + share) / 2.0)
-    return Conversion(1.0 / z, f"one axis, {100 * share:g} % within the figure: / {z:.4f}")
+    return Conversion(
+        1.0 / z, f"one axis, {to_digits(100 * share)} % within the figure: / {to_places(z, 4)}"
+    )
 
 
 def circular(share: float) -> Conversion:
@@ -46,7 +49,9 @@ def circular(share: float) -> Conversion:
     figure = sigma sqrt(-2 ln(1 - share)), sigma per axis.
     """
     k = math.sqrt(-2.0 * math.log1p(-share))
-    return Conversion(1.0 / k, f"radius of a circle that holds {100 * share:g} %: / {k:.4f}")
+    return Conversion(
+        1.0 / k, f"radius of a circle that holds {to_digits(100 * share)} %: / {to_places(k, 4)}"
+    )
 
 
 # P(|r| <= k sigma) = 0.5 of three equal independent axes (Maxwell): k = sqrt(chi2^-1(0.5; 3)).
@@ -64,15 +69,16 @@ _FIXED: Final[Mapping[str, Conversion]] = {
     "2drms": Conversion(math.sqrt(0.125), "twice the drms: / (2 sqrt(2))"),
     "mrse": Conversion(math.sqrt(1.0 / 3.0), "root mean square of the distance: / sqrt(3)"),
     "sep50": Conversion(
-        1.0 / _SPHERICAL_50, f"radius of a sphere that holds 50 %: / {_SPHERICAL_50:.4f}"
+        1.0 / _SPHERICAL_50, f"radius of a sphere that holds 50 %: / {to_places(_SPHERICAL_50, 4)}"
     ),
     "median": Conversion(
-        1.0 / _HALF_NORMAL_50, f"half of all on one axis: / {_HALF_NORMAL_50:.4f}"
+        1.0 / _HALF_NORMAL_50, f"half of all on one axis: / {to_places(_HALF_NORMAL_50, 4)}"
     ),
     "max": Conversion(math.sqrt(1.0 / 3.0), "ends of a uniform error, +/- figure: / sqrt(3)"),
     "resolution": Conversion(math.sqrt(1.0 / 12.0), "step of a uniform error: / sqrt(12)"),
     "beam width": Conversion(
-        1.0 / _HALF_POWER, f"full width at half power of a Gaussian beam: / {_HALF_POWER:.4f}"
+        1.0 / _HALF_POWER, f"full width at half power of a Gaussian beam: / "
+                           f"{to_places(_HALF_POWER, 4)}"
     ),
     "1/e2 width": Conversion(1.0 / 4.0, "full width at 1/e^2 of a Gaussian beam: / 4"),
     "typical": Conversion(1.0, "not stated more precisely: taken as one sigma"),

@@ -123,9 +123,16 @@ def signed(value: float, digits: int = 6) -> str:
     return text if text == "0" or text.startswith(("-", "n")) else f"+{text}"
 
 
-def to_places(value: float, places: int) -> str:
+def rounded(value: float, digits: int) -> float:
+    """A value to so many significant figures."""
+    return float(f"{value:.{digits}g}")
+
+
+def to_places(value: float, places: int, sign: bool = False) -> str:
     """So many decimals, zeros kept: figures of a column, or of one unit, beside one another."""
-    return f"{value:.{places}f}" if math.isfinite(value) else _not_finite(value)
+    if not math.isfinite(value):
+        return _not_finite(value)
+    return f"{value:{'+' if sign else ''}.{places}f}"
 
 
 def percent(share: float, digits: int = 3) -> str:

@@ -12,6 +12,7 @@ import numpy as np
 
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.planning.path import GRAVITY_MPS2, STEP_S, Course
 from syncline_design.planning.vehicle import Vehicle
 
@@ -87,18 +88,18 @@ def _wave(duration_s: float, cycles: int) -> Array:
 
 
 def _mps(speed: float) -> str:
-    return f"{speed:.3g} m/s"
+    return f"{to_digits(speed, 3)} m/s"
 
 
 def _straight(v: Vehicle) -> tuple[str, Course]:
     ahead = ramps(v, [(v.fast_mps, LINE_S)], v.join_mps)
-    return f"straight ahead at {_mps(v.fast_mps)} for {LINE_S:.0f} s", _course(ahead)
+    return f"straight ahead at {_mps(v.fast_mps)} for {to_places(LINE_S, 0)} s", _course(ahead)
 
 
 def _slow(v: Vehicle) -> tuple[str, Course]:
     speed = max(v.slowest_mps, 0.3 * v.v_max_mps)
     ahead = ramps(v, [(speed, LINE_S)], v.join_mps)
-    return f"straight ahead at {_mps(speed)} for {LINE_S:.0f} s", _course(ahead)
+    return f"straight ahead at {_mps(speed)} for {to_places(LINE_S, 0)} s", _course(ahead)
 
 
 def _reciprocal(v: Vehicle) -> tuple[str, Course]:
@@ -137,7 +138,10 @@ def _speeds(v: Vehicle, hold_s: float) -> tuple[str, Course] | None:
     low = max(v.slowest_mps, 0.25 * v.v_max_mps)
     if low > 0.9 * v.fast_mps:
         return None
-    words = f"one line, {hold_s:.0f} s at {_mps(low)} and {hold_s:.0f} s at {_mps(v.fast_mps)}"
+    words = (
+        f"one line, {to_places(hold_s, 0)} s at {_mps(low)} and {to_places(hold_s, 0)} s "
+        f"at {_mps(v.fast_mps)}"
+    )
     return words, _course(ramps(v, [(low, hold_s), (v.fast_mps, hold_s)], v.join_mps))
 
 
@@ -188,8 +192,8 @@ def _sway(v: Vehicle, sideways: bool) -> tuple[str, Course] | None:
     swing = min(GRAVITY_MPS2 * math.tan(lean) / omega, 0.4 * v.v_max_mps) * _wave(SWEEP_S, cycles)
     zero = np.zeros_like(swing)
     axis, name = ("roll", "sideways") if sideways else ("pitch", "to and fro")
-    words = f"{axis} sweeps: sway {name} every {SWEEP_S / cycles:.0f} s, leaning to " \
-            f"{math.degrees(lean):.0f} deg"  # fmt: skip
+    words = f"{axis} sweeps: sway {name} every {to_places(SWEEP_S / cycles, 0)} s, leaning to " \
+            f"{to_places(math.degrees(lean), 0)} deg"  # fmt: skip
     return words, _course(zero, right=swing) if sideways else _course(swing)
 
 
@@ -204,7 +208,7 @@ def _rock(v: Vehicle) -> tuple[str, Course] | None:
     at = (len(ahead) - len(swing)) // 2
     turn[at : at + len(swing)] = swing
     what = "roll sweeps: rock the wings" if v.motion == "fixed_wing" else "a slalom"
-    words = f"{what} at {_mps(speed)}, {cycles} times to either side, {period:.0f} s each"
+    words = f"{what} at {_mps(speed)}, {cycles} times to either side, {to_places(period, 0)} s each"
     return words, _course(ahead, turn=turn)
 
 
@@ -216,7 +220,7 @@ def _heights(v: Vehicle) -> tuple[str, Course] | None:
     down = rate * _wave(len(ahead) * STEP_S, 2)[: len(ahead)]
     down = np.pad(down, (0, len(ahead) - len(down)))
     step = rate * len(ahead) * STEP_S / 2 / math.pi
-    return f"height steps: {step:.2g} m down and up again, twice, flying on", _course(
+    return f"height steps: {to_digits(step, 2)} m down and up again, twice, flying on", _course(
         ahead, down=down
     )
 

@@ -9,6 +9,7 @@ from typing import Final
 from syncline_design.diagnosis.result import Diagnosis, Finding, NextDrive, Rival
 from syncline_design.effects import registry
 from syncline_design.machine.deadline import NoVerdict, within_s
+from syncline_design.model.figure_text import to_places
 from syncline_design.planning.run import plan
 from syncline_design.planning.setup import PlanRequest
 from syncline_design.planning.telling import PlanRun
@@ -62,7 +63,7 @@ def _short(case: Case, run: PlanRun, first: Named, second: Named) -> NextDrive:
     result = run.result
     command = ["syncline-design", "plan", str(case.path), "--separate", first.text, second.text]
     if not result.reached and result.least_minutes is not None:
-        command += ["--minutes", f"{result.least_minutes * 1.05 + 0.1:.1f}"]
+        command += ["--minutes", to_places(result.least_minutes * 1.05 + 0.1, 1)]
     return NextDrive(
         first=first.text,
         second=second.text,

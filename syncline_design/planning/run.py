@@ -7,6 +7,7 @@ from typing import Final
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.linear_algebra import one_thread
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.planning.drives import Outcome, outcome
 from syncline_design.planning.search import (
     AREA_SHARE,
@@ -69,9 +70,10 @@ class _Planning:
         if not any(known.fits([told]) for told in self.setup.told):
             least = min((extent_m([told]) for told in self.setup.told), key=max)
             raise PlanError(
-                f"area [{area[0]:g} m, {area[1]:g} m]: not one leg of this vehicle stays within "
-                f"it; the smallest takes {least[0] / AREA_SHARE:.0f} m by "
-                f"{least[1] / AREA_SHARE:.0f} m: widen it, or lower v_max"
+                f"area [{to_digits(area[0])} m, {to_digits(area[1])} m]: not one leg of this "
+                f"vehicle stays within "
+                f"it; the smallest takes {to_places(least[0] / AREA_SHARE, 0)} m by "
+                f"{to_places(least[1] / AREA_SHARE, 0)} m: widen it, or lower v_max"
             )
         return area
 

@@ -17,6 +17,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.notebooks import Shown
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.system import System
 from syncline_design.planning.drives import Outcome, World
 from syncline_design.planning.information import (
@@ -206,7 +207,7 @@ class Telling:
         held = [
             f"{v.stage} hovers"
             if v.wait_mps == 0.0
-            else f"{v.stage} circles wide at {v.wait_mps:.2g} m/s"
+            else f"{v.stage} circles wide at {to_digits(v.wait_mps, 2)} m/s"
             for k, v in enumerate(self.setup.world.vehicles)
             if k != stage
         ]

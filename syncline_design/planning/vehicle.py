@@ -10,6 +10,7 @@ import math
 from typing import Final, Literal, NamedTuple
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.spec.case import Case, StageCase
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.yaml_text import Flaw
@@ -123,13 +124,13 @@ def _vehicle(case: Case, stage: StageCase, ranging_type: str) -> Vehicle:
                        "reverses; `motion:` of the platform says more)")  # fmt: skip
     accelerates = _stated(entry.acceleration, _usual_acceleration(usual, v_max))
     if entry.acceleration is None:
-        assumed.append(f"acceleration: {accelerates:.3g} m/s^2")
+        assumed.append(f"acceleration: {to_digits(accelerates, 3)} m/s^2")
     radius = usual.turn_radius_m if usual.turn_radius_m is not None else v_max / omega
     if entry.minimum_turn_radius is None and radius > 0.0:
-        assumed.append(f"minimum_turn_radius: {radius:.3g} m")
+        assumed.append(f"minimum_turn_radius: {to_digits(radius, 3)} m")
     slowest = _stated(entry.minimum_speed, usual.slowest * v_max)
     if entry.minimum_speed is None and slowest > 0.0:
-        assumed.append(f"minimum_speed: {slowest:.3g} m/s")
+        assumed.append(f"minimum_speed: {to_digits(slowest, 3)} m/s")
     tilt = min(float(case.spec.horizon.tilt), MOST_TILT_RAD)
     return Vehicle(
         stage.choice.name,

@@ -21,7 +21,11 @@ _SUPERSCRIPT = str.maketrans(
 def power_of_ten(value: float) -> str:
     """1000 as 10 with a superscript 3, in plain characters; 1 and 10 as they are."""
     exponent = round(math.log10(value))
-    return f"{value:g}" if exponent in (0, 1) else "10" + str(exponent).translate(_SUPERSCRIPT)
+    return (
+        numbers.number(value, 6)
+        if exponent in (0, 1)
+        else "10" + str(exponent).translate(_SUPERSCRIPT)
+    )
 
 
 def decades(low: float, high: float, most: int = 7) -> list[float]:

@@ -77,7 +77,7 @@ def _against(value: float | None, limit: numbers.Limited | None) -> Cell:
 
 
 def _rows(found: ErrorFigures) -> Iterator[Row]:
-    k = 0.0 if found.worst_case_k is None else found.worst_case_k
+    k = numbers.number(found.worst_case_k or 0.0)
     yield "Syncline error", found.syncline_m, None, (
         "sum of one-sigma sensor terms and the timing bound (the paper's); no worst case, no "
         "quantile"
@@ -85,8 +85,8 @@ def _rows(found: ErrorFigures) -> Iterator[Row]:
     yield "Certified worst case, sensors at 1 \u03c3", found.worst_case_1sigma_m, None, (
         "nothing exceeds it while sensors stay within one \u03c3 and stamps within their bounds"
     )  # fmt: skip
-    yield f"Certified worst case, sensors at {k:g} \u03c3", found.worst_case_m, None, (
-        f"the same, sensors within {k:g} \u03c3"
+    yield f"Certified worst case, sensors at {k} \u03c3", found.worst_case_m, None, (
+        f"the same, sensors within {k} \u03c3"
     )  # fmt: skip
     one = found.one_mission
     yield "95 % of 3D errors", found.quantile95_3d_m, _of(one, "quantile95_3d_m"), (

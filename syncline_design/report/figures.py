@@ -179,7 +179,7 @@ def _limit_and_design(axes: Axes, curve: SynclineCurve, low: float) -> None:
 def _syncline_labels(axes: Axes) -> None:
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     scales.set_ticks(axes, "x", scales.decades(left, right), scales.power_of_ten)
-    scales.set_ticks(axes, "y", scales.log_ticks(bottom, top), lambda v: f"{v:g}")
+    scales.set_ticks(axes, "y", scales.log_ticks(bottom, top), lambda v: numbers.number(v, 6))
     axes.set_xlabel("synchronisation accuracy 1/\u03c4 [1/s]")
     axes.set_ylabel("accuracy 1/error [1/m]")
     scales.grid(axes)

@@ -56,8 +56,8 @@ def _faults(axes: Axes, row: StreamAudit) -> None:
     for fault in [f for f in row.faults if f.from_s is not None][:MOST_MARKS]:
         begin = fault.from_s or 0.0
         tell(axes, (begin, fault.to_s or begin), axes.get_ylim(), [
-            ("Stream", row.name), ("Fault", fault.fault), ("From", f"{begin:.3f} s"),
-            ("To", "" if fault.to_s is None else f"{fault.to_s:.3f} s"),
+            ("Stream", row.name), ("Fault", fault.fault), ("From", f"{numbers.places(begin, 3)} s"),
+            ("To", "" if fault.to_s is None else f"{numbers.places(fault.to_s, 3)} s"),
         ])  # fmt: skip
         colour = BAD if fault.counts else MUTED
         axes.axvline(begin, color=colour, linewidth=1.1, linestyle=(0, (4, 2)))

@@ -96,7 +96,7 @@ def _bar(axes: Axes, left: float, top: float, bottom: float, words: str, colour:
     axes.add_patch(Rectangle((left, top), BAR, bottom - top, facecolor=SHADE, edgecolor=colour,
                              linewidth=1.2, zorder=1))  # fmt: skip
     axes.text(left + 0.5 * BAR, 0.5 * (top + bottom), words, rotation=90, ha="center",
-              va="center", color=INK, zorder=5, gid=f"cell-{words}-{top:.0f}")  # fmt: skip
+              va="center", color=INK, zorder=5, gid=f"cell-{words}-{round(top)}")  # fmt: skip
 
 
 def _sensor(axes: Axes, one: Stamped, y: float) -> None:

@@ -92,7 +92,7 @@ def _curve(axes: Axes, curve: LabelledCurve, index: int, legend: str) -> None:
 def _ticks(axes: Axes) -> None:
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     scales.set_ticks(axes, "x", scales.decades(left, right), scales.power_of_ten)
-    scales.set_ticks(axes, "y", scales.log_ticks(bottom, top), lambda v: f"{v:g}")
+    scales.set_ticks(axes, "y", scales.log_ticks(bottom, top), lambda v: numbers.number(v, 6))
     axes.set_xlabel("synchronisation accuracy 1/\u03c4 [1/s]", color=INK)
     axes.set_ylabel("accuracy 1/error [1/m]", color=INK)
     scales.grid(axes)

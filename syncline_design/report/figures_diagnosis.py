@@ -155,8 +155,9 @@ def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigu
             axes.stairs(scores, edges, color=SERIES[0], linewidth=1.2)
             for low, high, score in entry.cells:
                 tell(axes, (low, high), (0.0, score), [
-                    (entry.covariate.replace("_", " "), f"{low:.3g} to {high:.3g} {entry.unit}"),
-                    ("Standard errors", f"{score:.3g}"),
+                    (entry.covariate.replace("_", " "), f"{numbers.number(low, 3)} to "
+                                                        f"{numbers.number(high, 3)} {entry.unit}"),
+                    ("Standard errors", numbers.number(score, 3)),
                 ])  # fmt: skip
             axes.axhline(3.0, color=MUTED, linewidth=1, linestyle=(0, (3, 2)))
             axes.set_ylim(0, 1.08 * max(top, 4.0))
@@ -166,8 +167,9 @@ def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigu
             scales.grid(axes, "y")
 
     spoken = "; ".join(
-        f"{entry.covariate}: standard errors {min(s for *_, s in entry.cells):.3g} to "
-        f"{max(s for *_, s in entry.cells):.3g}"
+        f"{entry.covariate}: standard errors "
+        f"{numbers.number(min(s for *_, s in entry.cells), 3)} to "
+        f"{numbers.number(max(s for *_, s in entry.cells), 3)}"
         for entry in maps
     )
     size = (WIDTH, 20.0 + 105.0 * len(maps))

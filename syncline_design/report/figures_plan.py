@@ -35,14 +35,16 @@ def path(run: PlanRun) -> InlineFigure:
                 rows = np.unique(np.r_[own[::step], own[-1], min(own[-1] + 1, len(leg) - 1)])
                 axes.plot(east[rows], north[rows], color=SERIES[k % len(SERIES)], linewidth=1.4)
                 tell(axes, float(east[own[0]]), float(north[own[0]]), [
-                    ("Leg", str(k + 1)), ("Place", f"{east[own[0]]:.1f} m east, "
-                                          f"{north[own[0]]:.1f} m north"),
+                    ("Leg", str(k + 1)), ("Place", f"{numbers.places(east[own[0]], 1)} m east, "
+                                          f"{numbers.places(north[own[0]], 1)} m north"),
                 ])  # fmt: skip
                 axes.text(east[own[0]], north[own[0]], f" {k + 1}")
         axes.plot([t.east_m for t in run.result.targets], [t.north_m for t in run.result.targets],
                   "x", color=MUTED, markersize=4)  # fmt: skip
         for k, one in enumerate(run.result.targets, 1):
-            place = f"{one.east_m:.1f} m east, {one.north_m:.1f} m north"
+            place = (
+                f"{numbers.places(one.east_m, 1)} m east, {numbers.places(one.north_m, 1)} m north"
+            )
             tell(axes, one.east_m, one.north_m, [("Target", str(k)), ("Place", place)])
         axes.plot(east[:1], north[:1], "o", color=SERIES[0], markersize=4.5)
         axes.set_aspect("equal", adjustable="datalim")
@@ -71,19 +73,19 @@ def after(found: Plan) -> InlineFigure:
                       color=SERIES[k % len(SERIES)], label=key)  # fmt: skip
             for leg, ratio in zip(legs, _ratios(found, key), strict=True):
                 tell(axes, leg, min(ratio, FAR), [("Leg", str(leg)), ("Effect", key),
-                     ("Sigma over asked", f"{ratio:.3g}")])  # fmt: skip
+                     ("Sigma over asked", numbers.number(ratio, 3))])  # fmt: skip
         axes.axhline(1.0, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
         low, high = 0.8 * min(*ratios, 1.0), 1.25 * max(*ratios, 1.0)
         axes.set_ylim(low, high)
-        scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), lambda v: f"{v:g}")
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), lambda v: numbers.number(v, 6))
         axes.set_xticks(legs)
         axes.set_xlabel("leg")
         axes.set_ylabel("sigma / asked")
         axes.legend(loc="upper center", bbox_to_anchor=(0.5, 1.24), ncols=2)
         scales.grid(axes, "y")
 
-    last = "; ".join(f"{key} {_ratios(found, key)[-1]:.2g}" for key in keys)
+    last = "; ".join(f"{key} {numbers.number(_ratios(found, key)[-1], 2)}" for key in keys)
     return draw("fig-after", "Sigma over what is asked", f"after the last leg {last}",
                 (WIDTH, 260.0), build)  # fmt: skip
 

@@ -136,7 +136,8 @@ def _against(
     unit = "s" if covariate == "time" else UNITS[covariate]
     for word, found in (("before", before), ("after", after)):
         for middle, size in found:
-            tell(axes, middle, size, [(covariate.replace("_", " "), f"{middle:.3g} {unit}"),
+            where = f"{numbers.number(middle, 3)} {unit}"
+            tell(axes, middle, size, [(covariate.replace("_", " "), where),
                  ("Residuals", word), ("RMS", numbers.length(size, 3))])  # fmt: skip
     axes.set_xlabel(f"{covariate.replace('_', ' ')} [{unit}]")
     axes.set_ylabel("RMS")
@@ -162,11 +163,14 @@ def spectrum(found: Spectrum, name: str = "fig-spectrum") -> InlineFigure:
                   linewidth=1.4, label="what is left")  # fmt: skip
         axes.axhline(1.0, color=INK, linewidth=0.8)
         for hertz, power, most in zip(found.frequency_hz, found.power, found.most, strict=True):
-            tell(axes, hertz, power, [("Frequency", f"{hertz:.3g} Hz"), ("Power", f"{power:.3g}"),
-                 ("White noise seldom exceeds", f"{most:.3g}")])  # fmt: skip
+            tell(axes, hertz, power, [("Frequency", f"{numbers.number(hertz, 3)} Hz"),
+                 ("Power", numbers.number(power, 3)),
+                 ("White noise seldom exceeds", numbers.number(most, 3))])  # fmt: skip
         axes.set_xscale("log")
         low, high = found.frequency_hz[0], found.frequency_hz[-1]
-        scales.set_ticks(axes, "x", scales.one_two_five(low, high)[::2], lambda v: f"{v:g}")
+        scales.set_ticks(
+            axes, "x", scales.one_two_five(low, high)[::2], lambda v: numbers.number(v, 6)
+        )
         axes.set_ylim(0.0, 1.1 * max(*found.power, *found.most))
         axes.set_xlabel("frequency [Hz]")
         axes.set_ylabel("power over white noise's")
@@ -175,8 +179,9 @@ def spectrum(found: Spectrum, name: str = "fig-spectrum") -> InlineFigure:
 
     top = max(range(len(found.power)), key=lambda k: found.power[k] / found.most[k])
     spoken = (
-        f"Highest against what white noise seldom exceeds at {found.frequency_hz[top]:.3g} Hz: "
-        f"{found.power[top]:.3g} of {found.most[top]:.3g}"
+        f"Highest against what white noise seldom exceeds at "
+        f"{numbers.number(found.frequency_hz[top], 3)} Hz: "
+        f"{numbers.number(found.power[top], 3)} of {numbers.number(found.most[top], 3)}"
     )
     return draw(name, "Spectrum of what is left", spoken, (WIDTH, 260.0), build)
 
@@ -191,15 +196,16 @@ def normal(found: NormalPlot, name: str = "fig-normal") -> InlineFigure:
         axes.plot(found.normal, found.remainder, color=SERIES[0], marker="o", markersize=3.5,
                   linewidth=1.2, label="what is left")  # fmt: skip
         for normal_at, at in zip(found.normal, found.remainder, strict=True):
-            tell(axes, normal_at, at, [("Standard normal", f"{normal_at:.2f}"),
-                 ("What is left", f"{at:.2f}")])  # fmt: skip
+            tell(axes, normal_at, at, [("Standard normal", numbers.places(normal_at, 2)),
+                 ("What is left", numbers.places(at, 2))])  # fmt: skip
         axes.set_xlabel("quantile of the standard normal")
         axes.set_ylabel("quantile, in its own sigma")
         axes.legend(loc="upper left")
         scales.grid(axes)
 
-    spoken = (
-        f"At {found.normal[0]:.2f} and {found.normal[-1]:+.2f} the remainder is at "
-        f"{found.remainder[0]:.2f} and {found.remainder[-1]:+.2f}"
+    normal, rest = (
+        f"{numbers.places(row[0], 2)} and {numbers.places(row[-1], 2, sign=True)}"
+        for row in (found.normal, found.remainder)
     )
+    spoken = f"At {normal} the remainder is at {rest}"
     return draw(name, "Normal plot of what is left", spoken, (WIDTH, 300.0), build)

@@ -177,7 +177,7 @@ def _accuracies(axes: Axes, shown: Sequence[GridPoint]) -> None:
     axes.legend(loc="lower right")
     axes.set_ylabel("accuracy 1/error [1/m]")
     low, high = axes.get_ylim()
-    scales.set_ticks(axes, "y", scales.log_ticks(low, high), lambda v: f"{v:g}")
+    scales.set_ticks(axes, "y", scales.log_ticks(low, high), lambda v: numbers.number(v, 6))
     scales.inverse_axis(axes, "x", "timestamp error \u03c4", scales.short_time)
 
 

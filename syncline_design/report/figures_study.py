@@ -86,7 +86,7 @@ def _cell(
 
 
 def _thousands(cost: float) -> str:
-    return f"{cost / 1000:.4g}k" if cost >= 10_000 else numbers.count(cost)
+    return f"{numbers.number(cost / 1000, 4)}k" if cost >= 10_000 else numbers.count(cost)
 
 
 def _label_axis(axes: Axes, which: str, labels: Sequence[str]) -> None:
@@ -230,7 +230,7 @@ def _scatter_axis(axes: Axes, which: Literal["x", "y"], axis: ScatterAxis) -> No
     elif axis.log:
         (axes.set_xscale if which == "x" else axes.set_yscale)("log")
         low, high = axes.get_xlim() if which == "x" else axes.get_ylim()
-        scales.set_ticks(axes, which, scales.log_ticks(low, high), lambda p: f"{p:g}")
+        scales.set_ticks(axes, which, scales.log_ticks(low, high), lambda p: numbers.number(p, 6))
 
 
 def _strength(cost: float | None, costs: Sequence[float]) -> float:

@@ -33,18 +33,21 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineFigure:
         axes = add_axes(figure)
         axes.plot(numbers_of, values, marker="o", markersize=3.5, color=SERIES[0])
         for run, value in zip(numbers_of, values, strict=True):
-            tell(axes, run, value, [("Run", str(run)), ("e-value", f"{value:.3g}")])
+            tell(axes, run, value, [("Run", str(run)), ("e-value", numbers.number(value, 3))])
         axes.axhline(threshold, color=MUTED, linewidth=1.0, linestyle=(0, (5, 3)))
         axes.set_yscale("log")
         low, high = 0.7 * min(values), 2.0 * max(*values, threshold)
         axes.set_ylim(low, high)
-        scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), lambda v: f"{v:g}")
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high, 6), lambda v: numbers.number(v, 6))
         _whole_ticks(axes, numbers_of)
         axes.set_xlabel("run")
         axes.set_ylabel("e-value")
         scales.grid(axes, "y")
 
-    spoken = f"{e_value_text(values[-1])} after run {numbers_of[-1]}, alarm from {threshold:.3g} on"
+    spoken = (
+        f"{e_value_text(values[-1])} after run {numbers_of[-1]}, alarm from "
+        f"{numbers.number(threshold, 3)} on"
+    )
     return draw("fig-evidence", "Evidence for a change", spoken, (WIDTH, 220.0), build)
 
 
@@ -74,8 +77,9 @@ def _panel(axes: Axes, runs: Sequence[WatchedRun], key: Key, since: int | None) 
         low, high = v.interval95 or (0.0, 0.0)
         tell(axes, run, v.value / scale, [
             ("Run", str(run)), ("Effect", f"{key[0].replace('_', ' ')} ({key[1]})"),
-            ("Value", f"{v.value / scale:.4g} {unit}"),
-            ("95 % interval", f"{low / scale:.4g} to {high / scale:.4g} {unit}"),
+            ("Value", f"{numbers.number(v.value / scale, 4)} {unit}"),
+            ("95 % interval", f"{numbers.number(low / scale, 4)} to "
+                              f"{numbers.number(high / scale, 4)} {unit}"),
         ])  # fmt: skip
         axes.plot([run, run], [low / scale, high / scale], color=colour, linewidth=1.2)
     axes.plot([run for run, _ in shown], [v.value / scale for _, v in shown], "o", color=colour,

@@ -6,7 +6,13 @@ import math
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
-from syncline_design.model.figure_text import format_duration, format_estimate, format_quantity
+from syncline_design.model import figure_text
+from syncline_design.model.figure_text import (
+    format_duration,
+    format_estimate,
+    format_quantity,
+    to_places,
+)
 from syncline_design.model.quantity import Dimension
 from syncline_design.model.written import beside, limit_as_written
 
@@ -116,6 +122,16 @@ def to_the_cent(value: Any, currency: str) -> str:
 def number(value: Any, digits: int = 4) -> str:
     """A plain number."""
     return _shown(value, Dimension.DIMENSIONLESS, digits)
+
+
+def places(value: float, decimals: int, sign: bool = False) -> str:
+    """So many decimals, typeset: figures of a column, or of one unit, beside one another."""
+    return typeset(to_places(value, decimals, sign))
+
+
+def signed(value: float, digits: int = 4) -> str:
+    """A plain number with its sign, typeset."""
+    return typeset(figure_text.signed(value, digits))
 
 
 def count(value: Any) -> str:

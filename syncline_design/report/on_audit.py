@@ -182,7 +182,7 @@ def _when(fault: StampFault) -> str:
 
 
 def _clock(seconds: float) -> str:
-    return f"{seconds:.2f}\N{NO-BREAK SPACE}s"
+    return f"{numbers.places(seconds, 2)}\N{NO-BREAK SPACE}s"
 
 
 def _charts(result: Audit) -> Iterator[Node]:

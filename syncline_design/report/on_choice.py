@@ -102,7 +102,11 @@ def _sentences(found: Optimised) -> list[str]:
 def _proof(result: Optimisation, objective: str) -> str:
     proof, size = result.proof, _size(result.combinations or "")
     if not proof.optimal:
-        gap = "" if proof.gap is None else f": the optimum is at most {100 * proof.gap:.3g} % lower"
+        gap = (
+            ""
+            if proof.gap is None
+            else f": the optimum is at most {numbers.number(100 * proof.gap, 3)} % lower"
+        )
         return (
             f"Found among {size} combinations by {objective} within the time limit, rechecked "
             f"exactly, not proven optimal{gap}."
@@ -119,7 +123,7 @@ def _proof(result: Optimisation, objective: str) -> str:
 
 def _size(combinations: str) -> str:
     """How many combinations there are: plain up to a million, then as a power."""
-    return combinations if len(combinations) < 7 else f"{int(combinations):.2e}"
+    return combinations if len(combinations) < 7 else numbers.number(float(combinations), 3)
 
 
 def incomplete_lines(result: Optimisation) -> list[str]:

@@ -100,10 +100,10 @@ def _drive(plan: NextDrive | None) -> list[Node]:
     """The test drive for a class, in short, and the command that prints it whole."""
     if plan is None:
         return []
-    length = numbers.typeset(f"{plan.minutes:.2g} min")
+    length = numbers.typeset(f"{numbers.number(plan.minutes, 2)} min")
     words = f"This log cannot tell {plan.first} from {plan.second}. A drive of {length} does:"
     if not plan.reached:
-        least = numbers.typeset(f"{plan.least_minutes or plan.minutes:.2g} min")
+        least = numbers.typeset(f"{numbers.number(plan.least_minutes or plan.minutes, 2)} min")
         words = f"This log cannot tell {plan.first} from {plan.second}. It takes {least} of:"
     targets = f", over {plan.targets} surveyed targets" if plan.targets else ""
     more = f"Whole, with waypoints{targets}: "
@@ -121,7 +121,7 @@ def outcome_of(found: Diagnosis) -> Outcome:
     known, times = DIAGNOSES[found.verdict], _times_expected(found.gap)
     if found.verdict != "explained" or times <= LARGE:
         return known
-    more = f"{known.word}, {times:.2g} times what the spec expects"
+    more = f"{known.word}, {numbers.number(times, 2)} times what the spec expects"
     return Outcome(known.tone, known.mark, more)
 
 
@@ -322,9 +322,9 @@ def rival_text(one: Rival, *, alike: bool = False) -> str:
     if one.nats_worse >= 0.0:
         kept = "" if one.refitted else " with the noise kept"
         other = ", of another signature" if alike and one.cosine <= SAME else ""
-        return f"{_effect_text(one)}{other}, {one.nats_worse:.3g} nat worse{kept}"
+        return f"{_effect_text(one)}{other}, {numbers.number(one.nats_worse, 3)} nat worse{kept}"
     if not one.possible:
-        better = f"{-one.nats_worse:.3g} nat better"
+        better = f"{numbers.number(-one.nats_worse, 3)} nat better"
         why = "but only with impossible values"
         if registry()[one.effect].spread is not None:
             why = "but this log does not scatter as it would have to"
@@ -366,7 +366,10 @@ def _regime_text(one: Regime) -> str:
     """`along track at speed 6.3 m/s to 9 m/s: mean -652 mm, 508 standard errors`."""
     low, high = (numbers.si_quantity(end, one.unit, 3) for end in (one.low, one.high))
     place = f"{one.axis}, {_spaced(one.covariate)} {low} to {high}"
-    return f"{place}: mean {rms_length(one.mean_m)}, {abs(one.score):.3g} standard errors"
+    return (
+        f"{place}: mean {rms_length(one.mean_m)}, {numbers.number(abs(one.score), 3)} "
+        f"standard errors"
+    )
 
 
 def _design(design: DesignMeaning | None) -> list[Node]:

@@ -90,8 +90,8 @@ def _placebo_text(gap: WholeGap) -> str:
     saved, placebo = gap.nll_saved_per_sample, gap.placebo
     if placebo.nll_saved_per_sample is None or saved is None:
         return ""
-    change = numbers.typeset(f"{placebo.nll_saved_per_sample.value - saved.value:+.4f} nat")
-    return f"Adding {placebo.added} as well, which was not chosen: {change} per sample."
+    change = numbers.places(placebo.nll_saved_per_sample.value - saved.value, 4, sign=True)
+    return f"Adding {placebo.added} as well, which was not chosen: {change} nat per sample."
 
 
 def _gap_chart(found: Diagnosis) -> list[Node]:

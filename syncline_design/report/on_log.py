@@ -154,7 +154,7 @@ def _moment(one: InspectedStream, end: str) -> str:
     seconds = one.first if end == "first" else one.last
     if dated is not None:
         return dated[:-3]
-    return "\u2013" if seconds is None else f"{seconds:.6f} s"
+    return "\u2013" if seconds is None else f"{numbers.places(seconds, 6)} s"
 
 
 def _times(one: InspectedStream) -> str:

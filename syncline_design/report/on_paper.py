@@ -132,7 +132,7 @@ def _matrix_cell(cell: Printed | None) -> Cell:
 def _computed(cell: Printed) -> str:
     """The computed figure: five digits, or one decimal more than printed if that is more."""
     decimals = len(cell.printed_text.split(" ")[0].partition(".")[2])
-    five, one_more = f"{cell.computed:.5g}", f"{cell.computed:.{decimals + 1}f}"
+    five, one_more = numbers.number(cell.computed, 5), numbers.places(cell.computed, decimals + 1)
     return numbers.typeset(f"{max(five, one_more, key=len)} {cell.unit}")
 
 

@@ -71,13 +71,16 @@ def _outcome(found: Plan) -> Outcome:
         return Outcome("good", "\u2713", f"Reached by {legs} in {length}")
     if found.least_minutes is None:
         return Outcome("bad", "\u2717", "Not reachable: no drive of this platform tells it")
-    return Outcome("bad", "\u2717", f"Not reachable in {found.minutes:g} min")
+    return Outcome("bad", "\u2717", f"Not reachable in {numbers.number(found.minutes, 6)} min")
 
 
 def _sentences(found: Plan) -> Iterator[str]:
     if not found.reached and found.least_minutes is not None:
         least = _minutes(_upwards(found.least_minutes))
-        yield f"The least that is enough: {least}. Below is the best for {found.minutes:g} min."
+        yield (
+            f"The least that is enough: {least}. Below is the best for "
+            f"{numbers.number(found.minutes, 6)} min."
+        )
     for words in found.inseparable:
         yield f"No drive of this platform tells {words} apart."
     if found.reached and not found.confused:
@@ -92,8 +95,12 @@ def _sentences(found: Plan) -> Iterator[str]:
 def _minutes(minutes: float) -> str:
     """`2.8 min`, `130 min`, `12 h`."""
     if minutes >= 600.0:
-        return numbers.typeset(f"{minutes / 60.0:.0f} h")
-    return numbers.typeset(f"{minutes:.0f} min" if minutes >= 10.0 else f"{minutes:.2g} min")
+        return numbers.typeset(f"{numbers.places(minutes / 60.0, 0)} h")
+    return numbers.typeset(
+        f"{numbers.places(minutes, 0)} min"
+        if minutes >= 10.0
+        else f"{numbers.number(minutes, 2)} min"
+    )
 
 
 def _upwards(minutes: float) -> float:
@@ -242,7 +249,7 @@ def _open(found: Plan) -> list[Node]:
 
 
 def _log(found: Plan) -> list[Node]:
-    rate = numbers.typeset(f"{found.rate_hz:.4g} Hz")
+    rate = numbers.typeset(f"{numbers.number(found.rate_hz, 4)} Hz")
     return [
         Text(("Columns: ", code(", ".join(found.columns)))),
         Text(f"Rows: {rate}, from the first leg to the last."),
@@ -257,7 +264,7 @@ def _targets(found: Plan) -> list[Node]:
         "frame of the drive, whose origin is below its start."
     )
     rows: list[tuple[Cell | str, ...]] = [
-        (str(t.id), *(Cell(f"{v:.1f}", v) for v in (t.north_m, t.east_m, t.down_m)))
+        (str(t.id), *(Cell(numbers.places(v, 1), v) for v in (t.north_m, t.east_m, t.down_m)))
         for t in found.targets
     ]
     heads = ("Target", "North, m #", "East, m #", "Down, m #")

@@ -182,7 +182,7 @@ def _spec(result: TimingAndSpec) -> list[Node]:
         asked, share = means.asked_coverage, result.claim.coverage
         nodes.append(Text(
             f"The bound is claimed {coverage_words(share, asked)}: measure with "
-            f"--coverage {asked:.4g}.",
+            f"--coverage {numbers.number(asked, 4)}.",
             mark="!", tone="warn",
         ))  # fmt: skip
     if means.after is not None and means.tau_s is not None and means.measured_tau_s is not None:

@@ -152,7 +152,7 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     if figures is not None and figures.quantile95_3d_m is not None:
         facts.append(("95 % of errors within", numbers.error(figures.quantile95_3d_m, limit)))
     if figures is not None and figures.worst_case_m is not None:
-        at = f"Worst case at {figures.worst_case_k:g} \u03c3"
+        at = f"Worst case at {numbers.number(figures.worst_case_k, 6)} \u03c3"
         facts.append((at, numbers.error(figures.worst_case_m, limit)))
     row = verdict_words.tightest(verdict.requirements)
     if row is not None:

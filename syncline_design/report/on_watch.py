@@ -119,7 +119,7 @@ def _parameter(one: Alarm) -> str:
 def _facts(found: Watch) -> Iterator[tuple[str, str]]:
     if found.e_value is not None:
         yield "Evidence for a change", f"e-value {e_value_text(found.e_value)}"
-        yield "Alarm", f"from {found.rule.threshold:.3g} on, at any look"
+        yield "Alarm", f"from {numbers.number(found.rule.threshold, 3)} on, at any look"
     yield "Runs", str(len(found.runs))
     if found.baseline_after:
         yield "Baseline", f"after run {found.baseline_after}"

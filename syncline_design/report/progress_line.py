@@ -6,6 +6,8 @@ import sys
 import time
 from typing import TYPE_CHECKING, TextIO
 
+from syncline_design.report import numbers
+
 if TYPE_CHECKING:
     from syncline_design.studies.result import Progress
 
@@ -50,7 +52,7 @@ class StepLine:
         if not self._live or elapsed_s < SILENT_S or elapsed_s - self._last < ON_TERMINAL_S:
             return
         self._last, self._shown = elapsed_s, True
-        self._stream.write(f"\r\x1b[2K{doing or 'working'} ({elapsed_s:.0f} s)")
+        self._stream.write(f"\r\x1b[2K{doing or 'working'} ({numbers.places(elapsed_s, 0)} s)")
         self._stream.flush()
 
     def clear(self) -> None:

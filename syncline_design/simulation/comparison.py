@@ -7,13 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from syncline_design.model.figure_text import rounded, to_digits, to_places
 from syncline_design.model.system import System
 from syncline_design.simulation.bounds import StageBound, chain_bounds
 from syncline_design.simulation.results import ComparisonRow, WorstCase
 from syncline_design.simulation.settings import demand_simulable
 from syncline_design.simulation.worst_case import worst_cases
 
-DEFAULT_GRID_S = tuple(float(f"{tau:.6g}") for tau in np.logspace(-6, 0, 25))
+DEFAULT_GRID_S = tuple(rounded(tau, 6) for tau in np.logspace(-6, 0, 25))
 CLOSE = 0.02  # a ratio this near to 1 needs no reason
 WORTH_SAYING = 0.005  # parts of the Syncline below this are left out of a reason
 CAUSES = {
@@ -54,11 +55,11 @@ def reason(system: System, found: WorstCase) -> tuple[str, tuple[str, ...]]:
     """(words, causes): where the worst case leaves the Syncline and why."""
     ratio = found.ratio_to_syncline
     if abs(ratio - 1.0) <= CLOSE:
-        return f"within {100 * CLOSE:g} % of the Syncline", ()
+        return f"within {to_digits(100 * CLOSE)} % of the Syncline", ()
     parts = sorted(_parts(system, found), reverse=True)
     told = [(cause, text) for share, cause, text in parts if share > WORTH_SAYING]
     side = "above" if ratio > 1.0 else "below"
-    words = f"{100 * abs(ratio - 1.0):.1f} % {side} the Syncline"
+    words = f"{to_places(100 * abs(ratio - 1.0), 1)} % {side} the Syncline"
     if told:
         words += f": {'; '.join(text for _, text in told)}"
     return words, tuple(cause for cause, _ in told)
@@ -74,14 +75,15 @@ def _parts(system: System, found: WorstCase) -> list[tuple[float, str, str]]:
     leaning = math.fsum(part.tilt_m for part in bounds) / whole
     turn = max(stage.platform.omega_max_radps for stage in system.stages) * found.tau_s
     return [
-        (lever, "lever_arm", f"{CAUSES['lever_arm']} (up to {100 * lever:.1f} %)"),
+        (lever, "lever_arm", f"{CAUSES['lever_arm']} (up to {to_places(100 * lever, 1)} %)"),
         (
             bent,
             "chord",
-            f"{CAUSES['chord']} (a turn of {math.degrees(turn):.0f} deg, {100 * bent:.1f} %)",
+            f"{CAUSES['chord']} (a turn of {to_places(math.degrees(turn), 0)} deg, "
+            f"{to_places(100 * bent, 1)} %)",
         ),
-        (lost, "range_noise", f"{CAUSES['range_noise']} ({100 * lost:.1f} %)"),
-        (leaning, "tilt", f"{CAUSES['tilt']} (up to {100 * leaning:.1f} %)"),
+        (lost, "range_noise", f"{CAUSES['range_noise']} ({to_places(100 * lost, 1)} %)"),
+        (leaning, "tilt", f"{CAUSES['tilt']} (up to {to_places(100 * leaning, 1)} %)"),
     ]
 
 

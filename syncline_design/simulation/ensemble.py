@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from syncline_design.effects.acting import acting_of, implied, listed, tilts
-from syncline_design.model.figure_text import format_duration
+from syncline_design.model.figure_text import format_duration, to_digits
 from syncline_design.model.system import System
 from syncline_design.simulation.draws import entering
 from syncline_design.simulation.results import Ensemble
@@ -53,10 +53,10 @@ def _over_the_horizon(system: System, envelope: str) -> list[str]:
     horizon = system.horizon
     drawn = [
         f"time since the start up to {format_duration(horizon.duration_s)}",
-        f"place within {horizon.extent_m:g} m",
+        f"place within {to_digits(horizon.extent_m)} m",
     ]
     if envelope != "trajectory" and tilts(system):
-        drawn.append(f"tilt up to {math.degrees(horizon.tilt_rad):g} deg")
+        drawn.append(f"tilt up to {to_digits(math.degrees(horizon.tilt_rad))} deg")
     return drawn
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from syncline_design.effects.acting import by_stage
 from syncline_design.effects.kinematics import bearing, rotate
 from syncline_design.effects.record import Array
-from syncline_design.model.figure_text import format_duration
+from syncline_design.model.figure_text import format_duration, to_digits
 from syncline_design.model.system import Stage, System
 from syncline_design.simulation.settings import SimulationSettings
 from syncline_design.simulation.track import Track
@@ -119,5 +119,7 @@ def _over(
     stage: Stage, does: str, found: float, allowed: float, unit: str, size: float = 1.0
 ) -> str:
     """`uav moves at up to 12 m/s, 10 is allowed for`."""
-    much = f"up to {found / size:.6g} {unit}, {allowed / size:.6g} is allowed for"
+    much = (
+        f"up to {to_digits(found / size, 6)} {unit}, {to_digits(allowed / size, 6)} is allowed for"
+    )
     return f"{stage.name} {does} {much}"

@@ -27,6 +27,7 @@ from syncline_design.effects.kinematics import bearing, euler_to_rotation, rotat
 from syncline_design.effects.record import Array, StageRows
 from syncline_design.machine.input_files import FileContent, UnsuitableError, read_plain
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits, to_places
 from syncline_design.model.system import Platform, SimulationError, Stage, System
 from syncline_design.simulation import known_effects
 from syncline_design.simulation.chain import ChainNoise
@@ -184,8 +185,9 @@ def stage_track(system: System, settings: SimulationSettings, index: int) -> Tra
     path, track = file.path, _file_track(file, prefix)
     if track.time_s[-1] - track.time_s[0] <= 2.0 * margin:
         raise SimulationError(
-            f"{path}: the trajectory lasts {track.time_s[-1] - track.time_s[0]:g} s, expected more "
-            f"than {2 * margin:g} s, twice the largest timestamp error"
+            f"{path}: the trajectory lasts {to_digits(track.time_s[-1] - track.time_s[0])} s, "
+            f"expected more "
+            f"than {to_digits(2 * margin)} s, twice the largest timestamp error"
         )
     return track
 
@@ -274,7 +276,8 @@ def _file_track(file: FileContent, prefix: str) -> Track:
     if np.any(steps > _LARGEST_STEP_RAD):
         row = int(np.argmax(steps > _LARGEST_STEP_RAD)) + 2
         raise SimulationError(
-            f"{path}:{row + 1}: the attitude turns by {math.degrees(steps[row - 2]):.0f} deg from "
+            f"{path}:{row + 1}: the attitude turns by "
+            f"{to_places(math.degrees(steps[row - 2]), 0)} deg from "
             "the row before; expected at most 90 deg; sample the trajectory faster"
         )
     velocity = np.gradient(position, time_s, axis=0)

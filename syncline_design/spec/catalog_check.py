@@ -18,7 +18,7 @@ from typing import Annotated, Any, Final, Literal
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, optional
 from syncline_design.model.conversion import conversion_of, printed_value
-from syncline_design.model.figure_text import format_like
+from syncline_design.model.figure_text import format_like, to_digits
 from syncline_design.model.quantity import UnitError
 from syncline_design.spec.catalog import SECTIONS, Catalog, Entry, Product, SensorEntry
 from syncline_design.spec.facts import (
@@ -297,7 +297,7 @@ def _siblings(
             ratio = max(value / middle, middle / value)
             way = "more" if value > middle else "less"
             message = (
-                f"{ratio:.3g} times {way} than the median of {len(others)} others "
+                f"{to_digits(ratio, 3)} times {way} than the median of {len(others)} others "
                 f"of type {entry.type}"
             )
             hint = f"look at the unit; if it is right, say why: unusual: {{{key}: ...}}"

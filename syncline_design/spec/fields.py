@@ -22,6 +22,7 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.quantity import (
     EXAMPLES,
     UNITS,
@@ -147,7 +148,9 @@ def read_number(value: Any, lowest: float | None = None, above: bool = False) ->
         raise refusal(error.message, error.expected, error.found, error.hint) from None
     if lowest is not None and not (number > lowest if above else number >= lowest):
         raise refusal(
-            "out of range", f"{'more than' if above else 'at least'} {lowest:g}", number.text
+            "out of range",
+            f"{'more than' if above else 'at least'} {to_digits(lowest)}",
+            number.text,
         )
     return number
 

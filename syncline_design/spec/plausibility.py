@@ -13,7 +13,7 @@ from statistics import median
 from typing import Final
 
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.figure_text import format_quantity, to_digits
 from syncline_design.model.quantity import Dimension, Quantity
 from syncline_design.model.roles import ROLES
 from syncline_design.spec.case import Candidate, Case, StageCase
@@ -73,7 +73,10 @@ def _changed(key: str, value: Quantity, base: PlatformEntry) -> str:
     ratio = max(value / was, was / value)
     way = "times" if value > was else "times less than"
     shown = getattr(was, "text", format_quantity(was, FIGURES[key]))
-    return f"is {ratio:.3g} {way} the {shown} of the platform that it changes{_slip(value, was)}"
+    return (
+        f"is {to_digits(ratio, 3)} {way} the {shown} of the platform that it "
+        f"changes{_slip(value, was)}"
+    )
 
 
 def _unheard(key: str, value: Quantity, others: Iterable[PlatformEntry]) -> str:
@@ -86,7 +89,10 @@ def _unheard(key: str, value: Quantity, others: Iterable[PlatformEntry]) -> str:
     if value <= most * FACTOR and not slip:
         return ""
     shown = format_quantity(most, FIGURES[key])
-    return f"is {value / most:.3g} times the most of any platform in the catalogs, {shown}{slip}"
+    return (
+        f"is {to_digits(value / most, 3)} times the most of any platform in the catalogs, "
+        f"{shown}{slip}"
+    )
 
 
 def _slip(value: Quantity, usual: float) -> str:
@@ -137,6 +143,7 @@ def _noise(name: str, entry: SensorEntry) -> Iterator[Implausible]:
             shown = [format_quantity(figure, dimension) for figure in (value, middle)]
             yield Implausible(
                 name, key,
-                f"{name}: {key} {shown[0]} is {ratio:.3g} times {way} than usual: the median of "
+                f"{name}: {key} {shown[0]} is {to_digits(ratio, 3)} times {way} than usual: the "
+                f"median of "
                 f"{len(others)} sensors of type {entry.type} is {shown[1]}",
             )  # fmt: skip

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from pydantic import field_validator as reads_field
 from pydantic_core import PydanticCustomError
 
+from syncline_design.model.figure_text import to_digits
 from syncline_design.model.horizon import DEFAULT_HORIZON, Horizon
 from syncline_design.model.quantity import CURRENCIES, Quantity
 from syncline_design.spec.choices import MethodChoice, StageChoice, one_or_candidates
@@ -93,7 +94,9 @@ class HorizonChoice(FileRecord):
     @classmethod
     def _is_flown_upright(cls, value: float) -> float:
         if value > MOST_TILT_RAD * (1.0 + 1e-12):
-            raise refusal("out of range", "at most 80 deg", f"{math.degrees(value):.6g} deg")
+            raise refusal(
+                "out of range", "at most 80 deg", f"{to_digits(math.degrees(value), 6)} deg"
+            )
         return value
 
     def horizon(self) -> Horizon:

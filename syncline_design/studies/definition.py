@@ -160,7 +160,7 @@ class ValueSpan:
             figure = math.exp(math.log(low) + share * (math.log(high) - math.log(low)))
         else:
             figure = low + share * (high - low)
-        text = f"{figure:.{FIGURES}g}"
+        text = f"{figure:.{FIGURES}g}"  # YAML of a spec
         return f"{text} {self.unit}" if self.unit else plain_scalar(text)
 
 

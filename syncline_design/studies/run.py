@@ -12,6 +12,7 @@ from syncline_design.choice.outcome import NoVerdict
 from syncline_design.machine.deadline import Deadline, OutOfTime, in_force, within
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import read_as
+from syncline_design.model.figure_text import to_digits
 from syncline_design.studies.case import CaseSettings, case_keys
 from syncline_design.studies.cluster import ClusterError, run_on_cluster
 from syncline_design.studies.inputs import Looked, full_key
@@ -170,7 +171,7 @@ class _Run:
 
     def out_of_time(self) -> str:
         """How far the study came within the time limit."""
-        limit = f"the time limit of {in_force().limit_s:g} s was reached"
+        limit = f"the time limit of {to_digits(in_force().limit_s or 0.0)} s was reached"
         if self.done is None:
             return f"{limit} before the first case"
         done, total = self.done

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from syncline_design.choice.outcome import Proof
 from syncline_design.effects import registry
 from syncline_design.model.budget import differs
-from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.figure_text import format_quantity, to_digits
 from syncline_design.model.quantity import Dimension
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
@@ -128,7 +128,7 @@ def _lever_arm(verified: Verified) -> Iterator[Caution]:
                 "lever-arm",
                 f"{row.stage}.{row.role}: with the lever arm, tau_crit is "
                 f"{_time(row.tau_crit_lever_arm_s)} instead of {_time(row.tau_crit_s)} "
-                f"(the paper's figure is optimistic by a factor of {ratio:.3g}){broken}",
+                f"(the paper's figure is optimistic by a factor of {to_digits(ratio, 3)}){broken}",
             )
     lever = figures.lever_arm
     if differs(figures.total_m, lever.total_m):
@@ -190,7 +190,8 @@ def _coverage(verified: Verified) -> Iterator[Caution]:
     if k < LEAST_COVERAGE and (normal or jitter):
         yield Caution(
             "coverage-factor",
-            f"coverage_factor {k:g}: {100.0 * math.erfc(k / math.sqrt(2.0)):.3g} % of normal "
+            f"coverage_factor {to_digits(k)}: "
+            f"{to_digits(100.0 * math.erfc(k / math.sqrt(2.0)), 3)} % of normal "
             "timestamp errors lie beyond the bound that tau is made of; with 3 it is 0.27 %",
         )
 
@@ -272,6 +273,6 @@ def _incomplete(case: Case) -> Iterator[Caution]:
 def unproven(proof: Proof) -> Iterator[Caution]:
     """What the time limit left open about a design that meets."""
     if not proof.optimal:
-        gap = "" if proof.gap is None else f" (by {100 * proof.gap:.3g} % at most)"
+        gap = "" if proof.gap is None else f" (by {to_digits(100 * proof.gap, 3)} % at most)"
         message = f"the time limit ended the search: a better design than this may exist{gap}"
         yield Caution("not-proven-optimal", message)

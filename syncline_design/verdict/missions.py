@@ -16,6 +16,7 @@ from syncline_design.choice.problem import selection_of, with_everything
 from syncline_design.choice.table import Design, Problem
 from syncline_design.machine.deadline import Pieces, in_force
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import percent, to_digits
 from syncline_design.spec.case import Case, Mission
 from syncline_design.spec.references import names_candidates
 from syncline_design.spec.selection import Selection
@@ -168,8 +169,9 @@ def _with_probability(work: Work, chosen: Chosen, found: Verdict) -> Verdict:
     row = decided(
         id=SHARE, kind="failing_share", status=one.status, value=1.0 - one.value,
         limit=1.0 - work.likelihood.asked, unit="1", implied=True,
-        note=f"{one.samples} samples of the datasheet figures, with {CONFIDENCE:.1%} confidence "
-        f"between {1.0 - one.high:.3g} and {1.0 - one.low:.3g}",
+        note=f"{one.samples} samples of the datasheet figures, with {percent(CONFIDENCE)} "
+             f"confidence "
+        f"between {to_digits(1.0 - one.high, 3)} and {to_digits(1.0 - one.low, 3)}",
     )  # fmt: skip
     word = min((found.verdict, word_of([row])), key=lambda word: _WORST_FIRST[word])
     warnings = found.warnings
@@ -278,7 +280,10 @@ def _at_worst(row: RequirementResult, given: RequirementResult | None) -> Requir
     if given is None or given.value is None or given.value == row.value:
         return row
     unit = "" if given.unit == "1" else f" {given.unit}"
-    told = f"at the worst end of the datasheet intervals; {given.value:.6g}{unit} at given figures"
+    told = (
+        f"at the worst end of the datasheet intervals; {to_digits(given.value, 6)}{unit} at "
+        f"given figures"
+    )
     return replace(row, note="; ".join(part for part in (row.note, told) if part))
 
 

@@ -19,6 +19,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
+from syncline_design.model.figure_text import to_digits
 from syncline_design.spec.case import Case
 from syncline_design.spec.selection import Selection
 
@@ -139,7 +140,10 @@ def _standing(case: Case, stage: Any, name: str, sensor: Any) -> Iterator[str]:
     yield from _sold(case, name, sensor)
     yield from _warm(name, sensor, choice)
     if choice.depth and sensor.depth_rating is not None and choice.depth > sensor.depth_rating:
-        yield f"{name} stands {sensor.depth_rating:g} m, {choice.name} is {choice.depth:g} m deep"
+        yield (
+            f"{name} stands {to_digits(sensor.depth_rating)} m, {choice.name} is "
+            f"{to_digits(choice.depth)} m deep"
+        )
     if sensor.modality == "ranging":
         yield from _path(stage, name, sensor)
         yield from _directions(choice, name, sensor)
@@ -235,10 +239,10 @@ def _path(stage: Any, name: str, sensor: Any) -> Iterator[str]:
     if reach is None:
         return
     if reach.min is not None and nearest < reach.min:
-        yield f"{name} begins at {reach.min:g} m, {where} is {nearest:g} m away"
+        yield f"{name} begins at {to_digits(reach.min)} m, {where} is {to_digits(nearest)} m away"
     known = _told_reach(stage.choice.reflectivity, reach)[1]
     if known is not None and distance > known:
-        yield f"{name} ends at {known:g} m, {where} is {distance:g} m away"
+        yield f"{name} ends at {to_digits(known)} m, {where} is {to_digits(distance)} m away"
 
 
 def _told_reach(reflectivity: float | None, reach: Any) -> tuple[float | None, float | None]:

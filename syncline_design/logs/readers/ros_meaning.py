@@ -13,6 +13,7 @@ from typing import Any, Final
 
 from syncline_design.logs.readers.stream import Body, Frame, StaticPose
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 Row = tuple[float, ...]
 NAN: Final = math.nan
@@ -256,7 +257,7 @@ def _static_pose(one: Any) -> StaticPose:
 
 def _arm(one: Any) -> str:
     x, y, z = _vector(one.transform.translation)
-    place = f"x {x:.4g} m, y {y:.4g} m, z {z:.4g} m"
+    place = f"x {to_digits(x, 4)} m, y {to_digits(y, 4)} m, z {to_digits(z, 4)} m"
     child, parent = str(one.child_frame_id)[:60], str(one.header.frame_id)[:60]
     return f"lever arm of {child} in {parent} (forward, left, up): {place}"
 

@@ -25,6 +25,7 @@ from syncline_design.logs.readers.epochs import WEEK_S, WEEK_SECONDS, nanosecond
 from syncline_design.logs.readers.reader import BY_SHAPE, NO, Head, Reader
 from syncline_design.logs.readers.stream import Recording
 from syncline_design.logs.refusals import refuse
+from syncline_design.model.figure_text import to_digits
 
 SBET = (
     *("time", "latitude", "longitude", "height", "vx", "vy", "vz"),
@@ -92,7 +93,9 @@ class SbetRecording(BatchRecording):
                     yield table[:end].astype(float)
                 if end < table.shape[0]:
                     time = float(table[end, 0])
-                    self._cut(f"record {rows + 1} cannot be one (time {time:.6g} s)", rows)
+                    self._cut(
+                        f"record {rows + 1} cannot be one (time {to_digits(time, 6)} s)", rows
+                    )
                     return
                 if whole < len(raw):
                     left = len(raw) - whole

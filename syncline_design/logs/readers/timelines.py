@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Timeline
+from syncline_design.model.figure_text import to_places
 
 SECOND: Final = 1_000_000_000
 EARLIEST_NS: Final = 946_684_800 * SECOND  # 2000-01-01: no log that people still have is older
@@ -32,7 +33,7 @@ def timeline_of(stamps: Nanoseconds, claimed: Timeline) -> tuple[Timeline, tuple
         if known.shape[0] > 2 and high - low < LEAST_SPAN_NS:
             return "unknown", (f"stamps of {low} to {high} ns are counts, not times",)
         return "boot", (
-            f"stamps begin at {low / SECOND:.6f} s: since boot or a start, no calendar",
+            f"stamps begin at {to_places(low / SECOND, 6)} s: since boot or a start, no calendar",
         )
     return "unknown", (f"stamps of {low} to {high} ns are no times of this century",)
 

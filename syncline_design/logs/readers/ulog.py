@@ -32,6 +32,7 @@ from syncline_design.logs.readers.ulog_meaning import Meaning, meaning_of
 from syncline_design.logs.refusals import refuse
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_places
 
 MAGIC: Final = b"ULog\x01\x12\x35"
 FORMAT: Final = "PX4 ULog"
@@ -335,7 +336,7 @@ def _clock_notes(topic: _Topic, stamps: Nanoseconds) -> list[str]:
         first, last = calendar(topic.utc[0][1]), calendar(topic.utc[-1][1])
         notes.append(
             f"UTC - boot = {seconds}.{micro:06d} s (median of {len(topic.utc)}, "
-            f"spread {spread:.1f} ms); UTC {first} to {last}"
+            f"spread {to_places(spread, 1)} ms); UTC {first} to {last}"
         )
     if topic.utc_unset:
         notes.append(f"{topic.utc_unset} messages without UTC: no fix yet")
