@@ -14,7 +14,7 @@ import numpy as np
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, scatter, seconds, spread
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import to_digits
+from syncline_design.model.figure_text import percent, to_digits
 
 _LEAST_INTERVALS: Final = 20  # to know a rhythm by
 _MOST_GAPS: Final = 0.05  # of all intervals, or two: more are how the messages come
@@ -248,7 +248,7 @@ def _losses(series: Series, pace: Cadence, lost: Array) -> tuple[StampFault, ...
     return (StampFault(
         "lost_messages", {"count": float(count)}, float(times[places[0]]),
         float(times[places[-1] + 1]),
-        f"{count} of {pace.interval.size + 1 + count} messages ({to_digits(100 * share, 2)} %) "
+        f"{count} of {pace.interval.size + 1 + count} messages ({percent(share, 2)}) "
         f"are missing "
         f"from the rhythm of {to_digits(pace.period_s, 4)} s, {places.size} times",
     ),)  # fmt: skip

@@ -39,7 +39,7 @@ from syncline_design.clocks.tolerance import (
 )
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration, to_digits
+from syncline_design.model.figure_text import format_duration, percent, to_digits
 
 MOST_EVENTS: Final = 1000
 MOST_BINS: Final = 1500
@@ -167,7 +167,7 @@ def _claim(
                else f"{len(counted)} sessions are too few")  # fmt: skip
     elif min(int(np.sum(s.steady)) for s in counted) * (1.0 - settings.coverage) < 1.0:
         why = ("too few samples in a session to say what holds for "
-               f"{to_digits(100.0 * settings.coverage, 6)} % of its time")  # fmt: skip
+               f"{percent(settings.coverage, 6)} of its time")  # fmt: skip
     elif figures.bound_s is None:
         why = "the logs hold nothing that a hard bound could be made of"
     durations = [s.duration_s for s in counted]

@@ -19,7 +19,7 @@ from syncline_design.diagnosis.noise import FACTOR_LIMIT
 from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.figure_text import format_duration, rounded, to_digits
+from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
 
 # what undoes a departure, so that neither the log nor the objects' places show both together
 _ALONE: Final = {
@@ -360,7 +360,7 @@ def _of_platform(one: Assumed, log: LogEvidence) -> Judgement:
 
 def _over(one: Assumed, mean: Beyond) -> Judgement:
     share = mean.share((1.0 + READ) * (one.value or 0.0))
-    words = (f"beyond the limit in {to_digits(100.0 * share, 2)} % of the log, by means over "
+    words = (f"beyond the limit in {percent(share, 2)} of the log, by means over "
              f"{format_duration(rounded(mean.over_s, 2))} and more than the "
              f"readings' noise "
              "can do")  # fmt: skip

@@ -13,7 +13,7 @@ from syncline_design.diagnosis.result import Diagnosis
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record, optional
 from syncline_design.model.budget import SyncModelName
-from syncline_design.model.figure_text import format_duration, format_quantity, to_digits
+from syncline_design.model.figure_text import format_duration, format_quantity, percent
 from syncline_design.model.quantity import Dimension
 from syncline_design.model.written import beside, limit_as_written
 from syncline_design.simulation.results import QuantileEstimate
@@ -161,7 +161,7 @@ def error_figures(before: Verdict, after: Verdict) -> tuple[ErrorFigure, ...]:
         for model, label in MODELS.items()
     ]
     one, other = _quantile(before), _quantile(after)
-    label = f"simulated, {to_digits(100 * float(QUANTILE))} % of errors below"
+    label = f"simulated, {percent(float(QUANTILE), 6)} of errors below"
     simulated = ErrorFigure(
         "simulated_95_m",
         label,

@@ -260,8 +260,10 @@ def _outside(found: Sequence[Stream]) -> dict[str, tuple[str, ...]]:
     for name, middle in middles.items():
         if not low - far <= middle <= high + far:
             apart = (middle - high if middle > high else middle - low) / NANO
-            words = (f"its stamps lie {to_places(apart, 3, sign=True)} s off those of the "
-                     f"file's other streams")
+            words = (
+                f"its stamps lie {to_places(apart, 3, sign=True)} s off those of the "
+                f"file's other streams"
+            )
             notes[name] = (*notes.get(name, ()), words)
     return notes
 

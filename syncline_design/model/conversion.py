@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Final
 
-from syncline_design.model.figure_text import to_digits, to_places
+from syncline_design.model.figure_text import percent, to_places
 from syncline_design.model.quantity import Dimension, Quantity, UnitError, parse_quantity
 
 
@@ -39,7 +39,7 @@ def within(share: float) -> Conversion:
     """
     z = normal_quantile((1.0 + share) / 2.0)
     return Conversion(
-        1.0 / z, f"one axis, {to_digits(100 * share)} % within the figure: / {to_places(z, 4)}"
+        1.0 / z, f"one axis, {percent(share, 6)} within the figure: / {to_places(z, 4)}"
     )
 
 
@@ -50,7 +50,7 @@ def circular(share: float) -> Conversion:
     """
     k = math.sqrt(-2.0 * math.log1p(-share))
     return Conversion(
-        1.0 / k, f"radius of a circle that holds {to_digits(100 * share)} %: / {to_places(k, 4)}"
+        1.0 / k, f"radius of a circle that holds {percent(share, 6)}: / {to_places(k, 4)}"
     )
 
 

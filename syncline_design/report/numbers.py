@@ -107,16 +107,8 @@ def power(value: Any, digits: int = 4) -> str:
 
 
 def money(value: Any, currency: str) -> str:
-    """An amount with thousands grouped: `38 400 EUR`."""
+    """An amount with thousands grouped, `38 400 EUR`; cents where there are any: `412.50 EUR`."""
     return _shown(value, Dimension.MONEY, 4, currency)
-
-
-def to_the_cent(value: Any, currency: str) -> str:
-    """An amount as on a bill, both decimals: `38 412.50 EUR`."""
-    amount = finite(value)
-    if amount is None:
-        return MISSING
-    return f"{amount:,.2f}\N{NO-BREAK SPACE}{currency}".replace(",", "\N{NO-BREAK SPACE}")
 
 
 def number(value: Any, digits: int = 4) -> str:
@@ -145,7 +137,7 @@ def percent(fraction: Any, digits: int = 3) -> str:
     amount = finite(fraction)
     if amount is None:
         return MISSING
-    return number(100.0 * amount, digits) + "\N{NO-BREAK SPACE}%"
+    return typeset(figure_text.percent(amount, digits))
 
 
 def in_unit(value: Any, unit: str, digits: int = 4) -> str:

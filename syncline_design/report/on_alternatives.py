@@ -42,7 +42,7 @@ def bargain_nodes(found: Sequence[Bargain], currency: str) -> list[Node]:
 
 
 def _bargain(one: Bargain, currency: str) -> str:
-    money = numbers.to_the_cent(abs(one.extra), currency)
+    money = numbers.money(abs(one.extra), currency)
     old, new = numbers.length(one.error_from_m), numbers.length(one.error_to_m)
     sensors = ", ".join(f"{role.name} ({role.timestamping})" for _, _, role in one.design.roles)
     if one.kind == "better":

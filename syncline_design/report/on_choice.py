@@ -105,7 +105,7 @@ def _proof(result: Optimisation, objective: str) -> str:
         gap = (
             ""
             if proof.gap is None
-            else f": the optimum is at most {numbers.number(100 * proof.gap, 3)} % lower"
+            else f": the optimum is at most {numbers.percent(proof.gap, 3)} lower"
         )
         return (
             f"Found among {size} combinations by {objective} within the time limit, rechecked "

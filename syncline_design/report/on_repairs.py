@@ -36,7 +36,7 @@ def _sentence(rows: tuple[Repair, ...]) -> str:
 
 
 def _money(one: Repair) -> str:
-    return numbers.to_the_cent(one.price, one.currency)
+    return numbers.money(one.price, one.currency)
 
 
 def _row(one: Repair) -> tuple[Cell | str, ...]:

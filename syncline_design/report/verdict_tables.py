@@ -159,7 +159,7 @@ def _amounts(
     verdict: Verdict, cost: float | None, mass: float | None, power: float | None
 ) -> tuple[Cell, Cell, Cell]:
     return (
-        Cell(numbers.to_the_cent(cost, currency_of(verdict)), cost),
+        Cell(numbers.money(cost, currency_of(verdict)), cost),
         Cell(numbers.mass(mass, 9), mass),
         Cell(numbers.power(power, 9), power),
     )

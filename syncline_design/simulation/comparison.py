@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from syncline_design.model.figure_text import rounded, to_digits, to_places
+from syncline_design.model.figure_text import percent, rounded, to_places
 from syncline_design.model.system import System
 from syncline_design.simulation.bounds import StageBound, chain_bounds
 from syncline_design.simulation.results import ComparisonRow, WorstCase
@@ -55,7 +55,7 @@ def reason(system: System, found: WorstCase) -> tuple[str, tuple[str, ...]]:
     """(words, causes): where the worst case leaves the Syncline and why."""
     ratio = found.ratio_to_syncline
     if abs(ratio - 1.0) <= CLOSE:
-        return f"within {to_digits(100 * CLOSE)} % of the Syncline", ()
+        return f"within {percent(CLOSE, 6)} of the Syncline", ()
     parts = sorted(_parts(system, found), reverse=True)
     told = [(cause, text) for share, cause, text in parts if share > WORTH_SAYING]
     side = "above" if ratio > 1.0 else "below"

@@ -14,7 +14,7 @@ from syncline_design.effects.record import Array
 from syncline_design.machine.input_files import FileRead
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Named, Record, Unbounded, optional
-from syncline_design.model.figure_text import format_quantity, to_digits
+from syncline_design.model.figure_text import format_quantity, percent, to_digits
 from syncline_design.model.quantity import Dimension
 from syncline_design.simulation.distribution import Binned, Values
 from syncline_design.simulation.settings import Envelope
@@ -225,7 +225,7 @@ def worst_case(
         f"effects add), tilt up to {to_digits(math.degrees(tilt_rad), 3)} deg, and known "
         f"effects at what "
         f"they are charged, nothing exceeds the bound; what was found is "
-        f"{to_digits(100 * gap, 2)} % below it"
+        f"{percent(gap, 2)} below it"
     )
     certificate = Certificate(gap, triangle_m, Bounded(tau_s, tilt_rad, "one sigma"), text)
     return WorstCase(tau_s, value_m, syncline_m, ratio, bound_m, certificate)

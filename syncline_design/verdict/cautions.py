@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from syncline_design.choice.outcome import Proof
 from syncline_design.effects import registry
 from syncline_design.model.budget import differs
-from syncline_design.model.figure_text import format_quantity, to_digits
+from syncline_design.model.figure_text import format_quantity, percent, to_digits
 from syncline_design.model.quantity import Dimension
 from syncline_design.model.system import UTC
 from syncline_design.model.timing import Normal
@@ -191,7 +191,7 @@ def _coverage(verified: Verified) -> Iterator[Caution]:
         yield Caution(
             "coverage-factor",
             f"coverage_factor {to_digits(k)}: "
-            f"{to_digits(100.0 * math.erfc(k / math.sqrt(2.0)), 3)} % of normal "
+            f"{percent(math.erfc(k / math.sqrt(2.0)), 3)} of normal "
             "timestamp errors lie beyond the bound that tau is made of; with 3 it is 0.27 %",
         )
 
@@ -273,6 +273,6 @@ def _incomplete(case: Case) -> Iterator[Caution]:
 def unproven(proof: Proof) -> Iterator[Caution]:
     """What the time limit left open about a design that meets."""
     if not proof.optimal:
-        gap = "" if proof.gap is None else f" (by {to_digits(100 * proof.gap, 3)} % at most)"
+        gap = "" if proof.gap is None else f" (by {percent(proof.gap, 3)} at most)"
         message = f"the time limit ended the search: a better design than this may exist{gap}"
         yield Caution("not-proven-optimal", message)

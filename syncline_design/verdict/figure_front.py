@@ -17,7 +17,7 @@ from syncline_design.choice.narrowed import stated
 from syncline_design.choice.options import ResourceName
 from syncline_design.choice.outcome import FrontPoint
 from syncline_design.choice.table import Judge, Problem
-from syncline_design.model.figure_text import to_digits
+from syncline_design.model.figure_text import percent
 from syncline_design.spec.case import Case
 from syncline_design.spec.requirement import Requirement
 from syncline_design.verdict.acceptance import Simulations
@@ -48,7 +48,7 @@ def drawn_requirement(case: Case, kind: FigureKind) -> Requirement:
 def figure_words(requirement: Requirement) -> str:
     """A figure in words, as a heading of a front."""
     share = requirement.share
-    part = "" if share is None else f"{to_digits(100.0 * float(share))} % of "
+    part = "" if share is None else f"{percent(float(share), 6)} of "
     axis = {"3d": "3D", None: ""}.get(requirement.axis or requirement.of, "")
     axis = axis or str(requirement.axis or requirement.of or "")
     return {

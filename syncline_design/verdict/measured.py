@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from syncline_design.machine.input_files import FileRead
-from syncline_design.model.figure_text import format_duration, to_digits
+from syncline_design.model.figure_text import format_duration, percent, to_digits
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import ClockEntry, TimestampError, TimestampingEntry
 from syncline_design.spec.exact import tau_bound
@@ -21,9 +21,9 @@ COMMONLY = 1.12
 def coverage_words(claimed: float, asked: float) -> str:
     """A bound that holds for less of the time than a spec takes it to."""
     return (
-        f"for {to_digits(100.0 * claimed, 4)} % of the time, where the spec's coverage_factor "
+        f"for {percent(claimed, 4)} of the time, where the spec's coverage_factor "
         f"asks for "
-        f"{to_digits(100.0 * asked, 4)} %"
+        f"{percent(asked, 4)}"
     )
 
 
@@ -72,13 +72,13 @@ def claim_words(claim: ClaimShown | None) -> str:
     """`95 % of the time in 95 % of sessions at 95 % confidence, from 7 sessions`."""
     if claim is None:
         return "no claim"
-    text = f"{to_digits(100.0 * claim.coverage, 4)} % of the time"
+    text = f"{percent(claim.coverage, 4)} of the time"
     if claim.session_share is not None:
-        text += f" in {to_digits(100.0 * claim.session_share, 4)} % of sessions"
+        text += f" in {percent(claim.session_share, 4)} of sessions"
     if claim.session_s is not None:
         text += f" of {format_duration(claim.session_s)}"
     if claim.confidence is not None:
-        text += f" at {to_digits(100.0 * claim.confidence, 4)} % confidence"
+        text += f" at {percent(claim.confidence, 4)} confidence"
     if claim.sessions is not None:
         text += f", from {claim.sessions} session{'s' if claim.sessions > 1 else ''}"
     return text
