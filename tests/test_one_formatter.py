@@ -1,0 +1,112 @@
+"""Figures for people are rounded in one place, alike for every room."""
+
+from __future__ import annotations
+
+import ast
+import math
+import re
+from decimal import ROUND_HALF_EVEN, Context, Decimal
+from pathlib import Path
+
+import pytest
+
+from syncline_design.model.figure_text import percent, rounded, signed, to_digits, to_places
+from syncline_design.report import numbers
+
+PACKAGE = Path(__file__).parent.parent / "syncline_design"
+# What formats a float by itself, and why.
+OWN = {
+    "model/figure_text.py": "the one place",
+    "report/numbers.py": "typesets it",
+    "machine/arguments.py": "says bounds of arguments; on the floor of the model, beside it",
+    "machine/deadline.py": "says a time limit as it was given; beside the model",
+    "machine/result_files.py": "the same",
+    "clocks/entry.py": "writes a catalog entry that is read again, rounded upwards",
+    "spec/edit.py": "writes YAML that is read again",
+    "studies/definition.py": "writes values into specs that are read again",
+    "report/plans.py": "writes KML",
+    "report/on_plan.py": "a heading as three digits, 007",
+}
+OF_A_FLOAT = re.compile(r"[eEfFgG%]$")
+
+
+def _formats(tree: ast.AST) -> list[int]:
+    """Lines that give a float a format: in an f-string, by `format`, by `%`."""
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FormattedValue) and isinstance(node.format_spec, ast.JoinedStr):
+            parts = node.format_spec.values
+            last = parts[-1] if parts else None
+            if isinstance(last, ast.Constant) and OF_A_FLOAT.search(str(last.value)):
+                found.append(node.lineno)
+        elif isinstance(node, ast.Call) and _is_format(node):
+            found.append(node.lineno)
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            text = node.left.value if isinstance(node.left, ast.Constant) else None
+            if isinstance(text, str) and re.search(r"%[-+ #0-9.]*[eEfFgG]", text):
+                found.append(node.lineno)
+    return found
+
+
+def _is_format(node: ast.Call) -> bool:
+    if isinstance(node.func, ast.Name):
+        return node.func.id == "format" and len(node.args) == 2
+    is_text = isinstance(node.func, ast.Attribute) and isinstance(node.func.value, ast.Constant)
+    return is_text and node.func.attr == "format"  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    "line", ['f"{x:.3g}"', 'f"{x:,.2f}"', 'f"{x:.{n}e}"', '"%.2f" % x', 'format(x, "g")',
+             '"{:.2f}".format(x)', 'f"{x:+g}"', 'f"{x:.1%}"']
+)  # fmt: skip
+def test_a_format_of_a_float_is_seen(line: str) -> None:
+    assert _formats(ast.parse(line)) == [1]
+
+
+@pytest.mark.parametrize("line", ['f"{n:02d}"', 'f"{text:>9}"', 'f"{x!r}"', "a % b", 'f"{x}"'])
+def test_what_is_none_is_not(line: str) -> None:
+    assert _formats(ast.parse(line)) == []
+
+
+def test_no_room_rounds_for_people_by_itself() -> None:
+    found = {
+        path.relative_to(PACKAGE).as_posix(): lines
+        for path in sorted(PACKAGE.rglob("*.py"))
+        if (lines := _formats(ast.parse(path.read_text("utf-8"))))
+    }
+    assert {name: lines for name, lines in found.items() if name not in OWN} == {}
+    assert set(OWN) == set(found)  # an exception that is none any more goes
+
+
+@pytest.mark.parametrize("value", [0.0, 1.0, -2.5, 1234.5678, 0.00012349, 99995.0, 5e-7, -3.21e12])
+@pytest.mark.parametrize("digits", [1, 3, 4, 6])
+def test_digits_are_those_of_decimal_arithmetic(value: float, digits: int) -> None:
+    exact = Context(prec=digits, rounding=ROUND_HALF_EVEN).create_decimal(Decimal(value))
+    text = to_digits(value, digits)
+    assert Decimal(text) == exact
+    assert rounded(value, digits) == float(exact)
+    assert ("e" in text) == (value != 0.0 and not 1e-4 <= abs(float(exact)) < 1e9)
+    mantissa = text.partition("e")[0]
+    assert not ("." in mantissa and mantissa.endswith(("0", ".")))
+    assert signed(value, digits) == ("+" if exact > 0 else "") + text
+
+
+def test_places_keep_their_zeros_and_shares_their_sign() -> None:
+    assert [to_places(2.5, 3), to_places(-0.125, 2)] == ["2.500", "-0.12"]
+    assert to_places(2.5, 1, sign=True) == "+2.5"
+    assert [percent(0.12345), percent(1.0), percent(-0.5)] == ["12.3 %", "100 %", "-50 %"]
+
+
+@pytest.mark.parametrize("text", [to_digits, signed, lambda v: to_places(v, 2)])
+def test_what_is_no_number_is_said(text) -> None:  # type: ignore[no-untyped-def]
+    said = [text(value) for value in (math.inf, -math.inf, math.nan)]
+    assert said in (["unlimited", "-unlimited", "not a number"],
+                    ["+unlimited", "-unlimited", "not a number"])  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("amount", "text"),
+    [(32000.0, "32 000 EUR"), (412.5, "412.50 EUR"), (0.0, "0 EUR"), (1234567.891, "1 234 567.89 EUR")],
+)  # fmt: skip
+def test_money_has_one_format(amount: float, text: str) -> None:
+    assert numbers.money(amount, "EUR") == text.replace(" ", "\N{NO-BREAK SPACE}")
