@@ -27,6 +27,7 @@ OWN = {
     "report/plans.py": "writes KML",
     "report/on_plan.py": "a heading as three digits, 007",
 }
+MAYBE = re.compile(r"[eEfFgG%]\}|format\(|%[-+ #0-9.]*[eEfFgG]")  # where a look is worth it
 OF_A_FLOAT = re.compile(r"[eEfFgG%]$")
 
 
@@ -72,7 +73,7 @@ def test_no_room_rounds_for_people_by_itself() -> None:
     found = {
         path.relative_to(PACKAGE).as_posix(): lines
         for path in sorted(PACKAGE.rglob("*.py"))
-        if (lines := _formats(ast.parse(path.read_text("utf-8"))))
+        if MAYBE.search(text := path.read_text("utf-8")) and (lines := _formats(ast.parse(text)))
     }
     assert {name: lines for name, lines in found.items() if name not in OWN} == {}
     assert set(OWN) == set(found)  # an exception that is none any more goes
@@ -100,13 +101,12 @@ def test_places_keep_their_zeros_and_shares_their_sign() -> None:
 @pytest.mark.parametrize("text", [to_digits, signed, lambda v: to_places(v, 2)])
 def test_what_is_no_number_is_said(text) -> None:  # type: ignore[no-untyped-def]
     said = [text(value) for value in (math.inf, -math.inf, math.nan)]
-    assert said in (["unlimited", "-unlimited", "not a number"],
-                    ["+unlimited", "-unlimited", "not a number"])  # fmt: skip
+    assert said == ["unlimited", "-unlimited", "not a number"]
 
 
 @pytest.mark.parametrize(
     ("amount", "text"),
-    [(32000.0, "32 000 EUR"), (412.5, "412.50 EUR"), (0.0, "0 EUR"), (1234567.891, "1 234 567.89 EUR")],
+    [(32000.0, "32 000 EUR"), (412.5, "412.50 EUR"), (0.0, "0 EUR"), (1e6, "1 000 000 EUR")],
 )  # fmt: skip
 def test_money_has_one_format(amount: float, text: str) -> None:
     assert numbers.money(amount, "EUR") == text.replace(" ", "\N{NO-BREAK SPACE}")

@@ -208,8 +208,8 @@ def _in_its_part(named: Finding, effect: Effect) -> Finding:
     span = span_of(effect)
     if span is None:
         return named
-    ends = (format_estimate(end, None, "s") for end in (span.from_s, span.to_s))
-    words = named.sentence + ", from {} to {}".format(*ends)
+    first, last = (format_estimate(end, None, "s") for end in (span.from_s, span.to_s))
+    words = f"{named.sentence}, from {first} to {last}"
     kind = named.kind if effect.passing else "stand_in"
     return replace(named, sentence=words, kind=kind, from_s=span.from_s, to_s=span.to_s)
 

@@ -120,7 +120,7 @@ def _not_finite(value: float) -> str:
 def signed(value: float, digits: int = 6) -> str:
     """The same with its sign, `+0.5`; 0 has none."""
     text = to_digits(value, digits)
-    return text if text == "0" or text.startswith(("-", "n")) else f"+{text}"
+    return text if text == "0" or text.startswith(("-", "n", "u")) else f"+{text}"
 
 
 def rounded(value: float, digits: int) -> float:
