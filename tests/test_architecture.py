@@ -52,11 +52,45 @@ def test_every_file_that_is_named_exists() -> None:
     assert [file for file in files if not (PACKAGE / file).is_file()] == []
 
 
-def test_the_four_walks_are_there() -> None:
-    walks = HOUSE.partition("## Four walks")[2].split("\n**")[1:]
-    assert len(walks) == 4
-    for walk in walks:
-        assert len(re.findall(r"^\d\. `", walk, re.M)) >= 5, walk
+WALKS = HOUSE.partition("## Four walks")[2].split("\n**")[1:]
+
+
+def _stations(walk: str) -> list[str]:
+    """The files of a walk, in its order."""
+    numbered = re.findall(r"^\d+\. (.*)$", walk, re.M)
+    found = [file for line in numbered for file in re.findall(r"`([\w/]+/\w+\.py): \w+`", line)]
+    assert len(found) >= len(numbered) >= 5, walk
+    return found
+
+
+def test_no_walk_climbs() -> None:
+    drawer = _drawer()
+    level = {room: number for number, floor in enumerate(drawer.floors()) for room in floor}
+    assert len(WALKS) == 4
+    for walk in WALKS:
+        floors = [level[file.partition("/")[0]] for file in _stations(walk)]
+        assert floors == sorted(floors, reverse=True), walk
+
+
+def test_every_station_is_reached_from_one_before(arrows: dict[str, set[str]]) -> None:
+    """Over imports; an effect is found by itself, so nothing names its file."""
+    for walk in WALKS:
+        stations = [f"{PACKAGE.name}.{file[:-3].replace('/', '.')}" for file in _stations(walk)]
+        reached = _below(stations[0], arrows)
+        for station in stations[1:]:
+            is_effect = "EFFECT" in _names(ROOT / f"{station.replace('.', '/')}.py")
+            assert is_effect or station in reached, station
+            reached |= _below(station, arrows)
+
+
+def _below(module: str, arrows: dict[str, set[str]]) -> set[str]:
+    """A module and what it imports, directly or through others."""
+    found, ahead = {module}, [module]
+    while ahead:
+        new = arrows.get(ahead.pop(), set()) - found
+        found |= new
+        ahead += new
+    return found
 
 
 def test_table_and_drawing_show_every_room_on_its_floor() -> None:
@@ -150,8 +184,9 @@ def test_a_way_back_is_found() -> None:
     assert _cycle({"a": {"b", "c"}, "b": {"c"}, "c": set()}) == []
 
 
-def test_no_module_imports_one_that_imports_it() -> None:
-    """Over all imports: a late one hides a cycle from the contract, which looks at rooms only."""
+@pytest.fixture(scope="module")
+def arrows() -> dict[str, set[str]]:
+    """Which module imports which, over all imports of the package."""
     paths = {
         ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
         for path in sorted(PACKAGE.rglob("*.py"))
@@ -159,8 +194,12 @@ def test_no_module_imports_one_that_imports_it() -> None:
     trees = {name: ast.parse(path.read_text("utf-8")) for name, path in paths.items()}
     modules = frozenset(paths)
     root = {PACKAGE.name}  # names the functions of api for type checkers, and holds the version
-    arrows = {
+    return {
         name: _imported(tree, modules) - root for name, tree in trees.items() if name not in root
     }
+
+
+def test_no_module_imports_one_that_imports_it(arrows: dict[str, set[str]]) -> None:
+    """A late import hides a cycle from the contract, which looks at rooms only."""
     assert sum(map(len, arrows.values())) > 2000
     assert _cycle(arrows) == []
