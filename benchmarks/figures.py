@@ -64,7 +64,7 @@ def published() -> None:
             stage = one.stages[0]
             platform = replace(stage.platform, distance_m=float(distance))
             system = replace(one, stages=(replace(stage, platform=platform),))
-            (found,) = statistical_figures(system, (Wanted("horizontal"),))
+            (found,) = statistical_figures(system, (Wanted("horizontal"),), seed=0)
             a = math.radians(heading)
             as_sine = found.value_m * math.sin(a) / a  # noise acts to first order
             same = abs(as_sine - printed) <= 0.1

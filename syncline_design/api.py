@@ -326,7 +326,7 @@ def accept(
 
     files, seed = _files(logs), _seed(seed)
     with _limited(time_limit_s):
-        return acceptance.accept(_case(spec), files, settings, seed)
+        return acceptance.accept(_case(spec), files, settings, seed=seed)
 
 
 def watch(

@@ -203,3 +203,21 @@ def test_no_module_imports_one_that_imports_it(arrows: dict[str, set[str]]) -> N
     """A late import hides a cycle from the contract, which looks at rooms only."""
     assert sum(map(len, arrows.values())) > 2000
     assert _cycle(arrows) == []
+
+
+def test_no_function_below_the_commands_has_a_seed_of_its_own() -> None:
+    """A default would hide that one was forgotten; settings hold theirs, made by a command."""
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        file = path.relative_to(PACKAGE).as_posix()
+        text = path.read_text("utf-8")
+        if file.startswith("cli/") or file == "api.py" or "seed" not in text:
+            continue
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.FunctionDef):
+                plain = [*node.args.posonlyargs, *node.args.args]
+                own = plain[len(plain) - len(node.args.defaults) :]
+                kept = zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
+                own += [one for one, default in kept if default is not None]
+                found += [(file, node.name) for one in own if one.arg == "seed"]
+    assert found == []

@@ -32,7 +32,7 @@ def of(log: WorldLog, *exclude: str) -> DiagnosisAndDesign:
         spec.write_text(log.spec_yaml(), encoding="utf-8")
         data = log.to_csv(Path(folder) / "log.csv")
         found = diagnose(spec, [data], DiagnosisSettings(exclude_effects=exclude))
-        means = meaning(load(spec), found.effects_entries())
+        means = meaning(load(spec), found.effects_entries(), seed=0)
     return with_design(found, means)
 
 
@@ -45,7 +45,7 @@ def example() -> DiagnosisAndDesign:
         log = Path(folder) / "log.csv"
         log.write_text("".join(lines[:901]), "utf-8")
         found = diagnose(spec, [log])
-    means = meaning(load(spec), found.effects_entries())
+    means = meaning(load(spec), found.effects_entries(), seed=0)
     assert means is not None
     return with_design(found, means)
 

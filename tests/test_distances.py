@@ -269,7 +269,7 @@ def test_figures_are_the_largest_at_any_distance(tmp_path: Path) -> None:
     assert verdict["monte_carlo"]["distances_m"] == {"uav": 60.0}
     system = _system(tmp_path)
     far = sample_errors(system, SimulationSettings(20_000, seed=5))
-    assert np.quantile(far, 0.95) <= error_statistics(system).over_missions.quantile95_3d_m
+    assert np.quantile(far, 0.95) <= error_statistics(system, seed=0).over_missions.quantile95_3d_m
 
 
 def _system(folder: Path) -> Any:

@@ -161,8 +161,8 @@ def _worst_ratios(platform: str) -> list[float]:
         f"    ranging: {{sensor: riegl_vux1uav, {how}}}\n"
     )
     loaded = load_text(text, ROOT / "specs" / "x.yaml")
-    system = system_of(loaded, *picked_design(loaded))
-    return [row.ratio for row in comparison(system, (1e-6, 1e-3, 1e-2, 1e-1))]
+    system = system_of(loaded, *picked_design(loaded, seed=0))
+    return [row.ratio for row in comparison(system, (1e-6, 1e-3, 1e-2, 1e-1), seed=0)]
 
 
 def test_the_lever_arm_figures_are_what_the_simulator_gives() -> None:
@@ -191,7 +191,7 @@ def test_how_often_errors_exceed_the_syncline_is_as_the_pages_say() -> None:
 
     assert f"{100 * chi2.sf(3.0, 3):.0f} %" == "39 %"
     loaded = load(ROOT / "specs" / "uav_corridor.yaml")
-    system = system_of(loaded, *picked_design(loaded))
+    system = system_of(loaded, *picked_design(loaded, seed=0))
     errors = np.linalg.norm(sample_errors(system, SimulationSettings(samples=100_000)), axis=1)
     share = float(np.mean(errors > budget(system).total_m))
     assert share == pytest.approx(0.09, abs=0.005)  # standard error 0.0009

@@ -141,7 +141,7 @@ def test_noise_of_a_situation_is_never_more_than_a_figure(wanted: Wanted) -> Non
     a quick yes against the same."""
     for seed in (0, 1, 2):
         system = exact_stamps(seed)
-        value = statistical_figures(system, (wanted,))[0].value_m
+        value = statistical_figures(system, (wanted,), seed=0)[0].value_m
         points = Situations(system).starting_points(seed, 12)
         for point in points.T:
             noise = noise_at(system, wanted, point)

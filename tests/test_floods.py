@@ -127,6 +127,6 @@ def test_thousands_of_stages_and_requirements_are_refused() -> None:
 def test_the_search_for_the_worst_case_keeps_the_time_limit() -> None:
     """With 64 stages it took minutes beyond a limit of 3 s."""
     system = survey()
-    assert worst_cases(system, np.array([1e-3]))
+    assert worst_cases(system, np.array([1e-3]), seed=0)
     with within(Deadline(0.0)), pytest.raises(OutOfTime):
-        worst_cases(system, np.array([1e-3]))
+        worst_cases(system, np.array([1e-3]), seed=0)

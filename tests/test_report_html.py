@@ -115,7 +115,7 @@ def as_the_verdict_has_it() -> list[str]:
     dearer, cheaper = (verdict.choice.staircase or ())[1::-1]
     up = math.ceil(1e5 * dearer.tightest_m) / 1e2, math.ceil(1e4 * cheaper.tightest_m) / 10.0
     return [
-        f"{_mm(median.low_m)} to {_mm(median.high_m)}",
+        f"{median.low_m:.4g}\u00a0m to {median.high_m:.4g}\u00a0m",
         f"{100.0 * within.low:.5g}\u00a0%",
         f"{up[0]:.4g}\u00a0mm to below {up[1]:.4g}\u00a0mm",
         verdict.provenance.spec_sha256,

@@ -434,7 +434,7 @@ def test_every_effect_of_the_dictionary_acts_and_is_bounded(name: str) -> None:
         assert np.array_equal(plain, acted) == (name == "induced_heave")
         if effect.kind == "discrete":
             continue
-        (worst,) = worst_cases(system, np.array([1e-3]), starts=2, iterations=5)
+        (worst,) = worst_cases(system, np.array([1e-3]), starts=2, iterations=5, seed=0)
         assert worst.value_m <= worst.bound_m * (1 + 1e-12)
 
 

@@ -67,7 +67,7 @@ def accept(
     settings = AcceptSettings(_asked(only), assigned)
     targets = output_targets(output, ACCEPT_FORMATS, reads)
     with watched(deadline, targets, quiet=quiet):
-        result = accept_logs(load(spec), log or (), settings, seed)
+        result = accept_logs(load(spec), log or (), settings, seed=seed)
     text = console(on_acceptance(result))
     emit(text, targets, lambda name: render_acceptance(name, result), quiet=quiet)
     return result.exit_code

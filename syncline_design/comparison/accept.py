@@ -63,7 +63,7 @@ class _Evidence:
 
 
 def accept(
-    case: Case, logs: Sequence[Path], settings: AcceptSettings | None = None, seed: int = 0
+    case: Case, logs: Sequence[Path], settings: AcceptSettings | None = None, *, seed: int
 ) -> Acceptance:
     """One row for every assumption of the spec's verdict; pinned, or its best design.
 

@@ -106,7 +106,7 @@ def with_design(
     return DiagnosisAndDesign(**parts, design=means, repairs=repairs)
 
 
-def meaning(case: Case, entries: Sequence[EffectChoice], seed: int = 0) -> DesignMeaning | None:
+def meaning(case: Case, entries: Sequence[EffectChoice], seed: int) -> DesignMeaning | None:
     """Check the spec with and without the findings; None when nothing was found."""
     if not entries:
         return None

@@ -33,7 +33,7 @@ class OnPaper:
     seed: int = 0
 
     @classmethod
-    def beside(cls, case: Case, found: Diagnosis, seed: int = 0) -> OnPaper:
+    def beside(cls, case: Case, found: Diagnosis, seed: int) -> OnPaper:
         """The pinned spec beside what its log's diagnosis found."""
         slight = tuple(f for f in found.findings if not f.material and f.fits_a_spec)
         return cls(case, slight, seed)

@@ -66,7 +66,7 @@ class Repair(Record):
     beaten: bool
 
 
-def repairs(case: Case, found: Sequence[Finding], seed: int = 0) -> tuple[Repair, ...]:
+def repairs(case: Case, found: Sequence[Finding], seed: int) -> tuple[Repair, ...]:
     """Of each kind of repair the cheapest that keeps every sum, else the one that errs least.
 
     case: the system as built, with nothing open.  Of several findings every combination of their

@@ -46,7 +46,7 @@ class Played:
         return f"{self.stage}.{self.role}"
 
 
-def held_against(audit: Audit, case: Case, seed: int = 0) -> Audit:
+def held_against(audit: Audit, case: Case, seed: int) -> Audit:
     """The audit with tau_crit, and metres where the stamps are arrivals."""
     verdict = check_loaded(as_measured(case, seed), CheckSettings(seed=seed))
     played = _played(audit, case, verdict)

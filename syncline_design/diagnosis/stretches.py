@@ -125,7 +125,7 @@ class _Fit:
     spreads: tuple[float, ...]
 
 
-def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int = 0) -> Stretches:
+def stretches(data: Data, model: Model, found: Sequence[Signature], seed: int) -> Stretches:
     """Every candidate of a settled model's log in every window."""
     asked = [s for s in found if _asked(s)]
     if not asked or len(data.view) < 4 * LEAST_ROWS:

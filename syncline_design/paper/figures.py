@@ -129,7 +129,7 @@ def plotted(figure: PaperPlot, simulated: tuple[SimulatedPoint, ...]) -> Plotted
     return PlottedFigure(figure.number, figure.title, figure.note, grid, curves, simulated)
 
 
-def compare(figure: PaperPlot, points: int = 13, seed: int = 0) -> tuple[SimulatedPoint, ...]:
+def compare(figure: PaperPlot, points: int = 13, *, seed: int) -> tuple[SimulatedPoint, ...]:
     """The simulated points of a figure: nonlinear chain, magnitudes bounded, directions free.
 
     Empty for a figure that the paper does not set beside a simulation.  Lever arms of the length

@@ -94,7 +94,7 @@ class Reproduction(Record):
     figures: tuple[PlottedFigure, ...]
 
 
-def reproduce(catalog: Catalog | None = None, simulate: bool = True, seed: int = 0) -> Reproduction:
+def reproduce(catalog: Catalog | None = None, simulate: bool = True, *, seed: int) -> Reproduction:
     """Compute every printed figure from a catalog, the built-in one unless another is given.
 
     simulate: whether to add the simulated points of figures 3 and 7 (takes a second or two).

@@ -27,7 +27,7 @@ CAUSES = {
 
 
 def comparison(
-    system: System, taus_s: Sequence[float] = DEFAULT_GRID_S, seed: int = 0
+    system: System, taus_s: Sequence[float] = DEFAULT_GRID_S, *, seed: int
 ) -> tuple[ComparisonRow, ...]:
     """The worst case of the nonlinear chain against the Syncline at every tau [s].
 

@@ -101,7 +101,7 @@ class Statistics:
 
 
 @lru_cache(maxsize=64)
-def error_statistics(system: System, seed: int = 0) -> Statistics:
+def error_statistics(system: System, seed: int) -> Statistics:
     """The statistical figures of a design; raises SimulationError where it makes no sense."""
     wanted = tuple(WANTED.values())
     over = statistical_figures(system, wanted, seed=seed)

@@ -122,7 +122,7 @@ def simulate(system: System, settings: SimulationSettings = DEFAULT_SETTINGS) ->
             figures.tau_crit_s,
         ),
         trajectory=trajectory,
-        grid=comparison(system, grid, settings.seed),
+        grid=comparison(system, grid, seed=settings.seed),
         versions=versions(),
     )
 

@@ -78,7 +78,7 @@ class Worst:
 
 
 def statistical_figures(
-    system: System, wanted: Sequence[Wanted], one_mission: bool = False, seed: int = 0
+    system: System, wanted: Sequence[Wanted], one_mission: bool = False, *, seed: int
 ) -> tuple[Worst, ...]:
     """Each wanted figure at its own worst situation.
 
@@ -117,7 +117,7 @@ def _promising(
     return tuple(out)
 
 
-def figure(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> Worst:
+def figure(system: System, wanted: Wanted, limit_m: float, seed: int) -> Worst:
     """A figure to be held against a limit [m]; near it, the largest of several searches."""
     found = statistical_figures(system, (wanted,), seed=seed)[0]
     near = CLOSE if Situations(system).linear else CLOSE_LONG
@@ -128,7 +128,7 @@ def figure(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> Wor
     return found
 
 
-def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0) -> bool:
+def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int) -> bool:
     """Whether some situation at random already exceeds a limit: a quick no, never a yes."""
     situations = Situations(system)
     pool = situations.starting_points(seed, _POOL)
@@ -142,7 +142,7 @@ def surely_exceeds(system: System, wanted: Wanted, limit_m: float, seed: int = 0
     return rays(moments, wanted, situations.dimensions).within(least) < wanted.p
 
 
-def worst_point(system: System, wanted: Wanted, seed: int = 0) -> Array:
+def worst_point(system: System, wanted: Wanted, seed: int) -> Array:
     """A situation (p,) in which a figure is about as large as anywhere."""
     return _worst_points(Situations(system), (wanted,), seed)[:, 0]
 

@@ -80,7 +80,7 @@ def _stage_blocks(stage: Stage, index: int, placed: bool) -> list[tuple[str, Kin
 def worst_cases(
     system: System,
     taus_s: Array,
-    seed: int = 0,
+    seed: int,
     starts: int = 16,
     iterations: int = 200,
     enough_gap: float = 1e-4,

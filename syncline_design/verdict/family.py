@@ -49,13 +49,14 @@ class Scenario:
 class Work:
     """A spec's missions as scenarios, and the family that they are.
 
-    likelihood: where a design has to hold with a probability.
+    likelihood: where a design has to hold with a probability; seed: of what it draws.
     """
 
     case: Case
     missions: tuple[Mission, ...]
     scenarios: tuple[Scenario, ...]
     family: Family
+    seed: int
     likelihood: Likelihood | None = None
 
     def of(self, mission: str) -> list[int]:
@@ -83,9 +84,7 @@ def missions_of(case: Case) -> tuple[Mission, ...]:
     return case.missions or (Mission(ALL, case),)
 
 
-def work_of(
-    case: Case, build: Callable[[], Build], seed: int = 0, *, nominal: bool = False
-) -> Work:
+def work_of(case: Case, build: Callable[[], Build], seed: int, *, nominal: bool = False) -> Work:
     """The scenarios of a spec; build: a fresh way to make a problem of each case.
 
     nominal: with figures as given, whatever the spec asks for.
@@ -101,7 +100,7 @@ def work_of(
         for one in missions
         for end, own in _ends(one.case, nominal)
     ]
-    return Work(case, missions, tuple(scenarios), _family(missions, scenarios), likely)
+    return Work(case, missions, tuple(scenarios), _family(missions, scenarios), seed, likely)
 
 
 def _family(missions: Sequence[Mission], scenarios: Sequence[Scenario]) -> Family:

@@ -39,7 +39,7 @@ def robustness_of(work: Work, sums: Sums, build: Callable[[], Build]) -> Robustn
     if spec.choose_for == "nominal":
         return None
     in_force().doing("choosing at given figures")
-    own = work_of(work.case, build, nominal=True)
+    own = work_of(work.case, build, work.seed, nominal=True)
     chosen = choose_family(own) if not own.family.is_empty else None
     best = None if chosen is None or chosen.undecided else ranked(own, chosen)
     unit = {"cost": spec.currency, "mass": "kg", "power": "W"}.get(spec.objective, "m")
@@ -96,7 +96,7 @@ def cannot_share(work: Work, build: Callable[[], Build]) -> tuple[str, ...]:
         rest = tuple(one for one in left if one is not mission)
         if (
             len(rest) > 1
-            and choose_family(work_of(replace(work.case, missions=rest), build)) is None
+            and choose_family(work_of(replace(work.case, missions=rest), build, work.seed)) is None
         ):
             left = list(rest)
     return tuple(one.name for one in left)

@@ -136,8 +136,8 @@ def _verdict_on(
     pieces = Pieces()
     if work.case.missions:
         judged = [
-            replace(one, alone=pieces.made(f"{one.mission.name} alone", _alone(one, build), None))
-            for one in judged
+            replace(one, alone=pieces.made(f"{one.mission.name} alone", choose, None))
+            for one, choose in ((one, _alone(one, build, work.seed)) for one in judged)
         ]
     shown = min(judged, key=lambda one: (_WORST_FIRST[one.word], _least_margin(one.rows)))
     nothing: Robustness | None = None
@@ -318,11 +318,11 @@ def _least_margin(rows: Sequence[RequirementResult]) -> float:
     return min(shares, default=math.inf)
 
 
-def _alone(one: Judged, build: Callable[[], Build]) -> Callable[[], RankedDesign | None]:
+def _alone(one: Judged, build: Callable[[], Build], seed: int) -> Callable[[], RankedDesign | None]:
     """The best payload of a mission by itself."""
 
     def choose() -> RankedDesign | None:
-        own = work_of(replace(one.mission.case, missions=()), build)
+        own = work_of(replace(one.mission.case, missions=()), build, seed)
         chosen = choose_family(own)
         return None if chosen is None or chosen.undecided else ranked(own, chosen)
 

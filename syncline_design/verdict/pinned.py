@@ -18,7 +18,7 @@ def pinned_text(case: Case, problem: Problem, design: Design) -> str:
     return pinned_spec_text(case, *_pins(case, problem, design))
 
 
-def as_measured(case: Case, seed: int = 0) -> Case:
+def as_measured(case: Case, seed: int) -> Case:
     """The spec of the system that made a log: with choices open, its best design pinned."""
     refuse_missions(case)
     if sole_design(build_problem(case)) is not None:
@@ -56,7 +56,7 @@ def pinned_role(stage: StageCase, one: RoleSelection) -> PinnedRole:
     return PinnedRole(stage.index, one.role, one.sensor, one.primitive, one.method)
 
 
-def picked_design(case: Case, seed: int = 0) -> tuple[Problem, Design]:
+def picked_design(case: Case, seed: int) -> tuple[Problem, Design]:
     """The only design of a pinned spec, or the best of an open one; BadInput when there is none.
 
     By its figures as given, whatever it is chosen for.

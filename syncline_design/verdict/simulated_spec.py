@@ -24,7 +24,7 @@ class SimulatedSpec:
 
 
 def simulate_spec(
-    case: Case, seed: int = 0, samples: int | None = None, workers: int | None = None
+    case: Case, seed: int, samples: int | None = None, workers: int | None = None
 ) -> SimulatedSpec:
     """Simulate a spec as its `monte_carlo` part says; samples and workers override."""
     in_force().doing("choosing")
