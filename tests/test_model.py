@@ -6,6 +6,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from operator import attrgetter
+from statistics import NormalDist
 from typing import Any
 
 import mpmath
@@ -14,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from syncline_design.model import syncline
+from syncline_design.model import normal, syncline
 from syncline_design.model.budget import Budget, budget, differs, lever_arm_m
 from syncline_design.model.known import Known
 from syncline_design.model.pairing import largest
@@ -595,3 +596,13 @@ def test_effects_on_unknown_stages_or_of_the_wrong_sign_are_refused() -> None:
         budget(system, Known({("vessel", "position"): -1e-3}))
     with pytest.raises(ValueError, match="negative"):
         budget(system, Known({}, (("bias", "auv", -1e-3),)))
+
+
+def test_constants_of_the_normal_distribution_are_its_quantiles() -> None:
+    """Against the standard library's inverse; those with few digits to all that they have."""
+    quantile = NormalDist().inv_cdf
+    assert pytest.approx(quantile(0.975), rel=1e-15) == normal.NORMAL_95
+    assert pytest.approx(quantile(0.9995), rel=1e-14) == normal.NORMAL_999
+    assert round(quantile(0.95), 4) == normal.NEARLY_ALL
+    assert round(quantile(0.75), 4) == normal.HALF_WITHIN
+    assert round(1.0 / quantile(0.75), 4) == normal.OF_MEDIAN_DEVIATION

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import to_digits, to_places
+from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -78,4 +79,4 @@ def scatter(values: Array) -> float:
     """1.4826 times the median absolute deviation: sigma of a normal law, blind to outliers."""
     if not values.size:
         return 0.0
-    return 1.4826 * float(np.median(np.abs(values - np.median(values))))
+    return OF_MEDIAN_DEVIATION * float(np.median(np.abs(values - np.median(values))))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from syncline_design.clocks.series import Array, Flags, Series
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import OF_MEDIAN_DEVIATION
 
 EventKind = Literal[
     "startup", "step", "unlock", "holdover", "gap", "relock", "leap_second", "frequency_jump"
@@ -21,7 +22,6 @@ STEP_SIGMAS: Final = 12.0
 LEAST_SAMPLES: Final = 20
 SHORTEST_S: Final = 90.0
 MOST_SKEW: Final = 1e-3  # larger ones say that the daemon knows nothing yet
-_MAD: Final = 1.4826  # to a normal standard deviation
 _DAY: Final = 86400.0
 
 
@@ -212,7 +212,7 @@ def _step_events(series: Series, steady: Flags) -> list[ClockEvent]:
         return []
     offsets, times = series.offset_s[places], series.time_s[places]
     jumps = np.diff(offsets)
-    spread = _MAD * float(np.median(np.abs(jumps - np.median(jumps))))
+    spread = OF_MEDIAN_DEVIATION * float(np.median(np.abs(jumps - np.median(jumps))))
     least = max(STEP_SIGMAS * spread, _usual(jumps))
     found: list[ClockEvent] = []
     for k in np.flatnonzero(np.abs(jumps) > least):
@@ -246,7 +246,7 @@ def _frequency_events(series: Series, steady: Flags) -> list[ClockEvent]:
     if rate.shape[0] < LEAST_SAMPLES:
         return []
     jumps = np.diff(rate)
-    spread = _MAD * float(np.median(np.abs(jumps - np.median(jumps))))
+    spread = OF_MEDIAN_DEVIATION * float(np.median(np.abs(jumps - np.median(jumps))))
     places = np.flatnonzero(np.abs(jumps) > max(STEP_SIGMAS * spread, _usual(jumps), 1e-9))
     return [
         ClockEvent("frequency_jump", float(times[k]), float(times[k + 1]),

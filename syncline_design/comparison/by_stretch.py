@@ -16,6 +16,7 @@ from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, rounded, to_digits
+from syncline_design.model.normal import NORMAL_95
 
 SPOKEN_OF: Final = 0.5  # of a log: what acts in so much of it has to show
 TOLD_S: Final = 1.0  # a short stretch whose size is told beside
@@ -136,7 +137,9 @@ def _figure(s: Stands, one: Assumed) -> MeasuredFigure | None:
     units = {p.name: p.unit for p in registry()[s.label[0]].parameters}
     if any(units[p] != one.unit for p in s.parameters):
         return None
-    ends = [(v - 1.96 * u, v + 1.96 * u) for v, u in zip(s.values, s.spreads, strict=True)]
+    ends = [
+        (v - NORMAL_95 * u, v + NORMAL_95 * u) for v, u in zip(s.values, s.spreads, strict=True)
+    ]
     if len(ends) == 1:
         return MeasuredFigure(s.values[0], *ends[0])
     least = math.hypot(*(0.0 if a <= 0.0 <= b else min(abs(a), abs(b)) for a, b in ends))

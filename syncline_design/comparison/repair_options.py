@@ -22,6 +22,7 @@ from syncline_design.diagnosis.result import Estimate, Finding
 from syncline_design.effects import registry
 from syncline_design.effects.record import Origin
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NORMAL_95
 from syncline_design.spec.case import Case, RoleCase, StageCase
 from syncline_design.spec.choices import MethodChoice
 from syncline_design.spec.edit import PinnedRole, with_effects
@@ -30,7 +31,6 @@ from syncline_design.verdict.bill import bill_of_materials
 from syncline_design.verdict.named import BillLine
 
 Kind = Literal["nothing", "calibrate", "rewire", "timestamping", "sensor"]
-INTERVAL = 1.96  # standard uncertainties of 95 %
 MOST_KEPT = 6  # options of one finding that others are combined with
 
 
@@ -166,7 +166,7 @@ def _half_width(found: Estimate) -> float | None:
     if found.interval95 is not None:
         return 0.5 * (found.interval95[1] - found.interval95[0])
     spread = found.standard_uncertainty
-    return INTERVAL * spread if spread is not None and math.isfinite(spread) else None
+    return NORMAL_95 * spread if spread is not None and math.isfinite(spread) else None
 
 
 def _other_ways(

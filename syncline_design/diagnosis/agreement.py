@@ -21,6 +21,7 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.log import GAP_FACTOR
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_estimate, to_digits, to_places
+from syncline_design.model.normal import HALF_WITHIN
 
 LENGTHS_S = (1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 LEAST_STEPS = 4  # rows in a window
@@ -81,7 +82,7 @@ class Spans:
         From second differences, in which smooth motion cancels: their variance is six times.
         """
         values, step = series[self.rows], float(np.median(np.diff(self.time_s)))
-        rough = np.median(np.abs(np.diff(values, 2, axis=0))) / 0.6745 / np.sqrt(6.0)
+        rough = np.median(np.abs(np.diff(values, 2, axis=0))) / HALF_WITHIN / np.sqrt(6.0)
         return float(rough * step * np.sqrt(np.median(self.last - self.first)))
 
 

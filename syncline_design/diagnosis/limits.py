@@ -18,6 +18,7 @@ from syncline_design.diagnosis.scatter import scatter
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NORMAL_95
 from syncline_design.model.system import Stage
 
 CHANCE: Final = 1e-3  # that noise alone reaches so far beyond a limit in one of the means
@@ -85,5 +86,5 @@ def _beyond(
     spread = np.hypot(noise * np.sqrt(usual / length), np.sqrt(2.0) * pose / length)
     reach = float(norm.isf(CHANCE / len(means)) * spread)
     most = float(np.max(means))
-    near = 1.96 * float(spread)
+    near = NORMAL_95 * float(spread)
     return Beyond(most, most - near, most + near, most - reach, limit, length, means, reach)

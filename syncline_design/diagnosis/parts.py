@@ -24,6 +24,7 @@ from syncline_design.diagnosis.spans import Span, cut_to, cuttable, span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array, Effect
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.normal import NORMAL_95, NORMAL_999
 
 LEAST, MOST = 2, 13  # blocks of a stretch, of the states' sixteen
 STRETCHES = sum(BLOCKS - k + 1 for k in range(LEAST, MOST + 1))
@@ -194,7 +195,7 @@ def _alone(states: States, model: Model, one: Acting, span: Span) -> bool:
 
 def _coverage(of_95: float) -> float:
     """Standard uncertainties of one chance in a thousand, from those of one in twenty (normal)."""
-    return of_95 * 3.29 / 1.96
+    return of_95 * NORMAL_999 / NORMAL_95
 
 
 def _span(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from syncline_design.effects.record import Array
 from syncline_design.logs.stamps import per_stamp
+from syncline_design.model.normal import HALF_WITHIN
 
 NEAR, WIDE = 2, 6  # neighbours on either side
 MOST_CENTRES = 2000
@@ -50,4 +51,4 @@ def _deviation(time_s: Array, column: Array, centres: NDArray[np.int64], reach: 
     if not np.any(moving):
         return 0.0
     scaled = np.abs(left / grown[:, None])[:, moving]
-    return float(np.sqrt(np.mean((np.median(scaled, axis=0) / 0.6745) ** 2)))
+    return float(np.sqrt(np.mean((np.median(scaled, axis=0) / HALF_WITHIN) ** 2)))

@@ -35,7 +35,7 @@ from syncline_design.diagnosis.spans import span_of
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
-from syncline_design.model.normal import NORMAL_95
+from syncline_design.model.normal import NORMAL_95, OF_MEDIAN_DEVIATION
 
 Channel = tuple[Sensor, int]
 SURVEY: Sensor = ("", "target")  # channel of the targets' survey errors
@@ -471,7 +471,7 @@ def slow_states(data: Data) -> States:
 def _scale2(left: Array, freedom: float) -> float:
     """Robust variance of the whitened remainder, for the freedom that the fit took."""
     rows = max(left.shape[0], 1)
-    square = (1.4826 * float(np.median(np.abs(left)))) ** 2 if left.size else 1.0
+    square = (OF_MEDIAN_DEVIATION * float(np.median(np.abs(left)))) ** 2 if left.size else 1.0
     return float(max(square * rows / max(rows - freedom, 1.0), SCALE_LEAST**2))
 
 
