@@ -49,7 +49,7 @@ def run(*arguments: str) -> Any:
     return CliRunner().invoke(app, ["catalog", *arguments])
 
 
-def findings(folder: Path, text: str) -> list[catalog_check.CatalogFinding]:
+def findings(folder: Path, text: str) -> list[catalog_check.CatalogFlaw]:
     path = folder / "mine.yaml"
     path.write_text(text, encoding="utf-8")
     return list(check_catalogs([path]).findings)

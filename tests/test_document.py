@@ -13,21 +13,21 @@ from syncline_design.report import document as d
 from syncline_design.report.render_console import WIDTH, console
 from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
-from syncline_design.report.svg import InlineFigure, LogBox
+from syncline_design.report.svg import InlineChart, LogBox
 from syncline_design.report.table import Cell, table
 from syncline_design.report.text import visible
 
 
-def drawing() -> InlineFigure:
+def drawing() -> InlineChart:
     box = LogBox(0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0)
-    return InlineFigure('<svg xmlns="http://www.w3.org/2000/svg"><title>drawn</title></svg>', box)
+    return InlineChart('<svg xmlns="http://www.w3.org/2000/svg"><title>drawn</title></svg>', box)
 
 
-def not_drawn() -> InlineFigure:
+def not_drawn() -> InlineChart:
     raise AssertionError("only a page draws")
 
 
-def every_node(text: str, draw: Callable[[], InlineFigure] = drawing) -> d.Document:
+def every_node(text: str, draw: Callable[[], InlineChart] = drawing) -> d.Document:
     """A document with the text wherever a document takes one."""
     words = (text, d.code(text), d.strong(text), d.muted(text), d.given(text))
     rows = [[Cell(text, 1.0, "good", "*", code=True, sub=text), Cell("2", 2.0)], [text, text]]

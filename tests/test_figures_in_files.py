@@ -13,8 +13,8 @@ import report_samples as samples
 from syncline_design.choice.table import Problem
 from syncline_design.cli.app import app
 from syncline_design.report.on_verdict import on_verdict
-from syncline_design.report.rendered import figure_files
-from syncline_design.report.verdict_figures import clocks_chart
+from syncline_design.report.rendered import chart_files
+from syncline_design.report.verdict_charts import clocks_chart
 from syncline_design.spec.load import load_text
 from syncline_design.verdict import cloud as clouds
 from syncline_design.verdict.named import CloudDesign
@@ -33,8 +33,8 @@ def run(*words: object) -> tuple[int, str]:
 
 def test_each_figure_is_a_file_that_stands_alone() -> None:
     documents = {"": on_verdict(samples.fixed_wing())}
-    drawings = dict(figure_files(documents, "svg"))
-    pictures = dict(figure_files(documents, "png"))
+    drawings = dict(chart_files(documents, "svg"))
+    pictures = dict(chart_files(documents, "png"))
     assert set(drawings) == {f"{name}.svg" for name in NAMES}
     assert set(pictures) == {f"{name}.png" for name in NAMES}
     for name, content in drawings.items():
@@ -45,7 +45,7 @@ def test_each_figure_is_a_file_that_stands_alone() -> None:
         picture = pictures[name.replace("svg", "png")]
         assert picture.startswith(b"\x89PNG")
         assert struct.unpack(">II", picture[16:24]) == (int(3 * width), int(3 * height))
-    assert figure_files(documents, "svg")[0][1] == drawings["ledger.svg"]  # the same every time
+    assert chart_files(documents, "svg")[0][1] == drawings["ledger.svg"]  # the same every time
 
 
 def test_folders_of_figures_are_written_and_refused(tmp_path: Path) -> None:

@@ -19,7 +19,7 @@ import report_samples as samples
 from html_page import Page
 from syncline_design.machine.records import Record
 from syncline_design.paper.errata import ERRATA
-from syncline_design.report import errata, figures
+from syncline_design.report import charts, errata
 from syncline_design.report.on_verdict import on_verdict
 from syncline_design.report.on_verdicts import on_verdicts
 from syncline_design.report.render_html import html
@@ -242,8 +242,8 @@ def test_hostile_text_stays_text(text: str) -> None:
 
 @pytest.mark.parametrize("text", [*samples.HOSTILE, "$x^2$", "a_b", "\\alpha", "%d"])
 def test_hostile_text_is_literal_in_figures(text: str) -> None:
-    bars = [figures.TauBar(visible(text)[:30], 1e-6, 1e-3, True)]
-    svg = figures.tau_bars(bars).svg
+    bars = [charts.TauBar(visible(text)[:30], 1e-6, 1e-3, True)]
+    svg = charts.tau_bars(bars).svg
     root = ElementTree.fromstring(svg)
     texts = ["".join(node.itertext()) for node in root.iter("{http://www.w3.org/2000/svg}text")]
     assert visible(text)[:30] in texts
@@ -311,7 +311,7 @@ def test_several_verdicts_get_an_overview() -> None:
     assert page.unbalanced == []
 
 
-def curve(**changes: Any) -> figures.SynclineCurve:
+def curve(**changes: Any) -> charts.SynclineCurve:
     values: dict[str, Any] = {
         "floor_m": 0.1,
         "rate_mps": 45.0,
@@ -320,12 +320,12 @@ def curve(**changes: Any) -> figures.SynclineCurve:
         "total_m": 0.145,
         "limit": ProportionEstimate(0.2, 0.9, 0.8, 1.0, "20.0 cm"),
     }
-    return figures.SynclineCurve(**(values | changes))
+    return charts.SynclineCurve(**(values | changes))
 
 
 def test_operating_point_lies_where_the_axes_say() -> None:
     """The marker's place in the SVG against the place its own tick labels give."""
-    drawn = figures.syncline(curve())
+    drawn = charts.syncline(curve())
     box = drawn.box
     assert box is not None
     root = ElementTree.fromstring(drawn.svg)
@@ -359,7 +359,7 @@ def test_operating_point_lies_where_the_axes_say() -> None:
     ],
 )
 def test_syncline_figure_takes_extreme_systems(changes: dict[str, Any]) -> None:
-    drawn = figures.syncline(curve(**changes))
+    drawn = charts.syncline(curve(**changes))
     ElementTree.fromstring(drawn.svg)
     assert drawn.box is not None
     assert "nan" not in drawn.svg.lower().replace("nano", "")

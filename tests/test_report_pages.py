@@ -19,7 +19,7 @@ from syncline_design.diagnosis.result import Motion, Rival, WholeGap
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.model.known import EffectEntry
-from syncline_design.paper.figures import SimulatedPoint
+from syncline_design.paper.plots import SimulatedPoint
 from syncline_design.paper.reproduce import reproduce
 from syncline_design.report import numbers
 from syncline_design.report.on_diagnosis import on_diagnosis

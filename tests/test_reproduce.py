@@ -11,11 +11,11 @@ import pytest
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
 from syncline_design.paper.errata import ERRATA
-from syncline_design.paper.figures import (
+from syncline_design.paper.plots import (
     FIGURE_2_PAYLOAD,
     SURVEY_PAYLOAD,
     PaperPlot,
-    figures,
+    plots,
     survey_system,
 )
 from syncline_design.paper.printed import PRINTED
@@ -260,7 +260,7 @@ def test_same_bytes_twice(catalog: Catalog, result: Reproduction) -> None:
 
 @pytest.fixture(scope="module")
 def plotted(catalog: Catalog) -> dict[int, PaperPlot]:
-    return {figure.number: figure for figure in figures(catalog)}
+    return {figure.number: figure for figure in plots(catalog)}
 
 
 def test_curves_double_at_tau_crit_and_rise(plotted: dict[int, PaperPlot]) -> None:

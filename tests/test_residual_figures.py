@@ -20,7 +20,7 @@ from syncline_design.diagnosis.plotted import (
     Track,
 )
 from syncline_design.diagnosis.remainder_plots import normal_of, spectrum_of, track_of
-from syncline_design.report import figures_residuals as drawings
+from syncline_design.report import charts_residuals as drawings
 from syncline_design.report.document import Chart
 from syncline_design.report.on_residuals import residual_nodes
 

@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from study_specs import SPEC, write
-from syncline_design.report.figures_study import cost_map, sampled_cases
+from syncline_design.report.charts_study import cost_map, sampled_cases
 from syncline_design.report.on_study import on_study
 from syncline_design.report.render_console import console
 from syncline_design.report.render_markdown import markdown_table

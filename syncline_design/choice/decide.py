@@ -37,7 +37,7 @@ SAME = 1e-11  # errors that two roads may call the same: neither sums floats mor
 MOST_STEPS = 4000  # steps of the search that confirms the merge before it is left out
 
 
-def choose(problem: Problem, method: Road = "auto") -> Choice | Infeasible:
+def choose(problem: Problem, road: Road = "auto") -> Choice | Infeasible:
     """The best design in the documented order, or that there is none.
 
     auto: the front by merging, confirmed by best-first search and, where there are few
@@ -45,13 +45,13 @@ def choose(problem: Problem, method: Road = "auto") -> Choice | Infeasible:
     ends without a proof or two roads disagree.  A deadline that ends the search leaves a design
     that meets every sum and is not proven optimal, where one was found.
     """
-    if method not in METHODS:
-        raise ValueError(f"unknown method {method!r}; expected one of {', '.join(METHODS)}")
+    if road not in METHODS:
+        raise ValueError(f"unknown method {road!r}; expected one of {', '.join(METHODS)}")
     if is_empty(problem):
         return Infeasible(Proof("tables", True, True))
     deadline = in_force()
     deadline.check()
-    found = _by_sums(problem, method, deadline)
+    found = _by_sums(problem, road, deadline)
     if problem.judge is None or isinstance(found, Infeasible):
         return found
     return _simulated(problem, found, deadline)
@@ -86,25 +86,25 @@ def _before(problem: Problem, design: Design, deadline: Deadline) -> int:
     return next((place for place, one in enumerate(order) if one == design), MOST_COUNTED)
 
 
-def _by_sums(problem: Problem, method: Road, deadline: Deadline) -> Choice | Infeasible:
+def _by_sums(problem: Problem, road: Road, deadline: Deadline) -> Choice | Infeasible:
     """The best design by the sums; one in hand where the time ends before the proof."""
     held = in_hand(problem, deadline)
     try:
-        return _proven(problem, method, deadline)
+        return _proven(problem, road, deadline)
     except OutOfTime:
-        found = None if held is None else unproven(problem, held, method)
+        found = None if held is None else unproven(problem, held, road)
         if found is None:
             raise
         return found
 
 
-def _proven(problem: Problem, method: Road, deadline: Deadline) -> Choice | Infeasible:
+def _proven(problem: Problem, road: Road, deadline: Deadline) -> Choice | Infeasible:
     """The answer of one road, or of roads that agree."""
-    if method == "auto":
+    if road == "auto":
         return _auto(problem, deadline)
-    if method == "enumerate":
+    if road == "enumerate":
         return _outcome(problem, best_by_enumeration(problem, deadline), "enumerate")
-    if method == "milp":
+    if road == "milp":
         return _by_milp(problem, deadline)
     return _outcome(problem, best_by_front(problem, deadline), "front")
 
@@ -179,13 +179,13 @@ def _agreed(
 
 
 def _outcome(
-    problem: Problem, design: Design | None, method: str, agrees: tuple[str, ...] = ()
+    problem: Problem, design: Design | None, road: str, agrees: tuple[str, ...] = ()
 ) -> Choice | Infeasible:
-    proof = Proof(method, optimal=True, rechecked=True, agrees_with=agrees)
+    proof = Proof(road, optimal=True, rechecked=True, agrees_with=agrees)
     if design is None:
         return Infeasible(proof)
     if broken(problem, evaluate(problem, design)):
-        raise NoVerdict(f"the design found by {method} does not stand up to the exact recheck")
+        raise NoVerdict(f"the design found by {road} does not stand up to the exact recheck")
     return Choice(design, proof)
 
 

@@ -51,7 +51,7 @@ class FamilyChoice:
     proof: Proof
 
 
-def choose_by_road(family: Family, method: Road = "auto") -> FamilyChoice:
+def choose_by_road(family: Family, road: Road = "auto") -> FamilyChoice:
     """The first design in the order, by the sums.
 
     auto: by merging, confirmed by enumeration where there are few combinations, the integer program
@@ -60,17 +60,17 @@ def choose_by_road(family: Family, method: Road = "auto") -> FamilyChoice:
     """
     if family.is_empty:
         return FamilyChoice(None, Proof("tables", True, True))
-    if method == "milp":
+    if road == "milp":
         return _by_milp(family, confirm=True)
-    if method == "enumerate":
+    if road == "enumerate":
         return _proven(family, _enumerated(family), "enumerate")
     try:
         found = best_of_family(family)
     except TooLarge:
-        if method == "front":
+        if road == "front":
             raise
         return _by_milp(family, confirm=False)
-    if method == "front" or family.combinations > SMALL:
+    if road == "front" or family.combinations > SMALL:
         return _proven(family, found, "front")
     try:
         other = _enumerated(family)
@@ -183,10 +183,10 @@ def _found(family: Family, design: FamilyDesign) -> Found:
     return Found(design, sums, rank_of(family, design, sums))
 
 
-def _proven(family: Family, found: Found | None, method: str, *agrees: str) -> FamilyChoice:
+def _proven(family: Family, found: Found | None, road: str, *agrees: str) -> FamilyChoice:
     if found is not None and broken_by_family(family, found.sums):
-        raise NoVerdict(f"the payload found by {method} does not stand up to the exact recheck")
-    return FamilyChoice(found, Proof(method, True, True, agrees_with=agrees))
+        raise NoVerdict(f"the payload found by {road} does not stand up to the exact recheck")
+    return FamilyChoice(found, Proof(road, True, True, agrees_with=agrees))
 
 
 def _agreed(
@@ -213,13 +213,13 @@ class InHand:
     found: Found
     bound: Fraction | float
 
-    def proof(self, family: Family, method: str) -> Proof:
+    def proof(self, family: Family, road: str) -> Proof:
         """That it is rechecked and by what share a better one may lie below it."""
         value: Fraction | float = self.found.sums.error_m
         if family.objective != "error":
             value = known_or_more(self.found.sums.amount(family.objective))
         gap = float(1 - Fraction(self.bound) / Fraction(value)) if value else 0.0
-        return Proof(method, optimal=False, rechecked=True, gap=max(0.0, gap))
+        return Proof(road, optimal=False, rechecked=True, gap=max(0.0, gap))
 
 
 def in_hand(family: Family, also: Also | None = None) -> InHand | None:

@@ -146,7 +146,7 @@ def _shown(whole: TimingAndSpec, targets: list[Target], quiet: bool) -> int:
     from syncline_design.report.render_console import console
 
     emit(console(on_timing(whole)), targets, lambda name: render_timing(name, whole), quiet=quiet,
-         figures=lambda: {"": on_timing(whole)})  # fmt: skip
+         charts=lambda: {"": on_timing(whole)})  # fmt: skip
     return whole.exit_code
 
 

@@ -96,7 +96,7 @@ def check(
         say(skipped_text(found.skipped))
     try:
         emit(text, targets, lambda name: render_checks(name, verdicts), quiet=quiet,
-             figures=lambda: _pictures(verdicts))  # fmt: skip
+             charts=lambda: _pictures(verdicts))  # fmt: skip
     except OutputError as error:
         if len(refused) < len(verdicts):
             raise
@@ -202,7 +202,7 @@ def optimize(
     if write_design is not None and found.result.exit_code == 0:
         _write_design(found, write_design)
     emit(console(on_choice(found)), targets, lambda n: render_optimize(n, found), quiet=quiet,
-         figures=lambda: {"": on_optimised(found)})  # fmt: skip
+         charts=lambda: {"": on_optimised(found)})  # fmt: skip
     return found.result.exit_code
 
 
@@ -287,7 +287,7 @@ def study(
         result = run_study(study_file, settings, None if quiet else ProgressLine())
     text = f"{console(on_study(result))}\n{stored_text(result)}"
     emit(text, targets, lambda name: render_study(name, result), quiet=quiet,
-         figures=lambda: {"": on_study(result)})  # fmt: skip
+         charts=lambda: {"": on_study(result)})  # fmt: skip
     return result.exit_code
 
 

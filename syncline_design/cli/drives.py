@@ -78,7 +78,7 @@ def plan(
         request = PlanRequest(asked, found, minutes, tuple(flown or ()), seed)
         run = plan_drive(as_measured(case, seed), request)
     emit(console(on_plan(run)), targets, lambda name: render_plan(name, run), quiet=quiet,
-         figures=lambda: {"": on_plan(run)})  # fmt: skip
+         charts=lambda: {"": on_plan(run)})  # fmt: skip
     return run.result.exit_code
 
 

@@ -69,7 +69,7 @@ def simulate(
         run = simulate_spec(load(spec), seed=seed, samples=samples, workers=workers)
     text = console(on_simulation(run.result, run.system))
     emit(text, targets, lambda name: render_simulate(name, run), quiet=quiet,
-         figures=lambda: {"": on_simulation(run.result, run.system)})  # fmt: skip
+         charts=lambda: {"": on_simulation(run.result, run.system)})  # fmt: skip
     return 0
 
 
@@ -160,7 +160,7 @@ def diagnose(
         _write_findings(case, found, means, write_spec)
     text = console(on_diagnosis(whole))
     emit(text, targets, lambda name: render_diagnose(name, whole), quiet=quiet,
-         figures=lambda: {"": on_diagnosis(whole)})  # fmt: skip
+         charts=lambda: {"": on_diagnosis(whole)})  # fmt: skip
     return found.demanded_exit_code(informative=require_informative)
 
 
@@ -273,5 +273,5 @@ def reproduce(
         found = paper.reproduce(seed=seed)
     said = on_paper(found)
     emit(console(said), targets, lambda name: rendered(name, found, lambda: said), quiet=quiet,
-         figures=lambda: {"": said})  # fmt: skip
+         charts=lambda: {"": said})  # fmt: skip
     return 0 if found.ok else 1

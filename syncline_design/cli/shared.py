@@ -65,8 +65,8 @@ def output_option(formats: tuple[str, ...]) -> Any:
 
 
 def pictured(texts: tuple[str, ...]) -> tuple[str, ...]:
-    """The formats of a command whose result has figures."""
-    return (*texts, *formats.FIGURE_FORMATS)
+    """The formats of a command whose result has charts."""
+    return (*texts, *formats.CHART_FORMATS)
 
 
 CheckOutput = Annotated[list[str] | None, output_option(pictured(formats.CHECK_FORMATS))]
@@ -203,18 +203,18 @@ def _stem(reads: Sequence[Path]) -> str:
 
 def emit(
     text: str, targets: list[Target], render: Callable[[str], str | bytes], *, quiet: bool,
-    figures: Callable[[], Mapping[str, Document]] = dict,
+    charts: Callable[[], Mapping[str, Document]] = dict,
 ) -> None:  # fmt: skip
     """Write every target, then the text unless something else already claims standard output.
 
-    figures: the documents whose figures go into a folder, by what the files' names begin with.
+    charts: the documents whose charts go into a folder, by what the files' names begin with.
     """
     from syncline_design.report.write import STDOUT, Target, write_outputs
 
     rendered: list[tuple[Target, str | bytes]] = []
     for target in targets:
-        if target.format in formats.FIGURE_FORMATS:
-            rendered += _figures(target, figures())
+        if target.format in formats.CHART_FORMATS:
+            rendered += _charts(target, charts())
         else:
             rendered.append((target, render(target.format)))
     if text and not quiet and not any(target.path == STDOUT for target in targets):
@@ -225,14 +225,14 @@ def emit(
             say(f"written to {target.path}")
 
 
-def _figures(target: Target, documents: Mapping[str, Document]) -> list[tuple[Target, str | bytes]]:
-    """A target for each figure; the user is told where there is none."""
-    from syncline_design.report.rendered import figure_files
+def _charts(target: Target, documents: Mapping[str, Document]) -> list[tuple[Target, str | bytes]]:
+    """A target for each chart; the user is told where there is none."""
+    from syncline_design.report.rendered import chart_files
     from syncline_design.report.write import Target
 
-    found = figure_files(documents, "svg" if target.format == "svg" else "png")
+    found = chart_files(documents, "svg" if target.format == "svg" else "png")
     if not found:
-        say(f"{target.path}: nothing written, this result has no figure")
+        say(f"{target.path}: nothing written, this result has no chart")
     folder = Path(target.path)
     return [(Target(target.format, str(folder / name)), content) for name, content in found]
 

@@ -67,7 +67,7 @@ def audit(
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
     emit(console(on_audit(found)), targets, lambda name: render_audit(name, found), quiet=quiet,
-         figures=lambda: {"": on_audit(found)})  # fmt: skip
+         charts=lambda: {"": on_audit(found)})  # fmt: skip
     return found.exit_code
 
 

@@ -74,7 +74,7 @@ def watch(
         case = as_measured(load(spec), seed)
         found = watch_runs(case, request, DiagnosisSettings(seed=seed))
     emit(console(on_watch(found)), targets, lambda name: render_watch(name, found), quiet=quiet,
-         figures=lambda: {"": on_watch(found)})  # fmt: skip
+         charts=lambda: {"": on_watch(found)})  # fmt: skip
     return found.exit_code
 
 

@@ -20,13 +20,13 @@ from syncline_design.model import syncline
 from syncline_design.model.budget import budget
 from syncline_design.model.quantity import Dimension, Quantity, parse_quantity
 from syncline_design.paper.errata import COMES_OUT_AT, ERRATA, Erratum, Key
-from syncline_design.paper.figures import (
+from syncline_design.paper.plots import (
     FIGURE_1_SENSOR_ERROR_M,
     SURVEY_PAYLOAD,
     PlottedFigure,
     compare,
-    figures,
     platform_of,
+    plots,
     plotted,
     sigma_axes,
     survey_system,
@@ -123,7 +123,7 @@ def reproduce(catalog: Catalog | None = None, simulate: bool = True, *, seed: in
         inputs=inputs,
         errata=ERRATA,
         figures=tuple(
-            plotted(one, compare(one, seed=seed) if simulate else ()) for one in figures(catalog)
+            plotted(one, compare(one, seed=seed) if simulate else ()) for one in plots(catalog)
         ),
     )
 

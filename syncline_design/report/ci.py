@@ -1,4 +1,4 @@
-"""A verdict as a list of findings with their place in the spec: what CI formats are made of."""
+"""A verdict as a list of notices with their place in the spec: what CI formats are made of."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Notice:
     figures: tuple[tuple[str, str], ...] = ()
 
 
-def findings(verdict: Checked) -> list[Notice]:
+def notices(verdict: Checked) -> list[Notice]:
     """Every requirement, problem, reason of infeasibility and warning of a verdict."""
     if isinstance(verdict, Refused):
         return [_problem(entry) for entry in verdict.problems]
@@ -69,7 +69,7 @@ def _requirements(verdict: Verdict) -> Iterator[Notice]:
 
 def found_failure(found: list[Notice]) -> bool:
     """Whether something already fails a job."""
-    return any(finding.level == "fail" for finding in found)
+    return any(notice.level == "fail" for notice in found)
 
 
 def _warning(entry: Caution, verdict: Verdict) -> Notice:
@@ -163,7 +163,7 @@ def _no_design(verdict: Verdict) -> Notice:
     return Notice(level, verdict.verdict, "", verdict.file, 1, 1, text)
 
 
-def all_findings(verdicts: Iterable[Checked]) -> Iterator[Notice]:
+def all_notices(verdicts: Iterable[Checked]) -> Iterator[Notice]:
     """Findings of several verdicts, in their order."""
     for verdict in verdicts:
-        yield from findings(verdict)
+        yield from notices(verdict)

@@ -17,7 +17,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report.table import Table, Tone
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
 
 Reach = Literal["everywhere", "page", "text"]
 Style = Literal["", "strong", "muted", "code", "given"]
@@ -103,7 +103,7 @@ class Chart:
 
     kind: ClassVar = "chart"
     name: str
-    draw: Callable[[], InlineFigure]
+    draw: Callable[[], InlineChart]
     caption: str
     reach: Reach = "page"
 

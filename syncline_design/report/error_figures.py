@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from syncline_design.report import numbers, verdict_figures
+from syncline_design.report import numbers, verdict_charts
 from syncline_design.report.document import Group, Node, Text, show
 from syncline_design.report.table import Cell, Table, table
 
@@ -30,7 +30,7 @@ def error_figures(verdict: Verdict) -> list[Node]:
     found = verdict.figures
     if found is None or found.worst_case_m is None:
         return []
-    limit = verdict_figures.tightest_limit(verdict, "accuracy")
+    limit = verdict_charts.tightest_limit(verdict, "accuracy")
     return [
         Text(LEAD),
         *show(_figures(found, limit), silent=True),

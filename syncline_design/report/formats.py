@@ -21,8 +21,8 @@ PLAN_FORMATS: Final = ("json", "html", "markdown", "csv", "kml", "qgc")
 GEODETIC_FORMATS: Final = ("kml", "qgc")  # of a plan: they need an origin on the globe
 WATCH_FORMATS: Final = ("json", "html", "markdown")
 CATALOG_FORMATS: Final = ("json",)
-FIGURE_FORMATS: Final = ("svg", "png")  # of subjects with figures: a file each, into a folder
-PICTURED: Final = ("html", *FIGURE_FORMATS)  # what shows figures
+CHART_FORMATS: Final = ("svg", "png")  # of subjects with charts: a file each, into a folder
+PICTURED: Final = ("html", *CHART_FORMATS)  # what shows charts
 
 # Pages and binary tables are for files; a bare format name does not send them to a terminal.
 NOT_FOR_A_TERMINAL: Final = ("html", "parquet")

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import PurePath
 
-from syncline_design.report.ci import SILENT, Notice, all_findings
+from syncline_design.report.ci import SILENT, Notice, all_notices
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import design_sentence, outcome
 from syncline_design.verdict.tree import Checked
@@ -22,24 +22,24 @@ _COMMANDS = {
 
 
 def render_github(verdicts: Sequence[Checked]) -> str:
-    """One command per finding that is no pass, then a notice with each spec's outcome."""
-    lines = [github_command(f) for f in all_findings(verdicts) if f.level not in SILENT]
+    """One command per notice that is no pass, then a notice with each spec's outcome."""
+    lines = [github_command(f) for f in all_notices(verdicts) if f.level not in SILENT]
     for verdict in verdicts:
         text = f"{outcome(verdict).word}. {design_sentence(verdict)}"
         lines.append(github_notice(verdict.name, verdict.file, text))
     return "\n".join(lines) + "\n"
 
 
-def github_command(finding: Notice) -> str:
+def github_command(notice: Notice) -> str:
     """One annotation."""
-    title = f"{finding.id} {finding.rule}".strip()
-    if finding.level in ("waived", "known"):
-        title += f" ({finding.level})"
-    message = finding.message + (f"; {finding.justification}" if finding.justification else "")
-    file = PurePath(finding.file).as_posix()
+    title = f"{notice.id} {notice.rule}".strip()
+    if notice.level in ("waived", "known"):
+        title += f" ({notice.level})"
+    message = notice.message + (f"; {notice.justification}" if notice.justification else "")
+    file = PurePath(notice.file).as_posix()
     return (
-        f"::{_COMMANDS[finding.level]} file={_property(file)},line={finding.line},"
-        f"col={finding.column},title={_property(title)}::{_data(message)}"
+        f"::{_COMMANDS[notice.level]} file={_property(file)},line={notice.line},"
+        f"col={notice.column},title={_property(title)}::{_data(message)}"
     )
 
 

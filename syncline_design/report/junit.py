@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from xml.etree import ElementTree
 
-from syncline_design.report.ci import Notice, findings
+from syncline_design.report.ci import Notice, notices
 from syncline_design.report.text import visible
 from syncline_design.report.verdict_words import outcome
 from syncline_design.verdict.tree import Checked
@@ -18,7 +18,7 @@ def render_junit(verdicts: Sequence[Checked]) -> str:
     Times are 0 and no timestamp is given: the same verdict gives the same bytes.
     """
     return junit_text(
-        suite_of(verdict.name, verdict.file, findings(verdict), outcome(verdict).word)
+        suite_of(verdict.name, verdict.file, notices(verdict), outcome(verdict).word)
         for verdict in verdicts
     )
 
@@ -37,8 +37,8 @@ def junit_text(members: Iterable[ElementTree.Element]) -> str:
 
 
 def suite_of(name: str, file: str, found: Sequence[Notice], word: str) -> ElementTree.Element:
-    """A suite named after a spec: a test per finding, the outcome and warnings as its output."""
-    cases = [finding for finding in found if finding.level != "warning"]
+    """A suite named after a spec: a test per notice, the outcome and warnings as its output."""
+    cases = [notice for notice in found if notice.level != "warning"]
     counts = {
         "tests": len(cases),
         "failures": sum(f.level == "fail" for f in cases),
@@ -49,43 +49,43 @@ def suite_of(name: str, file: str, found: Sequence[Notice], word: str) -> Elemen
     for key, value in counts.items():
         suite.set(key, str(value))
     suite.set("time", "0")
-    for finding in cases:
-        suite.append(_case(finding, file))
+    for notice in cases:
+        suite.append(_case(notice, file))
     lines = [word]
     lines += [f"warning [{f.rule}]: {visible(f.message)}" for f in found if f.level == "warning"]
     ElementTree.SubElement(suite, "system-out").text = "\n".join(lines)
     return suite
 
 
-def _case(finding: Notice, file: str) -> ElementTree.Element:
-    name = f"{finding.id} {finding.rule}" if finding.id else finding.rule
+def _case(notice: Notice, file: str) -> ElementTree.Element:
+    name = f"{notice.id} {notice.rule}" if notice.id else notice.rule
     case = ElementTree.Element(
         "testcase",
         {
             "name": visible(name),
             "classname": visible(file),
-            "file": visible(finding.file),
-            "line": str(finding.line),
+            "file": visible(notice.file),
+            "line": str(notice.line),
             "time": "0",
         },
     )
-    message = visible(finding.message)
-    place = f"{visible(finding.file)}:{finding.line}:{finding.column}"
-    if finding.id:
+    message = visible(notice.message)
+    place = f"{visible(notice.file)}:{notice.line}:{notice.column}"
+    if notice.id:
         listed = ElementTree.SubElement(case, "properties")
-        told = (("requirement", finding.id), ("kind", finding.rule), *finding.figures)
+        told = (("requirement", notice.id), ("kind", notice.rule), *notice.figures)
         for key, value in (*told, ("place", place)):
             ElementTree.SubElement(listed, "property", {"name": key, "value": visible(value)})
-    if finding.level == "fail":
-        failure = ElementTree.SubElement(case, "failure", {"type": finding.rule})
+    if notice.level == "fail":
+        failure = ElementTree.SubElement(case, "failure", {"type": notice.rule})
         failure.set("message", message)
         failure.text = f"{place}: {message}"
-    elif finding.level == "undecided":
-        error = ElementTree.SubElement(case, "error", {"type": finding.rule, "message": message})
+    elif notice.level == "undecided":
+        error = ElementTree.SubElement(case, "error", {"type": notice.rule, "message": message})
         error.text = f"{place}: {message}"
-    elif finding.level in ("waived", "known"):
-        reason = f"{visible(finding.justification)}; {message}"
+    elif notice.level in ("waived", "known"):
+        reason = f"{visible(notice.justification)}; {message}"
         ElementTree.SubElement(case, "skipped", {"message": reason})
-    elif finding.level == "not_reached":
+    elif notice.level == "not_reached":
         ElementTree.SubElement(case, "skipped", {"message": message})
     return case

@@ -28,7 +28,7 @@ from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
 
 MOST_DRAWN: Final = 40  # streams of a page
 WORDS: Final[Mapping[str, str]] = {
@@ -196,9 +196,9 @@ def _charts(result: Audit) -> Iterator[Node]:
         yield Text(f"and {len(rows) - len(shown)} sound streams more", quiet=True, reach="page")
 
 
-def _drawer(rows: list[StreamAudit]) -> Callable[[], InlineFigure]:
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_audit import traces
+def _drawer(rows: list[StreamAudit]) -> Callable[[], InlineChart]:
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_audit import traces
 
         return traces(rows)
 

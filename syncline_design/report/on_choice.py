@@ -42,7 +42,7 @@ from syncline_design.verdict.named import FrontDesign, NamedDesign, RankedDesign
 from syncline_design.verdict.optimisation import Optimisation, Optimised
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
 
 
 def on_choice(found: Optimised) -> Document:
@@ -292,8 +292,8 @@ def _figure_chart(found: Optimised, words: str) -> list[Node]:
         if point.drawn_m
     ]
 
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import FrontMark, pareto_front
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_front import FrontMark, pareto_front
 
         drawn = [FrontMark(*point) for point in sorted(points)]
         return pareto_front(

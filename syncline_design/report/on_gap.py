@@ -19,7 +19,7 @@ from syncline_design.diagnosis.result import (
     WholeGap,
 )
 from syncline_design.machine.sentences import sentence_list
-from syncline_design.report import figures_diagnosis as drawings
+from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,

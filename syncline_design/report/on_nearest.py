@@ -11,7 +11,7 @@ from syncline_design.verdict.named import MissedLimit, Nearest
 from syncline_design.verdict.tree import UNITS
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
     from syncline_design.spec.case import Case
 
 
@@ -64,8 +64,8 @@ def _chart(
         return []
     at = (found.cost, found.error_m)
 
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import FrontMark, pareto_front
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_front import FrontMark, pareto_front
 
         drawn = [FrontMark(point.cost, point.error_m, False) for point in points]
         return pareto_front(drawn, currency, limit, price, beside=at)

@@ -6,10 +6,12 @@ from collections.abc import Iterable
 from typing import Final
 
 from syncline_design.paper.errata import Erratum
-from syncline_design.paper.figures import PlottedFigure, SimulatedPoint
+from syncline_design.paper.plots import PlottedFigure, SimulatedPoint
 from syncline_design.paper.reproduce import TAU_CRIT_TABLES, Counts, Reproduction
 from syncline_design.paper.reproduce import PrintedCell as Printed
 from syncline_design.report import numbers
+from syncline_design.report.charts import SynclineCurve, syncline
+from syncline_design.report.charts_curves import LabelledCurve, letters, synclines
 from syncline_design.report.document import (
     Chart,
     Document,
@@ -24,10 +26,8 @@ from syncline_design.report.document import (
     show,
     strong,
 )
-from syncline_design.report.figures import SynclineCurve, syncline
-from syncline_design.report.figures_curves import LabelledCurve, letters, synclines
 from syncline_design.report.simulated import span
-from syncline_design.report.svg import InlineFigure
+from syncline_design.report.svg import InlineChart
 from syncline_design.report.table import Cell, Table, Tone, table
 
 _MARKS: Final[dict[str, tuple[str, Tone]]] = {
@@ -189,7 +189,7 @@ def _simulated(points: tuple[SimulatedPoint, ...]) -> str:
     return f"{len(points)} simulated worst cases reach {ends} of the Syncline."
 
 
-def _drawn(figure: PlottedFigure, title: str) -> InlineFigure:
+def _drawn(figure: PlottedFigure, title: str) -> InlineChart:
     """A single Syncline with roof, slope and both regions named, as in the paper's figure 1."""
     name, first = f"fig-paper-{figure.number}", figure.curves[0]
     if len(figure.curves) == 1 and not figure.simulated:

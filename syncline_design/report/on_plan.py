@@ -12,7 +12,7 @@ from syncline_design.model.quantity import si_name, suffix_unit
 from syncline_design.model.unit_table import Dimension
 from syncline_design.planning.result import Flown, Plan, Separated
 from syncline_design.planning.telling import PlanRun
-from syncline_design.report import figures_plan as drawings
+from syncline_design.report import charts_plan as drawings
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,

@@ -13,8 +13,8 @@ from syncline_design.diagnosis.plotted import (
     Spectrum,
     Track,
 )
-from syncline_design.report import figures_diagnosis as drawings
-from syncline_design.report import figures_residuals as of_residuals
+from syncline_design.report import charts_diagnosis as drawings
+from syncline_design.report import charts_residuals as of_residuals
 from syncline_design.report import numbers
 from syncline_design.report.document import Chart, Node
 

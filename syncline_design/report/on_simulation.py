@@ -38,7 +38,7 @@ from syncline_design.simulation.results import ComparisonRow, Simulation
 from syncline_design.verdict.simulated_spec import SimulatedSpec
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
 
 GRID_COLUMNS: Final = ("tau_s", "worst_case_m", "syncline_m", "ratio", "bound_m", "gap", "reason")
 
@@ -110,8 +110,8 @@ def _grid(result: Simulation, system: System | None) -> list[Node]:
 
 
 def _grid_chart(grid: tuple[ComparisonRow, ...]) -> list[Node]:
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import GridPoint, simulated_against_syncline
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_grid import GridPoint, simulated_against_syncline
 
         return simulated_against_syncline(
             [GridPoint(r.tau_s, r.worst_case_m, r.syncline_m) for r in grid if r.tau_s > 0.0]

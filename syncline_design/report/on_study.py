@@ -6,7 +6,7 @@ from functools import partial
 
 from syncline_design import __version__
 from syncline_design.machine.sentences import sentence_list
-from syncline_design.report import figures_study, numbers
+from syncline_design.report import charts_study, numbers
 from syncline_design.report.document import (
     Chart,
     Document,
@@ -82,7 +82,7 @@ def _heat(summary: StudySummary) -> list[Node]:
         size = f"{len(heat.x_values)} by {len(heat.y_values)} values"
         short = [Text(f"Over {size}: see the page or the CSV table.", reach="text")]
     return [
-        Chart("heat", lambda: figures_study.cost_map(heat), caption),
+        Chart("heat", lambda: charts_study.cost_map(heat), caption),
         *show(shown, silent=True, reach="page"),
         *short,
     ]
@@ -98,7 +98,7 @@ def _sampled(summary: StudySummary) -> list[Node]:
         return []
     several = varied(summary)
     says = [_says(summary.briefs[point.number - 1], several) for point in found.points]
-    draw = partial(figures_study.sampled_cases, found, currency, says)
+    draw = partial(charts_study.sampled_cases, found, currency, says)
     return [Chart("sampled", draw, _sampled_caption(found))]
 
 
@@ -124,8 +124,8 @@ def _fronts(summary: StudySummary) -> list[Node]:
     chosen = _distinct_fronts(summary)
     nodes: list[Node] = []
     if len({front.currency for front in chosen}) == 1:
-        named = [figures_study.NamedFront(_common(summary, f), f.points) for f in chosen]
-        draw = partial(figures_study.fronts, named, chosen[0].currency)
+        named = [charts_study.NamedFront(_common(summary, f), f.points) for f in chosen]
+        draw = partial(charts_study.fronts, named, chosen[0].currency)
         caption = "At most eight fronts are drawn; the table has all that differ."
         nodes.append(Chart("fronts", draw, caption))
     return [*nodes, *show(_fronts_table(summary), silent=True, reach="page")]

@@ -9,6 +9,7 @@ from syncline_design.clocks.result import Timing
 from syncline_design.comparison.clock_meaning import TimingAndSpec, TimingMeaning
 from syncline_design.model.figure_text import format_duration
 from syncline_design.report import numbers
+from syncline_design.report.charts_timing import offsets, sessions, stability
 from syncline_design.report.document import (
     Chart,
     Document,
@@ -24,14 +25,13 @@ from syncline_design.report.document import (
     section,
     show,
 )
-from syncline_design.report.figures_timing import offsets, sessions, stability
 from syncline_design.report.rendered import rendered
 from syncline_design.report.table import Cell, Table, table
 from syncline_design.verdict.measured import coverage_words
 from syncline_design.verdict.tree import PREDICATES
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
 
 _MOST_ROWS: Final = 40
 _RESTS: Final = {
@@ -248,7 +248,7 @@ def _entry(result: Timing) -> list[Node]:
 
 
 def _offsets(result: Timing) -> list[Node]:
-    def draw() -> InlineFigure:
+    def draw() -> InlineChart:
         return offsets(result.trace, result.bound_s)
 
     if not result.trace:
@@ -262,7 +262,7 @@ def _sessions(result: Timing) -> list[Node]:
     both = (("statistical", result.statistical_bound_s), ("hard", result.hard_bound_s))
     bounds = [(name, value) for name, value in both if value]
 
-    def draw() -> InlineFigure:
+    def draw() -> InlineChart:
         return sessions(counted, result.claim.coverage, bounds)
 
     chart: list[Node] = [Chart("sessions", draw, "One dot a session.")] if counted else []
@@ -318,7 +318,7 @@ def _events(result: Timing) -> list[Node]:
 
 
 def _noise(result: Timing) -> list[Node]:
-    def draw() -> InlineFigure:
+    def draw() -> InlineChart:
         return stability(result.stability)
 
     nodes: list[Node] = []

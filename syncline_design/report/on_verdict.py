@@ -12,7 +12,7 @@ from syncline_design.report import (
     choice_tables,
     errata,
     numbers,
-    verdict_figures,
+    verdict_charts,
     verdict_tables,
     verdict_words,
 )
@@ -107,7 +107,7 @@ def _at_a_glance(verdict: Verdict) -> list[Node]:
     total = None if verdict.syncline is None else verdict.syncline.total_m
     spread = [] if verdict.monte_carlo is None else histogram_chart(verdict.monte_carlo, total)
     figures = (
-        *verdict_figures.ledger_chart(verdict), *verdict_figures.timing_chart(verdict), *spread,
+        *verdict_charts.ledger_chart(verdict), *verdict_charts.timing_chart(verdict), *spread,
     )  # fmt: skip
     table = show(verdict_tables.requirements(verdict), silent=True)
     return [*table, *([Group(figures, "trio", reach="page")] if figures else [])]
@@ -143,7 +143,7 @@ def _key_facts(verdict: Verdict) -> list[tuple[str, str]]:
     if design is not None and design.cost is not None:
         currency = verdict_tables.currency_of(verdict)
         facts.append(("Price", numbers.money(design.cost, currency)))
-    limit = verdict_figures.tightest_limit(verdict, "accuracy")
+    limit = verdict_charts.tightest_limit(verdict, "accuracy")
     if verdict.syncline is not None:
         error = numbers.error(verdict.syncline.total_m, limit)
         asked = "" if limit is None else f" of {numbers.limit(limit)}"
@@ -182,8 +182,8 @@ def _why_not(verdict: Verdict) -> list[Node]:
     if why is None:
         return []
     limits = (
-        verdict_figures.tightest_limit(verdict, "accuracy"),
-        verdict_figures.lowest_limit(verdict, "cost"),
+        verdict_charts.tightest_limit(verdict, "accuracy"),
+        verdict_charts.lowest_limit(verdict, "cost"),
     )
     currency = verdict_tables.currency_of(verdict)
     return [*infeasibility_nodes(why), *nearest_nodes(verdict.nearest, currency, *limits)]
@@ -211,13 +211,13 @@ def _timing(verdict: Verdict) -> list[Node]:
     lead = ("A sensor whose \u03c4 stays below its \u03c4_crit is limited by its own noise, not by "
             "its timestamps.")  # fmt: skip
     return [
-        Text(lead), *verdict_figures.clocks_chart(verdict), *show(table, silent=True),
+        Text(lead), *verdict_charts.clocks_chart(verdict), *show(table, silent=True),
         *show(verdict_tables.measured(verdict)),
     ]  # fmt: skip
 
 
 def _syncline(verdict: Verdict) -> list[Node]:
-    syncline, chart = verdict.syncline, verdict_figures.syncline_chart(verdict)
+    syncline, chart = verdict.syncline, verdict_charts.syncline_chart(verdict)
     if syncline is None or not chart:
         return []
     tau, crit = syncline.tau_s, syncline.tau_crit_s
@@ -236,7 +236,7 @@ def _syncline(verdict: Verdict) -> list[Node]:
         beside = [term.value_m for term in syncline.ledger if term.kind == kind]
         if beside:
             facts.insert(-2, (label, numbers.length(math.fsum(beside))))
-    column = Group((Facts(tuple(facts)), *verdict_figures.explorer(verdict)))
+    column = Group((Facts(tuple(facts)), *verdict_charts.explorer(verdict)))
     return [Group((*chart, column), "split"), *show(verdict_tables.models(syncline))]
 
 
@@ -262,8 +262,8 @@ def _simulation(verdict: Verdict) -> list[Node]:
 def _choice(verdict: Verdict) -> list[Node]:
     proof = _proof(verdict)
     nodes: list[Node] = [Text(proof)] if proof else []
-    nodes += verdict_figures.choice_chart(verdict)
-    nodes += verdict_figures.figure_chart(verdict)
+    nodes += verdict_charts.choice_chart(verdict)
+    nodes += verdict_charts.figure_chart(verdict)
     found = verdict.choice.bargains if verdict.choice is not None else None
     nodes += bargain_nodes(found or (), verdict_tables.currency_of(verdict))
     for table in choice_tables.choice_tables(verdict):

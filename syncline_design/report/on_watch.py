@@ -11,7 +11,7 @@ from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
 from syncline_design.machine.sentences import sentence_list
 from syncline_design.model.quantity import split_suffix
-from syncline_design.report import figures_watch as drawings
+from syncline_design.report import charts_watch as drawings
 from syncline_design.report import numbers
 from syncline_design.report.document import (
     Chart,

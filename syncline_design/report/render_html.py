@@ -19,7 +19,7 @@ from syncline_design.report.text import visible
 if TYPE_CHECKING:
     from jinja2 import Environment
 
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
 
 _TEMPLATES: Final = "syncline_design.templates"
 MOST_VALUES: Final = 200  # rows of the table below a figure; more are shown one by one
@@ -94,7 +94,7 @@ def _environment() -> Environment:
     return environment
 
 
-def _points(figure: InlineFigure) -> str:
+def _points(figure: InlineChart) -> str:
     """What the places of a figure say, for the page's script.
 
     Labels; every word once; a row a place: left, top, width, height, the places of its words.
@@ -109,7 +109,7 @@ def _points(figure: InlineFigure) -> str:
     return json.dumps(data, ensure_ascii=False, separators=(",", ":"))
 
 
-def _values(figure: InlineFigure, caption: str) -> Table | None:
+def _values(figure: InlineChart, caption: str) -> Table | None:
     """The same as a table; None of a figure that says nothing, or more than anyone reads."""
     if not 0 < len(figure.told) <= MOST_VALUES:
         return None
@@ -118,7 +118,7 @@ def _values(figure: InlineFigure, caption: str) -> Table | None:
     return table(caption, labels, rows)
 
 
-def _labels(figure: InlineFigure) -> list[str]:
+def _labels(figure: InlineChart) -> list[str]:
     return list(dict.fromkeys(label for t in figure.told for label in t.says))
 
 

@@ -12,7 +12,7 @@ from syncline_design.report.render_html import html
 from syncline_design.report.render_markdown import markdown
 
 
-def figure_files(
+def chart_files(
     documents: Mapping[str, Document], kind: Literal["svg", "png"]
 ) -> list[tuple[str, bytes]]:  # fmt: skip
     """Every figure of the documents as a file of its own: name and content.

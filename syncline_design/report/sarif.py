@@ -13,7 +13,7 @@ from typing import Any, Final
 from urllib.parse import quote
 
 from syncline_design import __version__
-from syncline_design.report.ci import SILENT, Notice, all_findings
+from syncline_design.report.ci import SILENT, Notice, all_notices
 from syncline_design.report.json_out import json_text
 from syncline_design.report.text import visible
 from syncline_design.verdict.tree import Checked
@@ -60,11 +60,11 @@ _LEVELS: Final = {
 def render_sarif(verdicts: Sequence[Checked]) -> str:
     """A SARIF log with one run; what passes is left out, what is waived is suppressed, what is
     no worse than in the baseline is unchanged."""
-    return sarif_log([f for f in all_findings(verdicts) if f.level not in SILENT])
+    return sarif_log([f for f in all_notices(verdicts) if f.level not in SILENT])
 
 
 def sarif_log(found: Sequence[Notice]) -> str:
-    """A SARIF log of these findings."""
+    """A SARIF log of these notices."""
     rules = sorted({_rule_id(f) for f in found})
     run = {
         "tool": {
@@ -75,13 +75,13 @@ def sarif_log(found: Sequence[Notice]) -> str:
             }
         },
         "columnKind": "unicodeCodePoints",
-        "results": [_result(finding, rules) for finding in found],
+        "results": [_result(notice, rules) for notice in found],
     }
     return json_text({"$schema": SCHEMA_URI, "version": "2.1.0", "runs": [run]})
 
 
-def _rule_id(finding: Notice) -> str:
-    return visible(finding.rule)
+def _rule_id(notice: Notice) -> str:
+    return visible(notice.rule)
 
 
 def _rule(rule: str) -> dict[str, Any]:
@@ -89,31 +89,31 @@ def _rule(rule: str) -> dict[str, Any]:
     return {"id": rule, "shortDescription": {"text": text}}
 
 
-def _result(finding: Notice, rules: list[str]) -> dict[str, Any]:
-    rule = _rule_id(finding)
+def _result(notice: Notice, rules: list[str]) -> dict[str, Any]:
+    rule = _rule_id(notice)
     result: dict[str, Any] = {
         "ruleId": rule,
         "ruleIndex": rules.index(rule),
         "kind": "fail",
-        "level": _LEVELS[finding.level],
-        "message": {"text": visible(finding.message)},
-        "locations": [_location(finding)],
-        "partialFingerprints": {"requirement/v1": _fingerprint(finding)},
+        "level": _LEVELS[notice.level],
+        "message": {"text": visible(notice.message)},
+        "locations": [_location(notice)],
+        "partialFingerprints": {"requirement/v1": _fingerprint(notice)},
     }
-    if finding.level == "waived":
+    if notice.level == "waived":
         result["suppressions"] = [
-            {"kind": "external", "justification": visible(finding.justification)}
+            {"kind": "external", "justification": visible(notice.justification)}
         ]
-    elif finding.level == "known":
+    elif notice.level == "known":
         result["baselineState"] = "unchanged"
     return result
 
 
-def _location(finding: Notice) -> dict[str, Any]:
+def _location(notice: Notice) -> dict[str, Any]:
     return {
         "physicalLocation": {
-            "artifactLocation": {"uri": artifact_uri(finding.file)},
-            "region": {"startLine": finding.line, "startColumn": finding.column},
+            "artifactLocation": {"uri": artifact_uri(notice.file)},
+            "region": {"startLine": notice.line, "startColumn": notice.column},
         }
     }
 
@@ -125,7 +125,7 @@ def artifact_uri(file: str) -> str:
     return f"file://{encoded}" if path.is_absolute() else encoded
 
 
-def _fingerprint(finding: Notice) -> str:
+def _fingerprint(notice: Notice) -> str:
     """Stable under changes of the figures: file, rule and requirement."""
-    parts = (finding.file, finding.rule, finding.id or finding.message)
+    parts = (notice.file, notice.rule, notice.id or notice.message)
     return hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:32]

@@ -10,7 +10,7 @@ from syncline_design.report.table import Cell, Table, table
 from syncline_design.report.words import ENVELOPES
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
     from syncline_design.simulation.results import MonteCarlo, QuantileEstimate
 
 BEYOND: Final = (
@@ -92,8 +92,8 @@ def histogram_chart(found: MonteCarlo, syncline_m: float | None) -> list[Node]:
         if numbers.finite(entry.value_m) is not None
     )
 
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import DensityBars, error_histogram
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_distribution import DensityBars, error_histogram
 
         return error_histogram(DensityBars(bins.edges_m, bins.density, marks, within, syncline_m))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from syncline_design.report import study_findings
+from syncline_design.report import study_notices
 from syncline_design.report.csv_out import csv_text
 from syncline_design.report.formats import STUDY_FORMATS as STUDY_FORMATS
 from syncline_design.report.on_study import on_study
@@ -30,11 +30,11 @@ def render_study(name: str, result: StudyResult) -> str | bytes:
 def _for_ci(name: str, result: StudyResult) -> str:
     match name:
         case "junit":
-            return study_findings.study_junit(result)
+            return study_notices.study_junit(result)
         case "sarif":
-            return study_findings.study_sarif(result)
+            return study_notices.study_sarif(result)
         case "github":
-            return study_findings.study_github(result)
+            return study_notices.study_github(result)
         case _:
             raise ValueError(f"unknown format {name}")
 

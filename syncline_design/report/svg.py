@@ -91,7 +91,7 @@ class Told:
 
 
 @dataclass(frozen=True, slots=True)
-class InlineFigure:
+class InlineChart:
     """An `<svg>` element as text, and the box of its main axes where that is log-log.
 
     exported: the figure as a file of its own, on a ground and in colours of its own.
@@ -118,7 +118,7 @@ def tell(
 
 def draw(
     name: str, title: str, description: str, size: tuple[float, float], build: Build
-) -> InlineFigure:
+) -> InlineChart:
     """Draw one figure with the house style and return it as an `<svg>` element.
 
     name: prefix of every id, unique in the page.  title, description: what a screen reader says.
@@ -134,7 +134,7 @@ def draw(
         text = _saved(figure, "svg", _DPI, "none").decode("utf-8")
         box = None if axes is None else _log_box(figure, axes)
         told = tuple(_places(size[1], _NOTES.get()))
-    return InlineFigure(_themed(text, name, title, description), box, told, exported)
+    return InlineChart(_themed(text, name, title, description), box, told, exported)
 
 
 @contextmanager

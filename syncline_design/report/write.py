@@ -12,7 +12,7 @@ from typing import Final
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.result_files import OutputError, descriptor_of, is_stream, write_files
-from syncline_design.report.formats import FIGURE_FORMATS, NOT_FOR_A_TERMINAL
+from syncline_design.report.formats import CHART_FORMATS, NOT_FOR_A_TERMINAL
 
 __all__ = [
     "STDOUT", "OutputError", "Target", "apart", "check_targets", "check_writable", "parse_target",
@@ -40,10 +40,10 @@ def parse_target(argument: str, known: Sequence[str], stem: str = "report") -> T
     of no use on a terminal, go to a file in the working folder named after `stem`.
     """
     name, separator, path = argument.partition(":")
-    if name in known and name in FIGURE_FORMATS and path in ("", STDOUT):
+    if name in known and name in CHART_FORMATS and path in ("", STDOUT):
         raise OutputError(
-            f"--output {argument}: figures go into a folder, a file each; expected {name}:FOLDER, "
-            f"as in --output {name}:figures"
+            f"--output {argument}: charts go into a folder, a file each; expected {name}:FOLDER, "
+            f"as in --output {name}:charts"
         )
     if name not in known:
         raise OutputError(
@@ -88,7 +88,7 @@ def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None
     inputs = {os.path.realpath(path) for path in reads}
     seen: set[str] = set()
     for target in targets:
-        if target.format in FIGURE_FORMATS:
+        if target.format in CHART_FORMATS:
             _check_folder(target, inputs)
             continue
         key = STDOUT if target.path == STDOUT else os.path.realpath(target.path)
@@ -104,11 +104,11 @@ def check_targets(targets: Sequence[Target], reads: Sequence[Path] = ()) -> None
 
 
 def _check_folder(target: Target, inputs: set[str]) -> None:
-    """Refuse a place for figures that is a file, or cannot become a folder."""
+    """Refuse a place for charts that is a file, or cannot become a folder."""
     path = Path(target.path)
     if os.path.realpath(path) in inputs or (path.exists() and not path.is_dir()):
-        raise OutputError(f"{target.path}: is no folder; {target.format} writes a file a figure")
-    check_writable(path / f"figure.{target.format}")
+        raise OutputError(f"{target.path}: is no folder; {target.format} writes a file a chart")
+    check_writable(path / f"chart.{target.format}")
 
 
 def apart(path: Path, targets: Sequence[Target]) -> None:

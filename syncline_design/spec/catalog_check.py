@@ -53,7 +53,7 @@ _COMPARED: Final = (*SIGMA_DIMENSIONS, "reach", "rate", "cost", "mass", "power")
 
 
 @dataclass(frozen=True, slots=True)
-class CatalogFinding(Record):
+class CatalogFlaw(Record):
     """One thing to mend, or to say: where, what, what to do."""
 
     code: Code
@@ -81,7 +81,7 @@ class CatalogCheck(Record):
     schema: Annotated[str, Named(SCHEMA)]
     files: tuple[str, ...]
     entries: int
-    findings: tuple[CatalogFinding, ...]
+    findings: tuple[CatalogFlaw, ...]
 
     @property
     def exit_code(self) -> int:
@@ -98,10 +98,10 @@ class _Place:
     entry: Any
     document: ParsedFile
 
-    def finding(self, code: Code, key: str, message: str, hint: str) -> CatalogFinding:
+    def finding(self, code: Code, key: str, message: str, hint: str) -> CatalogFlaw:
         path: KeyPath = (self.section, self.id, *([key] if key else []))
         line, column = self.document.key_positions.get(path, self.document.position(path))
-        return CatalogFinding(
+        return CatalogFlaw(
             code, self.document.file, line, column, message, hint, self.section, self.id,
             key or None,
         )  # fmt: skip
@@ -156,32 +156,32 @@ def _alone(document: ParsedFile, section: str, identity: str) -> Any:
     return None if model is None else getattr(model, section)[identity]
 
 
-def _refused(flaw: Flaw) -> CatalogFinding:
+def _refused(flaw: Flaw) -> CatalogFlaw:
     code: Code = "duplicate" if flaw.message.startswith("this id is taken") else "format"
     parts = [f"expected {flaw.expected}" if flaw.expected else ""]
     parts += [f"found {flaw.found}" if flaw.found else "", flaw.hint]
     message = f"{flaw.path}: {flaw.message}" if flaw.path else flaw.message
     hint = "; ".join(part for part in parts if part)
-    return CatalogFinding(code, flaw.file, flaw.line, flaw.column, message, hint)
+    return CatalogFlaw(code, flaw.file, flaw.line, flaw.column, message, hint)
 
 
-def _withdrawn(collection: Collection) -> Iterator[CatalogFinding]:
+def _withdrawn(collection: Collection) -> Iterator[CatalogFlaw]:
     """Ids that a release had and the shipped catalogs have no more: specs out there name them."""
     for number, line in enumerate(published_ids().read_text("utf-8").splitlines(), 1):
         section, _, identity = line.partition(" ")
         if identity and (section, identity) not in collection.origins:
             message = f"{identity} of {section} was published and is gone"
             hint = "bring it back; what is no longer made is discontinued, not deleted"
-            yield CatalogFinding("published", "builtin:ids.txt", number, 1, message, hint)
+            yield CatalogFlaw("published", "builtin:ids.txt", number, 1, message, hint)
 
 
-def _ids(one: _Place) -> Iterator[CatalogFinding]:
+def _ids(one: _Place) -> Iterator[CatalogFlaw]:
     """An id is for years: specs name it, so it holds no capitals, blanks or signs."""
     if not _ID.fullmatch(one.id):
         yield one.finding("id", "", "an id that will not last", "lower case: maker_model_variant")
 
 
-def _sources(one: _Place) -> Iterator[CatalogFinding]:
+def _sources(one: _Place) -> Iterator[CatalogFlaw]:
     """Figures that neither a source nor a basis accounts for."""
     entry: Entry = one.entry
     if entry.source:
@@ -208,7 +208,7 @@ def _has_basis(entry: Entry, key: str) -> bool:
     return any(entry.basis_of(f"{key}.{part}") for part in PARTS.get(key, ()))
 
 
-def _conversions(one: _Place) -> Iterator[CatalogFinding]:
+def _conversions(one: _Place) -> Iterator[CatalogFlaw]:
     """Sigmas that are not what the printed figure and its kind give."""
     for key, printed in one.entry.figures.items():
         name, part = split_figure(key)
@@ -251,7 +251,7 @@ def _axis_figures(value: Any, name: str, part: str) -> tuple[Any, ...]:
     return tuple(axes[axis] for axis in AXES[name][part])
 
 
-def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[CatalogFinding]:
+def _successor(one: _Place, known: Mapping[str, set[str]]) -> Iterator[CatalogFlaw]:
     """Who comes after a product that is no longer made, as far as that is known."""
     lifecycle: Lifecycle | None = getattr(one.entry, "lifecycle", None)
     if lifecycle is None:
@@ -278,7 +278,7 @@ def _sizes(every: Sequence[_Place]) -> Mapping[tuple[str, str, str], list[float]
 
 def _siblings(
     one: _Place, sizes: Mapping[tuple[str, str, str], list[float]]
-) -> Iterator[CatalogFinding]:
+) -> Iterator[CatalogFlaw]:
     """Figures more than a factor of 5 off the median of the others of the same kind of sensor."""
     entry = one.entry
     if not isinstance(entry, SensorEntry) or not entry.type:
@@ -314,7 +314,7 @@ def size_of(entry: Product, key: str) -> float | None:
     return None if value is None else float(value)
 
 
-def _same_names(looked_at: Sequence[_Place], every: Sequence[_Place]) -> Iterator[CatalogFinding]:
+def _same_names(looked_at: Sequence[_Place], every: Sequence[_Place]) -> Iterator[CatalogFlaw]:
     """Two entries of a section by one name: a reader of a report cannot tell them apart."""
     first: dict[tuple[str, str], _Place] = {}
     asked = {(one.section, one.id) for one in looked_at}

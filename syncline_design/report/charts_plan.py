@@ -1,4 +1,4 @@
-"""Figures of a plan: its path from above, and what is known after each leg."""
+"""Charts of a plan: its path from above, and what is known after each leg."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from syncline_design.planning.result import Plan
 from syncline_design.planning.telling import PlanRun
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import MUTED, SERIES
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -22,7 +22,7 @@ MOST_POINTS = 2000
 FAR = 1e6  # times what is asked: not seen yet, and off the scale
 
 
-def path(run: PlanRun) -> InlineFigure:
+def path(run: PlanRun) -> InlineChart:
     """East to the right, north up; every leg in its colour, numbered where it begins."""
     north, east, _ = run.path.position_m.T
     leg, step = np.array(run.leg), max(1, len(run.leg) // MOST_POINTS)
@@ -60,7 +60,7 @@ def path(run: PlanRun) -> InlineFigure:
     return draw("fig-path", "Path from above", spoken, (WIDTH, 340.0), build)
 
 
-def after(found: Plan) -> InlineFigure:
+def after(found: Plan) -> InlineChart:
     """Sigma over tolerance after every leg, logarithmic; reached below the line at 1."""
     keys = [k for k in found.after[-1].sigma if k in found.tolerance]
     legs = list(range(1, len(found.after) + 1))

@@ -1,4 +1,4 @@
-"""Figures of a watch: the evidence for a change, and every parameter over the runs."""
+"""Charts of a watch: the evidence for a change, and every parameter over the runs."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Final
 from syncline_design.campaign.watch_result import RunValue, WatchedRun, e_value_text
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, MUTED, SERIES
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ HEIGHT: Final = 118.0  # of a row of panels
 MOST: Final = 1e12
 
 
-def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineFigure:
+def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineChart:
     """E-values over the runs, logarithmic."""
     numbers_of = [r.run for r in runs]
     values = [min(max(r.e_value or 0.0, 1e-3), MOST) for r in runs]
@@ -53,7 +53,7 @@ def evidence(runs: Sequence[WatchedRun], threshold: float) -> InlineFigure:
 
 def courses(
     runs: Sequence[WatchedRun], keys: Sequence[Key], since: Mapping[Key, int]
-) -> InlineFigure:
+) -> InlineChart:
     """A small panel a parameter: values of single runs with their intervals."""
     rows = math.ceil(len(keys) / ACROSS)
 

@@ -36,7 +36,7 @@ class _Tally:
     count: int = 0
 
 
-def study_findings(result: StudyResult) -> list[Notice]:
+def study_notices(result: StudyResult) -> list[Notice]:
     """What stands in the way, once per requirement and base however many cases it concerns."""
     tallies: dict[tuple[int, str, str], _Tally] = {}
     totals: dict[int, int] = {}
@@ -88,12 +88,12 @@ def setting_text(case: CaseResult) -> str:
 
 def study_sarif(result: StudyResult) -> str:
     """A SARIF log with one result per missed requirement."""
-    return sarif_log(study_findings(result))
+    return sarif_log(study_notices(result))
 
 
 def study_github(result: StudyResult) -> str:
     """Workflow commands: an annotation per missed requirement, a notice with the outcome."""
-    lines = [github_command(finding) for finding in study_findings(result)]
+    lines = [github_command(finding) for finding in study_notices(result)]
     text = f"{result.study.name}: {outcome(result).word}. {rule_sentence(result)}"
     return "\n".join([*lines, f"::notice ::{visible(text).replace('%', '%25')}"]) + "\n"
 

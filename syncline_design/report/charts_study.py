@@ -1,4 +1,4 @@
-"""Figures of a study: least cost over two factors, fronts side by side, a sampled study.
+"""Charts of a study: least cost over two factors, fronts side by side, a sampled study.
 
 A cost is shown by the strength of one colour over the page's surface: the dearer, the stronger,
 which holds on a light and on a dark page alike.  A scale beside the cells says what is what.
@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Literal
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 from syncline_design.studies.record import CasePoint
 from syncline_design.studies.scatter import Scatter, ScatterAxis, ScatterPoint
@@ -29,7 +29,7 @@ _FAINT, _STRONG = 0.08, 0.5  # opacity of the cheapest and the dearest cell: tex
 MOST_TEXT = 8  # cells across in which the cost itself still fits
 
 
-def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineFigure:
+def cost_map(heat: HeatMap, name: str = "fig-heat") -> InlineChart:
     """Heat map of the least cost over two factors; a cross where no case meets."""
     costs = [cost for row in heat.least_cost for cost in row if cost is not None]
 
@@ -108,7 +108,7 @@ class NamedFront:
     points: tuple[CasePoint, ...]
 
 
-def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts") -> InlineFigure:
+def fronts(shown: Sequence[NamedFront], currency: str, name: str = "fig-fronts") -> InlineChart:
     """Exact fronts of cost against error as staircases, one colour and line style per case."""
     styles = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 2, 1, 2)))
 
@@ -168,7 +168,7 @@ _VERDICTS = (  # verdicts, marker, colour, word
 
 def sampled_cases(
     data: Scatter, currency: str, says: Says = (), name: str = "fig-sampled"
-) -> InlineFigure:
+) -> InlineChart:
     """Cases over two factors: filled ones meet, the stronger the dearer; crosses do not."""
     meeting = [point for point in data.points if point.verdict == "meets"]
     costs = [point.cost for point in meeting if point.cost is not None]

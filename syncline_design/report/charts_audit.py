@@ -1,4 +1,4 @@
-"""Figures of audited stamps: receipt minus stamp over time, one row a stream, faults marked."""
+"""Charts of audited stamps: receipt minus stamp over time, one row a stream, faults marked."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Final
 from syncline_design.auditing.result import StampFault, StreamAudit
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, MUTED, SERIES, SHADE, WARN
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,7 @@ MOST_MARKS: Final = 30
 MOST_LETTERS: Final = 34
 
 
-def traces(rows: Sequence[StreamAudit]) -> InlineFigure:
+def traces(rows: Sequence[StreamAudit]) -> InlineChart:
     """One row a stream, all over the same time."""
     end = max((row.trace[-1].time_s for row in rows), default=1.0)
     begin = min((row.trace[0].time_s for row in rows), default=0.0)

@@ -13,7 +13,7 @@ from syncline_design.report.text import shortened
 from syncline_design.report.words import PRIMITIVES
 
 if TYPE_CHECKING:
-    from syncline_design.report.svg import InlineFigure
+    from syncline_design.report.svg import InlineChart
     from syncline_design.verdict.named import CloudDesign
     from syncline_design.verdict.tree import RequirementResult, SynclineFigures, Verdict
 
@@ -38,11 +38,11 @@ def syncline_chart(verdict: Verdict) -> list[Node]:
     if syncline is None or not syncline.sensor_error_m:
         return []
 
-    def draw() -> InlineFigure:
-        from syncline_design.report import figures
+    def draw() -> InlineChart:
+        from syncline_design.report import charts
 
-        return figures.syncline(
-            figures.SynclineCurve(
+        return charts.syncline(
+            charts.SynclineCurve(
                 floor_m=_floor_m(syncline),
                 rate_mps=syncline.sync_rate_mps,
                 tau_crit_s=syncline.tau_crit_s,
@@ -104,15 +104,15 @@ def timing_chart(verdict: Verdict) -> list[Node]:
     """Each sensor's tau against its tau_crit."""
     roles = [] if verdict.design is None else list(verdict.design.roles)
 
-    def draw() -> InlineFigure:
-        from syncline_design.report import figures
+    def draw() -> InlineChart:
+        from syncline_design.report import charts
 
         bars = []
         for stage, role, entry in roles:
             tau, crit = entry.tau_s, entry.tau_crit_s
             label = f"{shortened(stage.name, 18)} \u00b7 {role}"
-            bars.append(figures.TauBar(label, tau, crit, crit is None or tau < crit))
-        return figures.tau_bars(bars)
+            bars.append(charts.TauBar(label, tau, crit, crit is None or tau < crit))
+        return charts.tau_bars(bars)
 
     caption = (
         "Bar: timestamp error of the chosen timestamping. Mark: the sensor's \u03c4_crit. "
@@ -127,8 +127,8 @@ def clocks_chart(verdict: Verdict) -> list[Node]:
     if design is None:
         return []
 
-    def draw() -> InlineFigure:
-        from syncline_design.report import figures_clocks as clocks
+    def draw() -> InlineChart:
+        from syncline_design.report import charts_clocks as clocks
 
         kept = {clock.vehicle: clock for clock in design.clocks}
         drawn = []
@@ -160,16 +160,16 @@ def ledger_chart(verdict: Verdict) -> list[Node]:
     entries = () if verdict.syncline is None else verdict.syncline.ledger
     many = len({entry.stage for entry in entries if entry.stage}) > 1
 
-    def draw() -> InlineFigure:
-        from syncline_design.report import figures
+    def draw() -> InlineChart:
+        from syncline_design.report import charts
 
         terms = []
         for entry in verdict_words.larger(entries):
             stage = f"{shortened(entry.stage, 14)}: " if many and entry.stage else ""
             label = stage + shortened(verdict_words.term_text(entry))
-            terms.append(figures.LedgerBar(label, entry.value_m, entry.kind))
+            terms.append(charts.LedgerBar(label, entry.value_m, entry.kind))
         total = math.fsum(entry.value_m for entry in entries)
-        return figures.ledger(terms, tightest_limit(verdict, "accuracy"), total_m=total)
+        return charts.ledger(terms, tightest_limit(verdict, "accuracy"), total_m=total)
 
     caption = (
         "Terms add up to the total. Plain: sensor noise. Hatched: synchronisation. Crossed: known "
@@ -202,8 +202,8 @@ def choice_chart(verdict: Verdict) -> list[Node]:
         if entry.cost is not None and entry.error_m
     ]  # fmt: skip
 
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import FrontMark, pareto_front
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_front import FrontMark, pareto_front
 
         limit, price = tightest_limit(verdict, "accuracy"), lowest_limit(verdict, "cost")
         drawn = [FrontMark(*point) for point in sorted(points, key=lambda point: point[0])]
@@ -233,17 +233,19 @@ def figure_chart(verdict: Verdict) -> list[Node]:
         for one in found.designs
     ]
 
-    def draw() -> InlineFigure:
-        from syncline_design.report.figures_results import FrontMark, pareto_front
+    row = next((row for row in verdict.requirements if row.id == found.requirement), None)
+
+    def draw() -> InlineChart:
+        from syncline_design.report.charts_front import FrontMark, pareto_front
 
         drawn = [FrontMark(*mark[:4]) for mark in marks if not mark[4]]
         around = [FrontMark(*mark[:2], False, mark[3]) for mark in marks if mark[4]]
         return pareto_front(
-            drawn, verdict_tables.currency_of(verdict), found.limit_m,
+            drawn, verdict_tables.currency_of(verdict), row,
             lowest_limit(verdict, "cost"), "fig-by-figure", cloud=around, over=found.figure,
         )  # fmt: skip
 
-    kind = next((row.kind for row in verdict.requirements if row.id == found.requirement), "")
+    kind = "" if row is None else row.kind
     caption = (
         f"The designs of that front by the {found.figure} that {found.requirement} limits, each at "
         "its worst situation. Others may lie between them: the exact front over this figure is "

@@ -1,4 +1,4 @@
-"""Figures of the residuals: on the track, against the motion, over frequency, normal or not."""
+"""Charts of the residuals: on the track, against the motion, over frequency, normal or not."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from syncline_design.diagnosis.plotted import (
     Track,
 )
 from syncline_design.report import axes as scales
-from syncline_design.report import figures_diagnosis as drawings
+from syncline_design.report import charts_diagnosis as drawings
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import INK, MUTED, SERIES
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,7 +45,7 @@ def _span(values: Sequence[float]) -> float:
     return max(values) - min(values) if values else 0.0
 
 
-def track_map(track: Track, name: str = "fig-track") -> InlineFigure:
+def track_map(track: Track, name: str = "fig-track") -> InlineChart:
     """The way from above, with the mean residual of each stretch as an arrow."""
     larger = drawn_larger(track)
     shape = _span(track.north_m) / max(_span(track.east_m), 1e-9)
@@ -106,7 +106,7 @@ def against(
     before_m: Sequence[float],
     after_m: Sequence[float],
     name: str = "fig-against",
-) -> InlineFigure:
+) -> InlineChart:
     """RMS of the residuals before and after, over time and every part of the motion."""
 
     def build(figure: Figure) -> None:
@@ -152,7 +152,7 @@ def _range_of(found: Sequence[tuple[float, float]]) -> str:
     return f"{numbers.length(min(sizes), 2)} to {numbers.length(max(sizes), 2)}"
 
 
-def spectrum(found: Spectrum, name: str = "fig-spectrum") -> InlineFigure:
+def spectrum(found: Spectrum, name: str = "fig-spectrum") -> InlineChart:
     """Power of the whitened remainder over frequency, with what white noise seldom exceeds."""
 
     def build(figure: Figure) -> None:
@@ -186,7 +186,7 @@ def spectrum(found: Spectrum, name: str = "fig-spectrum") -> InlineFigure:
     return draw(name, "Spectrum of what is left", spoken, (WIDTH, 260.0), build)
 
 
-def normal(found: NormalPlot, name: str = "fig-normal") -> InlineFigure:
+def normal(found: NormalPlot, name: str = "fig-normal") -> InlineChart:
     """Quantiles of the whitened remainder against those of the standard normal."""
 
     def build(figure: Figure) -> None:

@@ -185,8 +185,8 @@ def survey_system(
     return System((first, second), horizon=LEVEL)
 
 
-def figures(catalog: Catalog) -> tuple[PaperPlot, ...]:
-    """All seven figures of the paper."""
+def plots(catalog: Catalog) -> tuple[PaperPlot, ...]:
+    """All seven plots of the paper."""
     return (*_georeferencing_figures(catalog), *_survey_figures(catalog))
 
 

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import INK, MUTED, SERIES, SURFACE
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def synclines(
     simulated: Sequence[tuple[float, float]],
     name: str,
     title: str,
-) -> InlineFigure:
+) -> InlineChart:
     """Accuracy against synchronisation accuracy of several systems.
 
     simulated: (tau [s], worst case [m]) points drawn beside the first curve.

@@ -1,4 +1,4 @@
-"""Figures of a measured clock: offset over time, sessions against the bound, TDEV and MTIE."""
+"""Charts of a measured clock: offset over time, sessions against the bound, TDEV and MTIE."""
 
 from __future__ import annotations
 
@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING
 from syncline_design.clocks.result import SessionResult, StabilityPoint, TracePoint
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import MUTED, SERIES, SHADE
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 
-def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineFigure:
+def offsets(trace: Sequence[TracePoint], bound_s: float | None) -> InlineChart:
     """Offset over time, the sessions one after another; the bound as two lines."""
 
     def build(figure: Figure) -> None:
@@ -76,7 +76,7 @@ def _time_or_zero(value: float) -> str:
 def sessions(
     rows: Sequence[tuple[int, SessionResult]], coverage: float,
     bounds: Sequence[tuple[str, float]],
-) -> InlineFigure:  # fmt: skip
+) -> InlineChart:  # fmt: skip
     """What |offset| stays below in each session, against the bounds; logarithmic.
 
     rows: sessions with their numbers.
@@ -123,7 +123,7 @@ def _log_times(axes: Axes, which: str, values: Sequence[float]) -> None:
         scales.set_ticks(axes, "x", scales.log_ticks(low, high, 6), scales.short_time)
 
 
-def stability(points: Sequence[StabilityPoint]) -> InlineFigure:
+def stability(points: Sequence[StabilityPoint]) -> InlineChart:
     """TDEV and MTIE over the averaging time, both axes logarithmic."""
 
     def build(figure: Figure) -> None:

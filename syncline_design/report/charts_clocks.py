@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Final
 
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH
+from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, GRID, INK, LINE, MUTED, SERIES, SHADE
-from syncline_design.report.svg import InlineFigure, draw, tell
+from syncline_design.report.svg import InlineChart, draw, tell
 from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ class Vehicle:
     offset_s: float | None
 
 
-def clocks(vehicles: Sequence[Vehicle], name: str = "fig-clocks") -> InlineFigure:
+def clocks(vehicles: Sequence[Vehicle], name: str = "fig-clocks") -> InlineChart:
     """Sensors to the left, clocks to the right, tau on every arrow between them."""
     rows = sum(len(v.sensors) for v in vehicles)
     height = HEAD + (HEAD + ROW) * len(vehicles) + ROW * rows

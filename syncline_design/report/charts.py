@@ -1,4 +1,4 @@
-"""The figures of a verdict: the Syncline, tau against tau_crit, the ledger of terms."""
+"""The charts of a verdict: the Syncline, tau against tau_crit, the ledger of terms."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
 from syncline_design.report.palette import BAD, GOOD, INK, LINE, MUTED, SERIES, SHADE, SURFACE, WARN
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def _tau_span(curve: SynclineCurve) -> tuple[float, float]:
 
 def syncline(
     curve: SynclineCurve, name: str = "fig-syncline", title: str = "Syncline of the design"
-) -> InlineFigure:
+) -> InlineChart:
     """Accuracy against synchronisation accuracy, log-log, as in the paper's figure 1."""
     low, high = _tau_span(curve)
 
@@ -214,7 +214,7 @@ class TauBar:
     within: bool
 
 
-def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineFigure:
+def tau_bars(bars: Sequence[TauBar], name: str = "fig-tau") -> InlineChart:
     """tau of each sensor as a bar up to its tau_crit mark, on a logarithmic time axis."""
     known = [v for b in bars for v in (b.tau_s, b.tau_crit_s) if v]
     low = min(known, default=1e-6) / 5
@@ -274,7 +274,7 @@ def ledger(
     limit: numbers.Limited | None,
     name: str = "fig-ledger",
     total_m: float | None = None,
-) -> InlineFigure:
+) -> InlineChart:
     """The terms as a waterfall that adds up to the total, with the limit.
 
     total_m: with terms that are too small to be shown; by default the sum of those that are.

@@ -1,4 +1,4 @@
-"""Figures of a diagnosis: residuals before and after, where they live, the gap step by step."""
+"""Charts of a diagnosis: residuals before and after, where they live, the gap step by step."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.report import axes as scales
 from syncline_design.report import numbers
-from syncline_design.report.figures import WIDTH, beside
+from syncline_design.report.charts import WIDTH, beside
 from syncline_design.report.palette import MUTED, SERIES
-from syncline_design.report.svg import InlineFigure, add_axes, draw, tell
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class ResidualAxis:
 
 def residuals(
     time_s: Sequence[float], shown: Sequence[ResidualAxis], name: str = "fig-residuals"
-) -> InlineFigure:
+) -> InlineChart:
     """Residuals per axis before and after, with the named effects' own signature."""
 
     def build(figure: Figure) -> None:
@@ -84,7 +84,7 @@ class Step:
 
 def gap_staircase(
     steps: Sequence[Step], floor_m: float | None, name: str = "fig-gap"
-) -> InlineFigure:
+) -> InlineChart:
     """RMS on held-out data as effects are added, down to the floor of the spec's own noise."""
 
     def build(figure: Figure) -> None:
@@ -141,7 +141,7 @@ class WhereCells:
     cells: tuple[tuple[float, float, float], ...]
 
 
-def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigure:
+def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineChart:
     """Disagreement in standard errors over cells of speed, turn rate, range and so on."""
 
     def build(figure: Figure) -> None:
@@ -176,9 +176,7 @@ def where_map(maps: Sequence[WhereCells], name: str = "fig-where") -> InlineFigu
     return draw(name, "Where simulation and log disagree", spoken, size, build)
 
 
-def coverage(
-    rows: Sequence[tuple[float, float, float]], name: str = "fig-coverage"
-) -> InlineFigure:
+def coverage(rows: Sequence[tuple[float, float, float]], name: str = "fig-coverage") -> InlineChart:
     """Share of residuals inside the expected interval against its nominal share.
 
     rows: (nominal, before, after), each a share of 1.

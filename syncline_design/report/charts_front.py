@@ -1,0 +1,157 @@
+"""The Pareto front of cost against error, and the designs around it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.report import axes as scales
+from syncline_design.report import numbers
+from syncline_design.report.charts import WIDTH
+from syncline_design.report.palette import GOOD, LINE, MUTED, SURFACE, WARN
+from syncline_design.report.svg import InlineChart, add_axes, draw, tell
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+FAR = 8.0  # times the largest error of a front: beyond it no other design is drawn
+
+
+@dataclass(frozen=True, slots=True)
+class FrontMark:
+    """One design; words: its sensors and how each is stamped, where known.
+
+    breaks: whether it breaks a requirement other than accuracy.
+    """
+
+    cost: float
+    error_m: float
+    chosen: bool
+    words: str = ""
+    breaks: bool = False
+
+
+def pareto_front(
+    points: Sequence[FrontMark],
+    currency: str,
+    limit: numbers.Limited | None,
+    cost_limit: float | None,
+    name: str = "fig-front",
+    beside: tuple[float, float] | None = None,
+    cloud: Sequence[FrontMark] = (),
+    over: str = "error",
+) -> InlineChart:
+    """The exact front of cost against error as a staircase, the chosen design on it.
+
+    beside: cost and error of the design that is nearest to what is asked; cloud: other designs;
+    over: which figure of the error it is drawn over, where that is not the Syncline's.
+    """
+
+    def build(figure: Figure) -> None:
+        axes = add_axes(figure)
+        _staircase(axes, points, cost_limit)
+        for point in points:
+            tell(axes, point.cost, point.error_m, _says(point, currency))
+        errors = [*(p.error_m for p in points), *([limit.limit] if limit is not None else [])]
+        around = _near(cloud, points, axes.get_xlim()[1])
+        errors += [p.error_m for p in around]
+        _cloud(axes, around, currency)
+        if beside is not None:
+            errors.append(beside[1])
+            _named_mark(axes, *beside, "nearest", WARN)
+        axes.set_ylim(min(errors) / 1.5, max(errors) * 1.6)
+        _limits(axes, limit, cost_limit, currency)
+        low, high = axes.get_ylim()
+        scales.set_ticks(axes, "y", scales.log_ticks(low, high), scales.short_length)
+        _money_ticks(axes)
+        axes.set_xlabel(f"cost [{currency}]")
+        axes.set_ylabel("Syncline error" if over == "error" else over)
+        scales.grid(axes)
+        if axes.get_legend_handles_labels()[1]:
+            figure.legend(loc="outside upper left", ncols=2, handlelength=1.6)
+
+    title = f"Pareto front of cost against {over}"
+    return draw(name, title, _front_words(points, currency, beside), (WIDTH, 290.0), build)
+
+
+def _near(
+    cloud: Sequence[FrontMark], front: Sequence[FrontMark], most: float
+) -> list[FrontMark]:  # fmt: skip
+    """Designs whose price has a place on the axis and whose error is not far from the front's."""
+    far = FAR * max(p.error_m for p in front)
+    return [p for p in cloud if p.cost <= most and p.error_m <= far]
+
+
+def _cloud(axes: Axes, shown: Sequence[FrontMark], currency: str) -> None:
+    """Other designs: a quiet dot each, a cross for those that break another requirement."""
+    for marker, size, breaks in (("o", 3.0, False), ("x", 3.0, True)):
+        some = [p for p in shown if p.breaks is breaks]
+        axes.plot([p.cost for p in some], [p.error_m for p in some], marker, color=MUTED,
+                  alpha=0.45, markersize=size, markeredgewidth=0.7 if breaks else 0,
+                  linestyle="none", zorder=1)  # fmt: skip
+    for point in shown:
+        tell(axes, point.cost, point.error_m, _says(point, currency))
+
+
+def _says(point: FrontMark, currency: str) -> list[tuple[str, str]]:
+    named = [("Design", point.words)] if point.words else []
+    return [*named, ("Price", numbers.money(point.cost, currency)),
+            ("Error", numbers.length(point.error_m))]  # fmt: skip
+
+
+def _staircase(axes: Axes, points: Sequence[FrontMark], cost_limit: float | None) -> None:
+    costs = [p.cost for p in points]
+    errors = [p.error_m for p in points]
+    span = max(costs) - min(costs) or max(costs) or 1.0
+    right = max([max(costs) + 0.15 * span, *([1.04 * cost_limit] if cost_limit else [])])
+    axes.set_yscale("log")
+    axes.step([*costs, right], [*errors, errors[-1]], where="post", color=LINE, linewidth=2)
+    axes.plot(costs, errors, "o", color=LINE, markersize=5, markeredgecolor=SURFACE)
+    for point in points:
+        if point.chosen:
+            _named_mark(axes, point.cost, point.error_m, "chosen", GOOD)
+    axes.set_xlim(max(0.0, min(costs) - 0.12 * span), right)
+
+
+def _named_mark(axes: Axes, cost: float, error_m: float, words: str, color: str) -> None:
+    axes.plot([cost], [error_m], "D", color=color, markersize=10, markeredgecolor=SURFACE,
+              markeredgewidth=1.4, zorder=5, linestyle="none", label=words)  # fmt: skip
+
+
+def _front_words(
+    points: Sequence[FrontMark], currency: str, beside: tuple[float, float] | None = None
+) -> str:
+    spoken = (
+        f"{len(points)} designs from {numbers.money(points[0].cost, currency)} with an error of "
+        f"{numbers.length(points[0].error_m)} to {numbers.money(points[-1].cost, currency)} with "
+        f"{numbers.length(points[-1].error_m)}."
+    )
+    for point in points:
+        if point.chosen:
+            spoken += (
+                f" Chosen: {numbers.money(point.cost, currency)}, {numbers.length(point.error_m)}."
+            )
+    if beside is not None:
+        spoken += f" Nearest: {numbers.money(beside[0], currency)}, {numbers.length(beside[1])}."
+    return spoken
+
+
+def _limits(
+    axes: Axes, limit: numbers.Limited | None, cost_limit: float | None, currency: str
+) -> None:
+    if limit is not None:
+        axes.axhline(limit.limit, color=WARN, linewidth=1.6,
+                     label=f"limit {numbers.limit(limit)}")  # fmt: skip
+    if cost_limit:
+        axes.axvline(cost_limit, color=WARN, linewidth=1.6, linestyle=(0, (5, 3)),
+                     label=f"limit {numbers.money(cost_limit, currency)}")  # fmt: skip
+
+
+def _money_ticks(axes: Axes) -> None:
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = axes.get_xlim()
+    places = [float(t) for t in MaxNLocator(4).tick_values(low, high) if low <= t <= high]
+    scales.set_ticks(axes, "x", places, numbers.count)
