@@ -16,6 +16,7 @@ from syncline_design.report.charts import WIDTH
 from syncline_design.report.palette import BAD, INK, MUTED, SERIES, SURFACE, WARN
 from syncline_design.report.svg import InlineChart, add_axes, draw, tell
 from syncline_design.report.text import shortened
+from syncline_design.report.words import BRIEF
 from syncline_design.studies.record import CasePoint
 from syncline_design.studies.scatter import Scatter, ScatterAxis, ScatterPoint
 from syncline_design.studies.summary import HeatMap
@@ -160,8 +161,8 @@ def _count_axis(axes: Axes) -> None:
 SHAPES = "osD^vP"
 STEP = 0.06  # of opacity: finer nobody sees
 _VERDICTS = (  # verdicts, marker, colour, word
-    (("fails", "infeasible"), "x", BAD, "does not meet"),
-    (("indeterminate",), "^", WARN, "no verdict"),
+    (("fails", "infeasible"), "x", BAD, BRIEF["fails"].word),
+    (("indeterminate",), "^", WARN, BRIEF["indeterminate"].word),
     (("refused",), "+", MUTED, "cannot be as combined"),
 )
 

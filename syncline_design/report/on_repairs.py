@@ -6,14 +6,8 @@ from syncline_design.comparison.meaning import DiagnosisAndDesign
 from syncline_design.comparison.repairs import Repair
 from syncline_design.report import numbers
 from syncline_design.report.document import Node, Text, show
-from syncline_design.report.table import Cell, Tone, table
-
-WORDS: dict[str, tuple[str, Tone, str]] = {
-    "meets": ("meets", "good", "\u2713"),
-    "fails": ("does not meet", "bad", "\u2717"),
-    "infeasible": ("does not meet", "bad", "\u2717"),
-    "indeterminate": ("open", "warn", "?"),
-}
+from syncline_design.report.table import Cell, table
+from syncline_design.report.words import BRIEF
 
 
 def repair_nodes(found: DiagnosisAndDesign) -> list[Node]:
@@ -40,12 +34,12 @@ def _money(one: Repair) -> str:
 
 
 def _row(one: Repair) -> tuple[Cell | str, ...]:
-    word, tone, mark = WORDS[one.verdict]
+    word = BRIEF[one.verdict]
     missed = f": {', '.join(one.misses)}" if one.misses else ""
     return (
         Cell(_money(one), one.price),
         Cell(numbers.length(one.error_m), one.error_m),
-        Cell(word + missed, tone=tone, mark=mark),
+        Cell(word.word + missed, tone=word.tone, mark=word.mark),
         "; ".join(step.text for step in one.steps),
         "; ".join(dict.fromkeys(step.assumes for step in one.steps if step.assumes)),
     )

@@ -13,6 +13,12 @@ OUTCOMES: Final[dict[str, Outcome]] = {
     "indeterminate": Outcome("warn", "?", "No verdict"),
     "refused": Outcome("bad", "!", "Refused: the spec cannot be read"),
 }
+BRIEF: Final[dict[str, Outcome]] = {  # the same in a cell or a legend
+    "meets": Outcome("good", "\u2713", "meets"),
+    "fails": Outcome("bad", "\u2717", "does not meet"),
+    "infeasible": Outcome("bad", "\u2298", "infeasible"),
+    "indeterminate": Outcome("warn", "?", "no verdict"),
+}
 QUALIFYING: Final[dict[str, str]] = {
     "worst-case-above-limit": "its certified worst case at one sigma",
     "quantile-above-limit": "its 95 % quantile",
