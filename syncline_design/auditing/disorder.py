@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Mask, Series
 from syncline_design.machine.quick_dataclass import dataclass
+from syncline_design.model.figure_text import to_digits
 
 _DEEPEST_NS: Final = 2 * 10**9  # a stamp further back was not overtaken, its clock was set
 _USUAL_DEPTH, _DEEPER = 98.0, 3.0  # per cent of what was overtaken; times that: set back as well
@@ -144,5 +145,5 @@ def _fault(
     return StampFault(
         "backward_jump", {"count": float(count), "seconds": -deepest_s}, float(times[0]),
         float(times[-1]), f"{count} times two messages carry each other's stamp, by up to "
-        f"{deepest_s:.6g} s: the first of them came before it was measured",
+        f"{to_digits(deepest_s, 6)} s: the first of them came before it was measured",
     )  # fmt: skip
