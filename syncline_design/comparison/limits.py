@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from syncline_design.model.quantity import Dimension, format_quantity
+from syncline_design.model.figure_text import format_quantity
+from syncline_design.model.quantity import Dimension
 from syncline_design.verdict.tree import RequirementResult, Verdict
 
 MOST_DIGITS = 17
