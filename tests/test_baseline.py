@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import syncline_design as sd
 from syncline_design.cli.app import app
 from syncline_design.machine.records import read_as
-from syncline_design.report.ci import findings
+from syncline_design.report.ci import notices
 from syncline_design.verdict.baseline import against
 from syncline_design.verdict.tree import Verdict
 from syncline_design.verdict.verify import CheckSettings

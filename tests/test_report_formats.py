@@ -17,7 +17,7 @@ import pytest
 import report_samples as samples
 from syncline_design.choice.outcome import Conflict
 from syncline_design.report.checks import CHECK_FORMATS, render_checks
-from syncline_design.report.ci import findings
+from syncline_design.report.ci import notices
 from syncline_design.report.json_out import json_text
 from syncline_design.report.sarif import artifact_uri
 from syncline_design.report.text import markdown_safe, spreadsheet_safe, visible
@@ -409,8 +409,8 @@ def test_a_bare_verdict_is_enough(name: str) -> None:
     assert render_checks(name, [verdict])
 
 
-def test_findings_count_what_counts() -> None:
-    levels = [finding.level for finding in findings(samples.failing())]
+def test_notices_count_what_counts() -> None:
+    levels = [notice.level for notice in notices(samples.failing())]
     warnings = len(samples.failing().warnings)
     assert levels == ["fail", "pass", "pass", "pass", "pass", *["warning"] * warnings]
 
@@ -428,6 +428,6 @@ def test_one_remedy_is_not_offered_as_a_choice() -> None:
         ways_out = tuple(replace(fix, text=f"way {k}") for k in range(count))
         verdict = samples.explained(plain, fixes=ways_out)
         ways = "; ".join(f"way {k}" for k in range(count))
-        said = [finding.message for finding in findings(verdict) if "would do" in finding.message]
+        said = [notice.message for notice in notices(verdict) if "would do" in notice.message]
         assert said
         assert all(f"{lead}{ways}." in message for message in said)
