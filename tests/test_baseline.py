@@ -123,7 +123,7 @@ def test_only_what_got_worse_fails(
         assert found.pop(name) == change
     if before.design is not None and now.design is not None:
         assert set(found.values()) <= {"same"}
-    failing = [n.level for n in findings(now) if n.level in ("fail", "undecided")]
+    failing = [n.level for n in notices(now) if n.level in ("fail", "undecided")]
     assert bool(failing) == (code != 0)
     assert read_as(Verdict, json.dumps(now.to_json())) == now
 
