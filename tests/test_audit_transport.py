@@ -159,3 +159,53 @@ def test_a_slip_within_a_slip_is_two_stretches_of_whole_seconds(tmp_path: Path) 
     row = said(tmp_path, stamp, queued(t, 1e-3, 14))
     assert {f.fault for f in row.faults} == {"whole_second_slip"}
     assert [f.parameters["seconds"] for f in row.faults] == [-2.0, -3.0, -1.0]
+
+
+# ---- stamps of a grid, of arrivals, of single slips --------------------------------------------
+
+
+@pytest.mark.parametrize("rate", [99.935, 100.05])
+def test_a_sensor_whose_interval_is_nearly_the_grain(tmp_path: Path, rate: float) -> None:
+    """Cut off to 10 ms: every tenth of a minute one stamp is left out, or comes twice."""
+    t = even(rate, 70.0)
+    row = found(said(tmp_path, np.floor(t / 0.01) * 0.01, queued(t, 2e-4, 15)))
+    assert set(row) == {"truncated_stamps"}
+    assert row["truncated_stamps"].parameters["resolution_s"] == 0.01
+
+
+@pytest.mark.parametrize("late", [True, False])
+def test_stamps_that_become_those_of_arrivals(tmp_path: Path, late: bool) -> None:
+    t = even(50.0, 70.0)
+    came = queued(t, 1e-3, 16)
+    receive = came + 2e-5 + np.random.default_rng(17).exponential(3e-5, t.size)
+    host = (t > 31.0) if late else (t < 31.0)
+    row = found(said(tmp_path, np.where(host, came, t), receive))
+    assert set(row) == {"stamped_on_arrival"}
+    begin, end = row["stamped_on_arrival"].from_s, row["stamped_on_arrival"].to_s
+    assert (begin if late else end) == pytest.approx(31.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("rate", "size"), [(20.0, 1.0), (20.0, -1.0), (73.0, -2.0)])
+def test_every_tenth_message_a_second_off(tmp_path: Path, rate: float, size: float) -> None:
+    t = even(rate, 60.0)
+    wrong = np.arange(t.size) % 10 == 3
+    row = found(said(tmp_path, t + size * wrong, queued(t, 5e-4, 18), file_order=False))
+    assert set(row) == {"whole_second_slip"}
+    assert row["whole_second_slip"].parameters == {"seconds": size, "count": float(wrong.sum())}
+
+
+def test_twenty_messages_with_a_slip_count_no_other_unit(tmp_path: Path) -> None:
+    t = even(10.0, 2.0)
+    stamp = t - np.where((t > 0.65) & (t < 1.25), 1.0, 0.0)
+    assert "epoch_offset" not in found(said(tmp_path, stamp, queued(t, 1e-3, 19)))
+
+
+def test_a_clock_that_is_set_again_and_again_is_one_fault(tmp_path: Path) -> None:
+    t = even(30.0, 90.0)
+    stamp = t * (1 + 80e-6) - 2.7e-4 * np.floor(t / 3.365)
+    row = said(tmp_path, stamp, queued(t, 2e-5, 20))
+    steps = [f for f in row.faults if f.fault == "step"]
+    assert len(steps) == 1
+    assert steps[0].parameters["seconds"] == pytest.approx(-2.7e-4, rel=0.05)
+    assert steps[0].parameters["interval_s"] == pytest.approx(3.365, rel=0.02)
+    assert steps[0].parameters["count"] == 26

@@ -5,15 +5,20 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from syncline_design.auditing.cadence import Cadence, about_rhythm
 from syncline_design.auditing.result import StampFault
-from syncline_design.auditing.series import Array, Series, in_words, seconds, spread
+from syncline_design.auditing.series import Array, Mask, Series, in_words, seconds, spread
 from syncline_design.logs.readers.stream import PointTimes
+from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import signed, to_digits
 
 _TIGHT: Final = 0.2  # scatter of receipt minus stamp against that of the stamps' rhythm
 _LEAST_JITTER_S: Final = 5e-6
+_PART: Final = 100  # messages of a part of the log
+_LEAST_PARTS, _MOST_PARTS = 4, 12
+_EVENER: Final = 0.3  # how much more even stamps of the sensor's own are
 _SKEWED: Final = 0.2  # how much further the late half of the rhythm's scatter reaches
 
 
@@ -43,6 +48,65 @@ def stamped_on_arrival(series: Series, pace: Cadence) -> StampFault | None:
         f"stamps scatter by {in_words(own)} about the sensor's rhythm, late rather than early, "
         f"while receipts follow within {in_words(transport)}: they say when messages came",
     )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArrivedInPart:
+    """Stamps on arrival from some message on, or up to one; places: of these messages."""
+
+    fault: StampFault
+    places: NDArray[np.intp]
+
+
+def arrived_in_part(series: Series, pace: Cadence) -> ArrivedInPart | None:
+    """Where a stream's stamps become those of arrivals, or cease to be: its driver lost the
+    sensor's own, or found it."""
+    size = pace.places.size
+    if series.receive is None or size < _LEAST_PARTS * _PART:
+        return None
+    late = seconds((series.receive - series.stamp)[pace.places])
+    stamp = series.stamp[pace.places]
+    parts = np.array_split(np.arange(size), min(_MOST_PARTS, size // _PART))
+    told = [_scatters(stamp[part], late[part]) for part in parts]
+    own = np.asarray([np.inf if about is None else spread(about) for about, _ in told])
+    transport = np.asarray([width for _, width in told])
+    arrived = (own > _LEAST_JITTER_S) & (transport < _TIGHT * own)  # or of no rhythm
+    sure = arrived & np.isfinite(own)
+    scattered = [about for (about, _), k in zip(told, sure, strict=True) if about is not None and k]
+    if len(scattered) < 2 or arrived.all() or not _one_sided(np.concatenate(scattered)):
+        return None
+    usual = float(np.median(own[sure]))
+    even = ~arrived & (own < _EVENER * usual) & (transport > float(np.max(transport[sure])))
+    last = bool(arrived[-1])
+    edge = int(np.argmax(arrived)) if last else int(np.argmin(arrived))  # of arrivals, or after
+    sides = (even[: edge - 1], arrived[edge:]) if last else (arrived[:edge], even[edge + 1 :])
+    if not all(side.size and side.all() for side in sides):
+        return None
+    parted = np.asarray([[float(late[part].min()), float(late[part].max())] for part in parts])
+    mixed = np.arange(len(parts)) == (edge if last else edge - 1)  # may hold both kinds
+    high, low = float(parted[sure & ~mixed, 1].max(initial=0.0)), float(parted[even, 0].min())
+    turn = _turn(late > max(high, 0.5 * (low + high)), last=last)
+    inside = pace.places[turn:] if last else pace.places[:turn]
+    times = series.seconds[inside]
+    fault = StampFault(
+        "stamped_on_arrival", {"seconds": usual}, float(times[0]), float(times[-1]),
+        f"{'from there' if last else 'so far'} stamps scatter by {in_words(usual)} about the "
+        f"sensor's rhythm while receipts follow them closely ({inside.size} messages), and the "
+        "others keep it: these say when messages came",
+    )  # fmt: skip
+    return ArrivedInPart(fault, inside)
+
+
+def _scatters(stamp: NDArray[np.int64], late: Array) -> tuple[Array | None, float]:
+    """(how far stamps are from their rhythm, scatter of receipt minus stamp) [s]."""
+    return about_rhythm(seconds(stamp - stamp[0])), _width(late)
+
+
+def _turn(above: Mask, *, last: bool) -> int:
+    """Where to part messages so that most before it are above a bound and most after it are not
+    (last), or the other way round."""
+    signs = np.where(above == last, 1, -1)
+    return int(np.argmax(np.cumsum(signs))) + 1
 
 
 def copied(about: Array | None) -> bool:

@@ -30,6 +30,7 @@ _LAG: Final = 16
 _STRETCH: Final = 24  # messages over which a rhythm is followed
 _MOST_STRETCHES: Final = 5000
 _GROWTH: Final = 2.0  # of irregularity over 16 intervals against over one: a rhythm 1, a walk 4
+_EXACT: Final = 1e-4  # of an interval: irregularities that matter nowhere
 _HOLE: Final = 0.85  # of an interval: more than a late message
 _WALK: Final = 2.5  # irregularity over 16 intervals against over one; a walk shows 4, a rhythm 1
 _AS_EVER: Final = 0.5  # of a hole's messages that are not missing among receipts
@@ -101,7 +102,7 @@ def about_rhythm(when: Array) -> Array | None:
     usual = float(np.median(when[_LAG:] - when[:-_LAG])) / _LAG
     dev = when - usual * count
     one, far = scatter(np.diff(dev)), scatter(dev[_LAG:] - dev[:-_LAG])
-    if usual <= 0.0 or far > _GROWTH * one or one > usual:
+    if usual <= 0.0 or far > max(_GROWTH * one, _EXACT * usual) or one > usual:
         return None
     pieces = dev[: dev.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
     pieces = pieces[:: max(1, pieces.shape[0] // _MOST_STRETCHES)]

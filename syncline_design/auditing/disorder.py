@@ -21,6 +21,8 @@ from syncline_design.model.figure_text import to_digits
 
 _DEEPEST_NS: Final = 2 * 10**9  # a stamp further back was not overtaken, its clock was set
 _USUAL_DEPTH, _DEEPER = 98.0, 3.0  # per cent of what was overtaken; times that: set back as well
+_WHOLE_NS: Final = 5e7  # from whole seconds
+_MOST: Final = 0.8
 _LEAST_MESSAGES: Final = 40
 _NEAR: Final = 0.2  # of an interval: how near to the rhythm stamps are once in order
 _MOST_ODD: Final = 0.1  # of all intervals
@@ -80,9 +82,19 @@ def disorder_of(series: Series) -> Disorder:
     fell = np.diff(stamp)
     deepest = float(-fell[fell >= -_DEEPEST_NS].min()) / NS
     late = (series.receive[places] - stamp).astype(np.float64)
+    away = late - np.median(late)
+    if _in_whole_seconds(away[falls + 1]) or _in_whole_seconds(away[falls]):
+        return Disorder()
     exchanged = _exchanged(sorted_, late, period)
     fault = _fault(series, places[falls + 1], count, deepest) if exchanged else None
     return Disorder(order, fault, count, deepest)
+
+
+def _in_whole_seconds(away: NDArray[np.float64]) -> bool:
+    """Whether what seems overtaken, or to overtake, is off by the same whole seconds: slips of
+    single stamps."""
+    whole = round(float(np.median(away)) / NS)
+    return whole != 0 and float(np.mean(np.abs(away - whole * NS) < _WHOLE_NS)) > _MOST
 
 
 def _sorted(stamp: NDArray[np.int64]) -> NDArray[np.intp]:

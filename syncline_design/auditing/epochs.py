@@ -50,6 +50,7 @@ _COUNTED: Final = (
 _TELLING: Final = 2  # messages: one alone may be old
 _FEW_FALLS: Final = 3
 _SLOWEST, _FASTEST = 0.98, 1.02  # no clock runs so: counts of another unit
+_LEAST_FOR_A_RATE: Final = 40  # messages: a slip within fewer looks as another rate
 _STEADY: Final = 0.005  # how alike the rates of short and long stretches are
 # ticks that are taken for others: 1/1024 s, 2^-20 s, hundredths, ten thousandths, minutes
 _FACTORS: Final = tuple(sorted({
@@ -104,6 +105,8 @@ def _factor(series: Series, ratio: float) -> float:
     if power and abs(power) <= 3 and abs(math.log10(ratio) - 3 * power) < 0.05:
         return float(10.0 ** (3 * power))
     if _SLOWEST < ratio < _FASTEST or not 1e-10 < ratio < 1e10:
+        return 1.0
+    if series.good.sum() < _LEAST_FOR_A_RATE:
         return 1.0
     rates = _rates(series)
     if len(rates) < 2 or max(rates) > (1.0 + _STEADY) * min(rates):

@@ -29,6 +29,11 @@ _DISORDER: Final = 0.02  # of all stamps: transport that changes their order
 _COHERENT: Final = 0.75
 _EXACT: Final = 0.002  # of a tick
 _EVEN: Final = 0.1  # of what neighbours are uneven by
+_LEAST_TURNS: Final = 2  # grains left out, to know that they are
+_TURN: Final = 1.3  # grains that such a course may begin or end with
+_STRAIGHT: Final = 0.4  # of a grain: delays about the course
+_BACK: Final = 0.35  # of a grain
+_NEXT: Final = 8  # messages on each side
 _MOST_LOST: Final = 0.15  # of all messages
 _COARSE_STEPS: Final = 3.0
 _EVENLY: Final = 0.25  # scatter of the distance between skips
@@ -114,8 +119,37 @@ def _alternates(series: Series, pace: Cadence, grain: int) -> bool:
     near = (np.abs(counts - usual) <= 1) & (counts != usual)
     if usual == 1:  # of 0 and 2 grains beside 1: duplicates and losses, unless they come evenly
         slower = skips_evenly(counts) and not _lost(series, pace, counts, grain)
+        slower = slower or _sawtooth(series, pace, counts, grain)
         return slower or (grain <= _FINE and _evenly(np.flatnonzero(counts == 0)))
     return int(np.sum(near & (counts % usual != 0))) >= 3
+
+
+def _sawtooth(series: Series, pace: Cadence, counts: Array, grain: int) -> bool:
+    """Whether receipts run away from stamps evenly and come back by a grain where one is left out.
+
+    So does a sensor whose interval is nearly the grain, however seldom its stamps leave one out.
+    """
+    if series.receive is None or counts.size != pace.places.size - 1:
+        return False
+    extra = np.concatenate([[0.0], np.cumsum(counts - 1.0)])
+    turns = abs(float(extra[-1]))
+    skips = np.flatnonzero(counts != 1.0)
+    if not _LEAST_TURNS <= skips.size == turns:
+        return False
+    late = (series.receive - series.stamp)[pace.places].astype(np.float64)
+    whole = late - late[0] + grain * extra
+    when = series.seconds[pace.places]
+    slope, first = np.polynomial.polynomial.polyfit(when, whole, 1)[::-1]
+    left = whole - first - slope * when
+    ramp = abs(slope) * float(when[-1] - when[0]) / grain
+    sides = [(late[max(0, k - _NEXT) : k + 1], late[k + 1 : k + 2 + _NEXT]) for k in skips]
+    back = [float(np.median(before) - np.median(after)) for before, after in sides]
+    sizes = np.abs(np.asarray(back)) / grain
+    return (
+        abs(ramp - turns) < _TURN
+        and spread(left) < _STRAIGHT * grain
+        and abs(float(np.median(sizes)) - 1.0) < _BACK
+    )
 
 
 def _lost(series: Series, pace: Cadence, counts: Array, grain: int) -> bool:

@@ -38,6 +38,8 @@ _REPEATED: Final = 0.9  # of an episode's stamps: old messages that are sent aga
 _LEAST_S: Final = 2e-5
 _SLOW: Final = 2e-4  # of an interval: oscillators wander by less within a gap
 _BACK: Final = 0.3  # of a jump: what returns by more settles, and is no step
+_LEAST_SETS: Final = 6  # jumps that come in a beat
+_BEAT: Final = 0.1  # of the time between them
 _EQUAL: Final = 0.02
 _SIGMA: Final = 1.25 / 1.35  # uncertainty of a median of n normal values, in quartile distances
 
@@ -84,7 +86,7 @@ def without_jumps(series: Series, pace: Cadence, least_s: float) -> Mended:
         stamp[part] -= round(jump.size_s * NS)
         if jump.end is None:
             stamp[part[-1] + 1 :] -= round(jump.size_s * NS)
-    faults = tuple(_fault(jump, times) for jump in found)
+    faults = _faults(found, times)
     return Mended(replace(series, stamp=stamp), faults, tuple(found), settling)
 
 
@@ -220,13 +222,38 @@ def _replays(jump: Jump, stamp: NDArray[np.int64]) -> bool:
     return float(np.mean(again)) > _REPEATED
 
 
+def _faults(found: list[Jump], times: Array) -> tuple[StampFault, ...]:
+    """One fault a jump; one for all, where a clock is set by about as much at even times."""
+    begins = times[[jump.place for jump in found]]
+    sizes = np.asarray([jump.size_s for jump in found])
+    even = sizes.size >= _LEAST_SETS and all(jump.end is None for jump in found)
+    if even:
+        apart = np.diff(begins)
+        turns = np.maximum(np.round(apart / np.percentile(apart, 25.0)), 1.0)
+        beat = float(apart.sum() / turns.sum())
+        off = float(np.percentile(np.abs(apart - turns * beat), 90.0))
+        even = off < _BEAT * beat and float(np.ptp(np.sign(sizes))) == 0.0
+    if not even:
+        return tuple(_fault(jump, times) for jump in found)
+    size, total = float(np.median(sizes)), float(sizes.sum())
+    return (StampFault(
+        "step", {"seconds": size, "count": float(sizes.size), "interval_s": beat},
+        float(begins[0]), float(times[-1]),
+        f"stamps move by {_signed(size)} in the median every {to_digits(beat, 4)} s, "
+        f"{sizes.size} times, {_signed(total)} in all: their clock is set again and again",
+    ),)  # fmt: skip
+
+
+def _signed(size_s: float) -> str:
+    return f"{'+' if size_s >= 0 else '-'}{in_words(abs(size_s))}"
+
+
 def _fault(jump: Jump, times: Array) -> StampFault:
     begin = float(times[jump.place])
     end = float(times[-1] if jump.end is None else times[jump.end])
     lasts = "and stay so" if jump.end is None else f"until {to_digits(end, 4)} s"
-    sign = "+" if jump.size_s >= 0 else "-"
     return StampFault(
         "step", {"seconds": jump.size_s}, begin, end,
-        f"stamps move by {sign}{in_words(abs(jump.size_s))} {lasts}: one interval breaks the "
+        f"stamps move by {_signed(jump.size_s)} {lasts}: one interval breaks the "
         "sensor's rhythm by as much as receipts shift against stamps",
     )  # fmt: skip

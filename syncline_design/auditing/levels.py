@@ -8,18 +8,26 @@ clocks have; an episode of longer delays has another spread and was left out bef
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 
 from syncline_design.auditing.blocks import Blocks
+from syncline_design.auditing.clock_shapes import (
+    KNOTS,
+    SETTLINGS,
+    Family,
+    Shape,
+    around,
+    course,
+    families,
+    straddling,
+)
 from syncline_design.auditing.series import Array, Mask
 from syncline_design.machine.deadline import in_force
-from syncline_design.machine.quick_dataclass import dataclass
 
-Kind = Literal["drift", "bend", "ramp", "step", "episode", "relock", "holdover"]
 _LONGEST: Final = 0.3  # of the log: what settles more slowly is drift
 _WILD: Final = (
     10.0  # of what is seen, or of all shapes together: sizes that nearly cancel one another
@@ -37,60 +45,6 @@ _EXTRA: Final = 0.004  # of what a shape explains: its freedom also fits what is
 _STEP_SHARE: Final = 0.25  # of the delays' spread: smaller steps are not named
 _DRIFT_SHARE: Final = 0.4  # of the delays' spread, over the whole log
 _LEAST_RUN_S: Final = 2e-5  # over the log: hosts that are disciplined wander by as much
-_KNOTS: Final = 36
-_SETTLINGS: Final = (0.01, 0.02, 0.04, 0.08, 0.16)  # of the log
-
-
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """An offset over time; size: seconds of receipt minus stamp (drift: over the whole log).
-
-    begin_s, end_s: of a step its place and the end of the log; settle_s: time constant.  bend: how
-    a rate changes slowly, a Legendre polynomial of `order` over the log.  ramp: drift that begins
-    and may end within the log, as of a clock that is slewed.
-    """
-
-    kind: Kind
-    size_s: float = 0.0
-    sigma_s: float = 0.0
-    begin_s: float = 0.0
-    end_s: float = 0.0
-    settle_s: float = 0.0
-    order: int = 1
-
-    def at(self, time_s: Array) -> Array:
-        """Its course for a size of 1."""
-        if self.kind == "drift":
-            return (time_s - self.begin_s) / (self.end_s - self.begin_s)
-        if self.kind == "bend":
-            return _legendre(time_s, self)
-        if self.kind == "step":
-            return np.where(time_s >= self.begin_s, 1.0, 0.0)
-        if self.kind == "episode":
-            return np.where((time_s >= self.begin_s) & (time_s < self.end_s), 1.0, 0.0)
-        back = np.exp(-np.maximum(time_s - self.end_s, 0.0) / (self.settle_s or 1.0))
-        if self.kind == "relock":
-            return np.where(time_s >= self.begin_s, back, 0.0)
-        away = np.clip((time_s - self.begin_s) / (self.end_s - self.begin_s), 0.0, 1.0)
-        return np.asarray(away if self.kind == "ramp" else away * back)
-
-
-Family = tuple[list[Shape], Array]
-
-
-def _legendre(time_s: Array, shape: Shape) -> Array:
-    place = 2.0 * (time_s - shape.begin_s) / (shape.end_s - shape.begin_s) - 1.0
-    only = np.zeros(shape.order + 1)
-    only[-1] = 1.0
-    return np.asarray(np.polynomial.legendre.legval(place, only))
-
-
-def course(shapes: tuple[Shape, ...], time_s: Array) -> Array:
-    """Sum of all shapes [s]."""
-    total = np.zeros(time_s.size)
-    for shape in shapes:
-        total += shape.size_s * shape.at(time_s)
-    return total
 
 
 def shapes_of(
@@ -105,11 +59,11 @@ def shapes_of(
     if time_s.size < 8:
         return ()
     found = _known_to_settle(time_s, low, settling_s, blocks)
-    families = tuple(_families(time_s))
+    kinds = tuple(families(time_s))
     for _ in range(MOST_SHAPES):
         in_force().check()
         keep = ~straddling(found, time_s, blocks.length_s)
-        best = _best(time_s[keep], low[keep], found, blocks, families, keep)
+        best = _best(time_s[keep], low[keep], found, blocks, kinds, keep)
         if best is None:
             break
         better = (*found, best)
@@ -137,7 +91,7 @@ def _known_to_settle(
         base = np.linalg.qr(_columns(found, time_s[keep]))[0]
         rest = low[keep] - base @ (base.T @ low[keep])
         trials = [Shape("relock", begin_s=begin, end_s=begin, settle_s=share * length)
-                  for share in (0.5 * _SETTLINGS[0], *_SETTLINGS)]  # fmt: skip
+                  for share in (0.5 * SETTLINGS[0], *SETTLINGS)]  # fmt: skip
         best = max(trials, key=lambda s: _gain(s, time_s[keep], base, rest))
         grown = polished((*found, best), [True] * (len(found) + 1), blocks, within=1.1)
         if abs(grown[-1].size_s) > SURE * grown[-1].sigma_s:
@@ -239,58 +193,6 @@ def _worth(shape: Shape, gain: float) -> float:
     return gain * (1.0 - _EXTRA * penalty) - penalty
 
 
-def _families(time_s: Array) -> Iterator[Family]:
-    first, last = float(time_s[0]), float(time_s[-1])
-    edges = 0.5 * (time_s[1:] + time_s[:-1])
-    drift = [Shape("drift", begin_s=first, end_s=last)]
-    yield drift, _courses(drift, time_s)
-    bends = [Shape("bend", begin_s=first, end_s=last, order=k) for k in (2, 3, 4)]
-    yield bends, np.stack([bend.at(time_s) for bend in bends])
-    steps = [Shape("step", begin_s=float(e), end_s=last) for e in edges[1:-1]]
-    yield steps, _courses(steps, time_s)
-    knots = edges[:: max(1, edges.size // _KNOTS)]
-    episodes = [Shape("episode", begin_s=float(a), end_s=float(b))
-                for i, a in enumerate(knots) for b in knots[i + 1 :]]  # fmt: skip
-    yield episodes, _courses(episodes, time_s)
-    length = last - first
-    relocks = [
-        Shape("relock", begin_s=float(e), end_s=float(e), settle_s=share * length)
-        for e in edges[1:-3] for share in _SETTLINGS
-    ]  # fmt: skip
-    yield relocks, _courses(relocks, time_s)
-    coarse = knots[::2]
-    ramps = [Shape("ramp", begin_s=float(a), end_s=float(b))
-             for i, a in enumerate(coarse) for b in (*coarse[i + 1 :], last)
-             if (a, b) != (edges[0], last)]  # fmt: skip
-    yield ramps, _courses(ramps, time_s)
-    holdovers = [
-        Shape("holdover", begin_s=float(a), end_s=float(b), settle_s=share * length)
-        for i, a in enumerate(coarse) for b in coarse[i + 1 : -1] for share in _SETTLINGS[1:4]
-    ]  # fmt: skip
-    if holdovers:
-        yield holdovers, _courses(holdovers, time_s)
-
-
-def _courses(shapes: list[Shape], time_s: Array) -> Array:
-    """One row a shape."""
-    begin = np.asarray([s.begin_s for s in shapes])[:, None]
-    end = np.asarray([s.end_s for s in shapes])[:, None]
-    settle = np.asarray([s.settle_s or 1.0 for s in shapes])[:, None]
-    row = time_s[None, :]
-    kind = shapes[0].kind
-    if kind == "drift":
-        return np.asarray((row - begin) / (end - begin))
-    if kind == "step":
-        return np.where(row >= begin, 1.0, 0.0)
-    if kind == "episode":
-        return np.where((row >= begin) & (row < end), 1.0, 0.0)
-    back = np.exp(-np.maximum(row - end, 0.0) / settle)
-    if kind == "relock":
-        return np.where(row >= begin, back, 0.0)
-    away = np.clip((row - begin) / (end - begin), 0.0, 1.0)
-    return np.asarray(away if kind == "ramp" else away * back)
-
-
 def _refined(time_s: Array, low: Array, found: tuple[Shape, ...], shape: Shape) -> Shape:
     """Begin, end and settling of a shape, made finer one after another."""
     if shape.kind in ("drift", "bend"):
@@ -298,36 +200,14 @@ def _refined(time_s: Array, low: Array, found: tuple[Shape, ...], shape: Shape) 
     base = np.linalg.qr(_columns(found, time_s))[0]
     rest = low - base @ (base.T @ low)
     width = float(np.median(np.diff(time_s)))
-    knot = max(width, float(time_s[-1] - time_s[0]) / _KNOTS)
+    knot = max(width, float(time_s[-1] - time_s[0]) / KNOTS)
     best, gained = shape, _gain(shape, time_s, base, rest)
     for scale in (1.0, 0.5, 0.25):
-        for trial in list(_around(best, scale * knot, scale, float(time_s[-1]))):
+        for trial in list(around(best, scale * knot, scale, float(time_s[-1]))):
             gain = _gain(trial, time_s, base, rest)
             if gain > gained * (1.0 + 1e-9):
                 best, gained = trial, gain
     return best
-
-
-def _around(shape: Shape, width: float, scale: float, last_s: float) -> Iterator[Shape]:
-    moves = (-2.0, -1.0, 0.0, 1.0, 2.0)
-    if shape.kind == "step":
-        return
-    if shape.kind == "relock":
-        for factor in (0.55, 0.75, 0.9, 1.1, 1.35, 1.8):
-            settle = shape.settle_s * (1.0 + (factor - 1.0) * scale)
-            for move in (-0.5, 0.0, 0.5):
-                begin = shape.begin_s + move * width
-                yield replace(shape, begin_s=begin, end_s=begin, settle_s=settle)
-        return
-    for a in moves:
-        for b in moves:
-            begin, end = shape.begin_s + a * width, shape.end_s + b * width
-            end = min(end, last_s) if shape.kind == "ramp" else end
-            if end - begin < 0.5 * width:
-                continue
-            for factor in (0.6, 1.0, 1.6) if shape.kind == "holdover" else (1.0,):
-                settle = shape.settle_s * (1.0 + (factor - 1.0) * scale)
-                yield replace(shape, begin_s=begin, end_s=end, settle_s=settle)
 
 
 def _gain(shape: Shape, time_s: Array, base: Array, rest: Array) -> float:
@@ -388,17 +268,6 @@ def polished(
     found = least_squares(rest, np.zeros(start.size), loss="soft_l1", f_scale=2.0, max_nfev=60)
     best = _set(shapes, fixed, start + found.x * scale, limits)
     return _fitted(time_s, low, best, blocks)
-
-
-def straddling(shapes: tuple[Shape, ...], time_s: Array, within_s: float) -> Mask:
-    """Blocks near a jump: they hold both sides of it."""
-    out = np.zeros(time_s.size, bool)
-    for shape in shapes:
-        edges = {"step": (shape.begin_s,), "relock": (shape.begin_s,),
-                 "episode": (shape.begin_s, shape.end_s)}  # fmt: skip
-        for edge in edges.get(shape.kind, ()):
-            out |= np.abs(time_s - edge) <= within_s
-    return out
 
 
 def _free(

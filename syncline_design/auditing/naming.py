@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.auditing.levels import Shape, course
+from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import Array, in_words
 from syncline_design.model.figure_text import signed, to_digits

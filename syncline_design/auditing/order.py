@@ -246,10 +246,12 @@ def without_spikes(series: Series) -> Repaired:
     out = np.zeros(stamp.size, bool)
     late = _lateness(series, places)
     count, deepest = 0, 0
+    away: list[float] = []
     for fall in falls[:MOST_SPIKES]:
         span = _spike(stamp, int(fall), out)
         if span is None or not _returns(late, span) or _is_whole(late, span):
             continue
+        away.append(_away(late, span))
         span = _with_partner(late, span)
         count += 1
         deepest = min(deepest, int(stamp[fall + 1] - stamp[fall]))
@@ -259,6 +261,9 @@ def without_spikes(series: Series) -> Repaired:
     good = series.good.copy()
     good[places[out]] = False
     times = series.seconds[places[out]]
+    slip = _slips(np.asarray(away), late, int(out.sum()), times)
+    if slip is not None:
+        return Repaired(replace(series, good=good), (slip,))
     fault = StampFault(
         "backward_jump", {"count": float(count), "seconds": deepest / NS}, float(times[0]),
         float(times[-1]), f"{count} times a stamp lies before the one of the message before, by "
@@ -312,6 +317,31 @@ def _is_whole(late: NDArray[np.float64], span: slice) -> bool:
     away = late[span] - float(np.median(around))
     whole = round(float(np.median(away)))
     return whole != 0 and float(np.max(np.abs(away - whole))) < max(0.05, 3.0 * spread(around))
+
+
+def _away(late: NDArray[np.float64], span: slice) -> float:
+    """How much later than the messages around it a spike is [s]."""
+    beside = np.concatenate(
+        [late[max(0, span.start - 5) : span.start], late[span.stop : span.stop + 5]]
+    )
+    return float(np.median(late[span]) - np.median(beside)) if beside.size else 0.0
+
+
+def _slips(
+    away: NDArray[np.float64], late: NDArray[np.float64], count: int, times: NDArray[np.float64]
+) -> StampFault | None:
+    """Single messages here and there that are all off by the same whole seconds: one slip."""
+    whole = round(float(np.median(away)))
+    near = np.abs(away - whole) < max(0.02, min(0.05, 3.0 * spread(late)))
+    if whole == 0 or away.size < LEAST_SLIP or float(np.mean(near)) < 0.9:
+        return None
+    side = "behind" if whole > 0 else "ahead"
+    falls = Consequence("backward_jump", {"count": float(away.size)},
+                        "stamps go back at each of them")  # fmt: skip
+    return StampFault(
+        "whole_second_slip", {"seconds": float(-whole), "count": float(count)}, float(times[0]),
+        float(times[-1]), f"{count} single messages are stamped {abs(whole)} s {side}", (falls,),
+    )  # fmt: skip
 
 
 def _with_partner(late: NDArray[np.float64], span: slice) -> slice:

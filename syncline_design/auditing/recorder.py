@@ -13,7 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from syncline_design.auditing.levels import SURE, Shape, straddling
+from syncline_design.auditing.clock_shapes import Shape, straddling
+from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, in_words
 from syncline_design.auditing.stream import Examined, examined

@@ -16,9 +16,10 @@ import numpy as np
 from syncline_design.auditing import witness
 from syncline_design.auditing.blocks import Blocks, blocks_of
 from syncline_design.auditing.cadence import Cadence, cadence
+from syncline_design.auditing.clock_shapes import Shape, course
 from syncline_design.auditing.grains import best_timer
 from syncline_design.auditing.jumps import Jump, without_jumps
-from syncline_design.auditing.levels import Shape, believed, course, polished, shapes_of
+from syncline_design.auditing.levels import believed, polished, shapes_of
 from syncline_design.auditing.naming import all_named
 from syncline_design.auditing.result import Consequence, StampFault
 from syncline_design.auditing.series import NS, Array, Series, seconds, spread

@@ -10,11 +10,12 @@ import numpy as np
 from syncline_design.auditing import arrival, grains, order
 from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import Cadence, cadence, level_scatter, missing
+from syncline_design.auditing.clock_shapes import Shape
 from syncline_design.auditing.counters import unwrapped
 from syncline_design.auditing.disorder import Disorder, disorder_of
 from syncline_design.auditing.envelope import above_floor
 from syncline_design.auditing.epochs import LARGE_SLIP_S, constant_fault, epoch_fault, in_one_unit
-from syncline_design.auditing.levels import Shape, smallest
+from syncline_design.auditing.levels import smallest
 from syncline_design.auditing.result import (
     Consequence,
     EnvelopePoint,
@@ -23,8 +24,9 @@ from syncline_design.auditing.result import (
     SmallestSeen,
     StampFault,
 )
-from syncline_design.auditing.series import NS, Array, Mask, Series, seconds, series_of
+from syncline_design.auditing.series import NS, Array, Series, seconds, series_of
 from syncline_design.auditing.shifts import Shift, Shifts, without_shifts, without_slips
+from syncline_design.auditing.stream_epochs import as_declared, as_epochs, known_offset, with_epoch
 from syncline_design.logs.readers.stream import UNSET, Nanoseconds, Stamps, Stream
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -35,10 +37,7 @@ _AT_EDGES: Final = 0.1  # of the messages that were overtaken
 _STRAY: Final = 0.01
 EDGE_S: Final = 1.5  # how near to the end of a shift a repeated stamp is its own
 TRACE_POINTS: Final = 240
-_NONE: Final = Stamps("", None, np.zeros(0, np.int64))
 _LARGE_STEP_NS: Final = 1e6
-# epochs of a counter without a calendar
-_COUNTERS: Final = ("boot", "unknown", "week_seconds", "day_seconds", "hour_seconds")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +78,12 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
         found.append(disorder.fault)
     grain = _grain(series, step_ns, found)
     arrived = None if grain else arrival.stamped_on_arrival(series, cadence(series))
+    part = None if grain or arrived else arrival.arrived_in_part(series, cadence(series))
+    if part is not None:
+        found.append(part.fault)
+        series = replace(
+            series, good=series.good & ~np.isin(np.arange(series.good.size), part.places)
+        )
     if arrived is not None:
         found.append(_with_alike(series, arrived))
     elif step_ns >= _LARGE_STEP_NS:  # duplicates are the unit's
@@ -88,13 +93,13 @@ def examined(stream: Stream, start: int | None = None) -> Examined:
     spikes = order.without_spikes(series)
     series = _take(_beside(disorder, spikes), found)
     epoch = None if unit else epoch_fault(series)
-    found[:] = _with_epoch(found, _as_declared(epoch, stream))
-    known = _known(epoch, series, unit is not None)
+    found[:] = with_epoch(found, as_declared(epoch, stream))
+    known = known_offset(epoch, series, unit is not None)
     slips = without_slips(series, known)
     if any(abs(float(f.parameters["seconds"])) >= LARGE_SLIP_S for f in slips.faults):
-        slips, base = _as_epochs(slips, series, epoch)
+        slips, base = as_epochs(slips, series, epoch)
         found = [f for f in found if f is not epoch]
-        known = _known(base, slips.series, False)
+        known = known_offset(base, slips.series, False)
     least = max(_coarse(raw), step_ns / NS, grain.size_s if grain is not None else 0.0)
     moved = without_shifts(slips.series, least_s=least)
     found = _with_jumps(found, [*slips.faults, *moved.faults])
@@ -166,65 +171,11 @@ def _grain(series: Series, step_ns: float, found: list[StampFault]) -> grains.Gr
     return grain
 
 
-def _as_declared(epoch: StampFault | None, stream: Stream) -> StampFault | None:
-    """GPS time where the format says GPS time is no fault."""
-    declared = stream.timeline == "gps" and "gps" in (stream.stamps or _NONE).primary.lower()
-    if epoch is None or not declared or epoch.parameters["kind"] != "gps":
-        return epoch
-    return replace(epoch, counts=False, evidence=f"{epoch.evidence}, as the format says")
-
-
-def _with_epoch(found: list[StampFault], epoch: StampFault | None) -> list[StampFault]:
-    """The epoch beside the others; a counter that wraps has none, so that is its consequence."""
-    if epoch is None:
-        return found
-    wraps = [f for f in found if f.fault == "counter_wrap"]
-    if not wraps or epoch.parameters["kind"] not in _COUNTERS:
-        return [*found, epoch]
-    follows = Consequence("epoch_offset", epoch.parameters, epoch.evidence)
-    whole = replace(wraps[0], consequences=(*wraps[0].consequences, follows))
-    return [whole if f is wraps[0] else f for f in found]
-
-
 def _with_alike(series: Series, arrived: StampFault) -> StampFault:
     """Stamps of messages that came at once follow from being stamped on arrival."""
     alike = order.without_duplicates(series).faults
     follows = tuple(Consequence("duplicates", f.parameters, f.evidence) for f in alike)
     return replace(arrived, consequences=follows)
-
-
-def _as_epochs(
-    slips: Shifts, series: Series, whole: StampFault | None
-) -> tuple[Shifts, StampFault | None]:  # fmt: skip
-    """Slips of many seconds are stretches of another epoch; the stretch without one is right.
-
-    Returns them with the epoch of what was taken as the base.
-    """
-    times = series.seconds
-    large = [f for f in slips.faults if abs(float(f.parameters["seconds"])) >= LARGE_SLIP_S]
-    inside = [_within(f, times) for f in large]
-    rest = series.good & ~np.logical_or.reduce(inside)
-    base = epoch_fault(replace(series, good=rest))
-    faults = [f for f in slips.faults if f not in large]
-    right = base is None
-    for slip, mask in zip(large, inside, strict=True):
-        own = epoch_fault(replace(series, good=series.good & mask))
-        if own is not None:
-            faults.append(replace(own, from_s=slip.from_s, to_s=slip.to_s))
-        elif base is None:
-            faults.append(slip)
-        right |= own is None
-    if base is not None:
-        ends = times[rest][[0, -1]]
-        spans = (None, None) if not right or base is whole else (float(ends[0]), float(ends[1]))
-        faults.append(replace(base, from_s=spans[0], to_s=spans[1]))
-    return replace(slips, faults=tuple(faults)), base
-
-
-def _within(fault: StampFault, times: Array) -> Mask:
-    begin, end = fault.from_s or 0.0, fault.to_s or 0.0
-    last = bool(end >= times[-1])
-    return np.asarray((times >= begin) & ((times < end) | last))
 
 
 def _with_jumps(found: list[StampFault], jumps: list[StampFault]) -> list[StampFault]:
@@ -240,24 +191,6 @@ def _with_jumps(found: list[StampFault], jumps: list[StampFault]) -> list[StampF
     follows = Consequence("duplicates", twice[0].parameters, twice[0].evidence)
     first = replace(jumps[0], consequences=(*jumps[0].consequences, follows))
     return [*(f for f in found if f is not twice[0]), first, *jumps[1:]]
-
-
-def _known(epoch: StampFault | None, series: Series, unit: bool) -> float | None:
-    """Stamp minus receipt that has a name [s]; None where the constant is of no known epoch."""
-    if epoch is None:
-        return None if unit or _far_off(series) else 0.0
-    exact = ("tai", "gps", "tai_gps", "time_zone", "gps_epoch", "adjusted_gps", "ntp_epoch",
-             "week_rollover")  # fmt: skip
-    value = epoch.parameters.get("seconds")
-    if epoch.parameters["kind"] in exact and isinstance(value, float):
-        return value
-    return None
-
-
-def _far_off(series: Series) -> bool:
-    if series.receive is None or not series.good.any():
-        return True
-    return abs(float(np.median(seconds((series.receive - series.stamp)[series.good])))) > 60.0
 
 
 def _coarse(raw: Series) -> float:
@@ -329,7 +262,8 @@ def residual_of(raw: Series, series: Series, faults: tuple[StampFault, ...]) -> 
     if series.receive is None or series.good.sum() < 2:
         return ResidualTime(None, None, None)
     drifts = any(f.fault == "drift" for f in faults)
-    restored = _restored(series, faults)
+    whole = tuple(f for f in faults if f.fault != "stamped_on_arrival" or f.from_s is None)
+    restored = _restored(series, whole)
     if restored is None:
         return ResidualTime(None, None, None)
     left = above_floor(series.seconds[series.places()], restored, sloping=drifts)

@@ -16,7 +16,8 @@ import numpy as np
 
 from syncline_design.auditing.blocks import Blocks
 from syncline_design.auditing.cadence import Cadence
-from syncline_design.auditing.levels import SURE, Shape, course
+from syncline_design.auditing.clock_shapes import Shape, course
+from syncline_design.auditing.levels import SURE
 from syncline_design.auditing.series import Array, Series, scatter, seconds
 from syncline_design.machine.quick_dataclass import dataclass
 
