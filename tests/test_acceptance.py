@@ -18,13 +18,19 @@ from typer.testing import CliRunner, Result
 from syncline_design.cli.app import app
 from syncline_design.comparison import accept as acceptance
 from syncline_design.comparison.accept import AcceptSettings, accept
-from syncline_design.comparison.acceptance import NAMES, Acceptance, AssumptionResult
+from syncline_design.comparison.acceptance import (
+    NAMES,
+    Acceptance,
+    AssumptionResult,
+    MeasuredFigure,
+)
 from syncline_design.comparison.assumptions import Assumed, assumptions
 from syncline_design.comparison.by_log import LogEvidence, by_log
 from syncline_design.comparison.judgement import Judgement, together
 from syncline_design.comparison.on_paper import OnPaper
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.consequence import promise_of
+from syncline_design.diagnosis.limits import Beyond
 from syncline_design.diagnosis.result import (
     BlindSpot,
     Diagnosis,
@@ -346,6 +352,24 @@ def test_a_moment_beyond_the_limit_is_no_proof_that_it_is_kept(
     assert row.status == "not_shown"
     assert row.measured is not None
     assert row.measured.value == 14.1
+
+
+@pytest.mark.parametrize(("most", "status"), [(7.0, "holds"), (0.5, "not_shown")])
+def test_an_earlier_stage_is_held_against_its_limits_too(
+    known: tuple[Case, Diagnosis], most: float, status: str
+) -> None:
+    """Its motion is in the log as that of the last one is, as means over seconds."""
+    case, found = known
+    mean = Beyond(most, most - 0.1, most + 0.1, most - 0.3, 9.0, 2.0, np.full(9, most), 0.3)
+    one = next(
+        a
+        for a in assumptions(case, check_loaded(case, CheckSettings(monte_carlo=False)))
+        if a.name == "speed"
+    )
+    sight = Sighted(found, beyond={("speed", one.stage): mean})
+    row = by_log(one, LogEvidence(found, OnPaper(case, ()), "another stage", sight=sight))
+    assert row.status == status
+    assert row.measured == MeasuredFigure(most, most - 0.1, most + 0.1)
 
 
 @pytest.mark.parametrize(("factor", "status", "code"), [(2, "not_shown", 3), (3, "broken", 1)])

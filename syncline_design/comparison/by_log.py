@@ -7,6 +7,8 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import field
 from typing import Final
 
+import numpy as np
+
 from syncline_design.comparison.acceptance import MeasuredFigure
 from syncline_design.comparison.assumptions import Assumed
 from syncline_design.comparison.by_shift import by_shifts, shifts, widened
@@ -16,7 +18,7 @@ from syncline_design.comparison.on_paper import OnPaper, size_of
 from syncline_design.diagnosis.built import Sighted
 from syncline_design.diagnosis.limits import Beyond
 from syncline_design.diagnosis.noise import FACTOR_LIMIT
-from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Smallest
+from syncline_design.diagnosis.result import Check, Diagnosis, Estimate, Finding, Motion, Smallest
 from syncline_design.effects import registry
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import format_duration, percent, rounded, to_digits
@@ -343,19 +345,36 @@ def _of_platform(one: Assumed, log: LogEvidence) -> Judgement:
         return Judgement("broken", beyond.message, MeasuredFigure(beyond.value, *ends))
     if mean is not None and one.value is not None and mean.least > (1.0 + READ) * one.value:
         return _over(one, mean)
-    if motion is None or one.stage != log.last_stage or one.value is None:
+    own = motion if one.stage == log.last_stage else None
+    if one.value is None or (own is None and mean is None):
         return Judgement("not_shown", "the log does not tell of it")
-    reached = max(abs(motion.low), abs(motion.high)) * unit
-    most = reached if motion.most is None else motion.most * unit
-    figure = MeasuredFigure(most)
-    if mean is not None:
-        figure = MeasuredFigure(most, min(mean.low, most), max(mean.high, most))
+    reached, figure = _reached(own, mean, unit)
+    most = figure.value or 0.0
     if reached < MOVED * one.value:
         return Judgement("not_shown", "the log stays far below the limit", figure)
     if most > (1.0 + READ) * one.value:
         words = "the log goes beyond the limit for moments, or its readings scatter that far"
         return Judgement("not_shown", words, figure)
-    return Judgement("holds", "the most that the log reaches", figure)
+    by_means = (
+        ""
+        if own is not None or mean is None
+        else f", as a mean over {format_duration(rounded(mean.over_s, 2))}"
+    )
+    return Judgement("holds", f"the most that the log reaches{by_means}", figure)
+
+
+def _reached(
+    motion: Motion | None, mean: Beyond | None, unit: float
+) -> tuple[float, MeasuredFigure]:
+    """What 95 % of a log stay below, and the most; of an earlier stage by means over seconds."""
+    if motion is None:
+        assert mean is not None
+        return float(np.quantile(mean.means, 0.95)), MeasuredFigure(mean.most, mean.low, mean.high)
+    reached = max(abs(motion.low), abs(motion.high)) * unit
+    most = reached if motion.most is None else motion.most * unit
+    if mean is None:
+        return reached, MeasuredFigure(most)
+    return reached, MeasuredFigure(most, min(mean.low, most), max(mean.high, most))
 
 
 def _over(one: Assumed, mean: Beyond) -> Judgement:

@@ -7,6 +7,7 @@ from dataclasses import field
 
 import numpy as np
 
+from syncline_design.diagnosis.followed import follows_noise
 from syncline_design.diagnosis.noise import Directed
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.effects import registry
@@ -75,7 +76,7 @@ def candidates(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...
                     continue  # attitude and rates are the better system's
                 if _has_tails(view, effect, sensor, k):
                     continue
-                if effect.by_heading and heading_is_noise(view, k):
+                if follows_noise(view, effect, k):
                     continue
                 if _can_have(effect, stage, sensor, k):
                     found.append(Candidate(effect, sensor, k))
@@ -95,32 +96,16 @@ def _has_tails(view: Scene, effect: Effect, sensor: str, index: int) -> bool:
     )
 
 
-def noise_of_heading(view: Scene, exclude: Sequence[str] = ()) -> tuple[str, ...]:
-    """What is no candidate because the heading hardly varies in this log, as `unseen` says it."""
+def hidden_by_noise(view: Scene, exclude: Sequence[str] = ()) -> tuple[Candidate, ...]:
+    """What is no candidate because the values that it follows hardly vary in this log."""
     return tuple(
-        f"{effect.name} ({sensor})"
+        Candidate(effect, sensor, k)
         for effect in registry().values()
         if effect.name not in exclude and view.log.kind != "position"
         for sensor in effect.sensors
-        if any(
-            effect.by_heading and effect.applies(stage, sensor) and heading_is_noise(view, k)
-            for k, stage in enumerate(view.system.stages)
-        )
+        for k, stage in enumerate(view.system.stages)
+        if effect.applies(stage, sensor) and follows_noise(view, effect, k)
     )
-
-
-def heading_is_noise(view: Scene, index: int) -> bool:
-    """Whether the noise of a stage's logged heading could pass for what follows the heading.
-
-    A heading of spread s that is logged with white noise sigma correlates with that noise: a false
-    slope of sigma^2 / (sigma^2 + s^2), worth n/2 (sigma/s)^2 nat where heading noise is all noise.
-    It stays below half a nat from s = sigma sqrt(n) on.
-    """
-    attitude = view.system.stages[index].attitude
-    if attitude is None:
-        return False
-    yaw = np.unwrap(view.rows[index].euler_rad[:, 2])
-    return bool(np.std(yaw) < attitude.sigma[2] * np.sqrt(len(view)))
 
 
 def commonness(label: tuple[str, str, int]) -> tuple[int, int]:

@@ -15,10 +15,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from syncline_design.diagnosis.candidates import Candidate, Signature, heading_is_noise, slopes
+from syncline_design.diagnosis.candidates import Candidate, Signature, slopes
 from syncline_design.diagnosis.consequence import expected_rms_m, rms_m
 from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model, inner, solve_scaled, thinned
+from syncline_design.diagnosis.followed import heading_is_noise
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import (
     Array,

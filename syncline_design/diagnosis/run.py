@@ -13,7 +13,7 @@ from syncline_design.diagnosis.axes import still_axes_apart, varying_axes, witho
 from syncline_design.diagnosis.candidates import (
     candidates,
     directed_parts,
-    noise_of_heading,
+    hidden_by_noise,
     signatures,
 )
 from syncline_design.diagnosis.checks import log_checks
@@ -382,7 +382,8 @@ def _unseen(
 ) -> tuple[str, ...]:
     """What this log could not show, and what it would show by its noise alone."""
     hidden = unseen(data, result.model, search.free_signatures(result.model))
-    return (*hidden, *_unseen_parts(result), *noise_of_heading(data.view, exclude))
+    by_noise = (f"{c.effect.name} ({c.sensor})" for c in hidden_by_noise(data.view, exclude))
+    return (*hidden, *_unseen_parts(result), *dict.fromkeys(by_noise))
 
 
 def _unseen_parts(result: SearchResult) -> tuple[str, ...]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from scipy.stats import chi2, f
 
-from syncline_design.diagnosis.candidates import Signature, zero_values
+from syncline_design.diagnosis.candidates import Candidate, Signature, hidden_by_noise, zero_values
 from syncline_design.diagnosis.consequence import Promise, blind_spots
 from syncline_design.diagnosis.positive import pseudo_inverse
 from syncline_design.diagnosis.result import BlindSpot, Informative, Smallest
@@ -59,14 +59,24 @@ def smallest_seen(search: Search, result: SearchResult) -> tuple[Seen, ...]:
     found: list[Seen] = []
     for s, one in zip(free, judged, strict=True):
         found += _of(search, s, one, log_p)
-    return tuple(found)
+    hidden = hidden_by_noise(search.data.view, search.settings.exclude_effects)
+    return (*found, *(blind for one in hidden for blind in _blind(search, one)))
+
+
+def _entry(search: Search, one: Candidate) -> EffectEntry:
+    stage = search.data.view.system.stages[one.stage]
+    values = tuple(zero_values(one.effect).items())
+    return EffectEntry(one.effect.name, one.sensor, stage.name, values)
+
+
+def _blind(search: Search, one: Candidate) -> Iterator[Seen]:
+    """No size of what follows values that are noise in this log shows in it."""
+    for p in one.effect.slopes():
+        yield Seen(_entry(search, one), p.name, math.inf, p.high)
 
 
 def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
-    effect, stage = s.candidate.effect, search.data.view.system.stages[s.candidate.stage]
-    entry = EffectEntry(
-        effect.name, s.candidate.sensor, stage.name, tuple(zero_values(effect).items())
-    )
+    effect, entry = s.candidate.effect, _entry(search, s.candidate)
     sizes = [_both(one.model, log_p)]
     sizes += [_both(covariance, log_p, count) for covariance, count in one.jackknives]
     size = np.max(sizes, axis=0)

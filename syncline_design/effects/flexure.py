@@ -26,10 +26,10 @@ GRAVITY_MPS2 = 9.80665
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """true lever arm = spec + (x f_x, y f_y, z f_z) [m], body, f the specific force."""
     bend = np.array([values["x"], values["y"], values["z"]])
-    return Departures(ranging_m=bend * _specific_force(rows))
+    return Departures(ranging_m=bend * specific_force(rows))
 
 
-def _specific_force(rows: StageRows) -> Array:
+def specific_force(rows: StageRows) -> Array:
     """f = a - g [m/s2], body, (n, 3): what an accelerometer feels and what loads the mount.
 
     At rest and level f = (0, 0, -9.81): the spec's arm is that of the unloaded mount.
@@ -41,7 +41,7 @@ def _specific_force(rows: StageRows) -> Array:
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:
     """d error / d C_k = -R e_k f_k [m/s2]; (n, 3, 3)."""
-    return -rows.rotation * _specific_force(rows)[:, None, :]
+    return -rows.rotation * specific_force(rows)[:, None, :]
 
 
 def _contribute(stage: Stage, values: Values, sensor: Target, basis: Basis) -> Contribution:
@@ -70,5 +70,6 @@ EFFECT = Effect(
     contribute=_contribute,
     tilted=True,
     accelerated=True,
+    follows="load",
     breaks="mounting",
 )

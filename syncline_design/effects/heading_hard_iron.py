@@ -50,5 +50,5 @@ EFFECT = Effect(
     depart=_depart,
     sensitivity=_sensitivity,
     contribute=_contribute,
-    by_heading=True,
+    follows="heading",
 )

@@ -298,8 +298,9 @@ class Effect:
     a place but neither stamps nor noise of its own.
     accelerated: acts by acceleration, and is charged for that of the platform's hardest turn.
     unbudgeted: why the Syncline cannot charge it with these values, and the way out; "" if it can.
-    by_heading: its size follows the heading; a log shows it only where the heading varies by far
-    more than its own noise, which otherwise passes for it (errors in variables).
+    follows: whose measured values its size follows, the heading or the load (the specific force
+    that comes of roll and pitch); a log shows it only where these vary by far more than their own
+    noise, which otherwise passes for it (errors in variables).
     rarity: where two effects fit a log equally well, the one that is met more often is named, the
     one of the lower figure, and the other listed as its alias; the order is ours, by judgement.
     opens: which of a log's noise a stochastic one sets free: the "factor" of its sensor, the "slow"
@@ -338,7 +339,7 @@ class Effect:
     transponder: bool = False
     accelerated: bool = False
     unbudgeted: Unbudgeted = always_budgeted
-    by_heading: bool = False
+    follows: Literal["", "heading", "load"] = ""
     rarity: int = SELDOM
     opens: Opening = ""
     undoing: Undoing | None = None
