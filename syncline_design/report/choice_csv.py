@@ -28,8 +28,9 @@ def family_csv(found: Optimised) -> str:
     resource = found.settings.resource
     listed = found.result.front if found.settings.pareto else found.result.designs
     names = [resource] if found.settings.pareto else ["cost", "mass", "power"]
+    over = ["figure_m"] if found.result.front_figure is not None else []
     units = {"mass": "mass_kg", "power": "power_w"} if not found.settings.pareto else {}
-    headers = [*(units.get(name, name) for name in names), "error_m"]
+    headers = [*(units.get(name, name) for name in names), *over, "error_m"]
     rows: list[list[Any]] = []
     for one in listed or ():
         if not rows:
@@ -38,7 +39,7 @@ def family_csv(found: Optimised) -> str:
             headers += [f"{slot}_{part}" for slot in slots for part in parts]
         cells = [part for *_, r in one.design.roles
                  for part in (r.sensor, r.primitive, r.timestamping)]  # fmt: skip
-        rows.append([*(getattr(one, name) for name in names), one.error_m, *cells])
+        rows.append([*(getattr(one, name) for name in (*names, *over)), one.error_m, *cells])
     return plain_csv(headers, rows)
 
 

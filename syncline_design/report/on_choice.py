@@ -195,18 +195,24 @@ def family_designs_table(designs: Sequence[RankedDesign], currency: str) -> Tabl
 
 
 def family_front_table(
-    front: Sequence[FrontDesign], resource: ResourceName, currency: str
+    front: Sequence[FrontDesign], resource: ResourceName, currency: str, figure: str | None = None
 ) -> Table:
-    """The front of several missions, a row per point."""
+    """The front of several missions, a row per point.
+
+    figure: what it is drawn over in place of the Syncline error.
+    """
+    over = () if figure is None else (f"{figure[0].upper()}{figure[1:]} #",)
     rows = [
         [
             amount_cell(getattr(one, resource), resource, currency),
+            *(Cell(numbers.length(one.figure_m), one.figure_m) for _ in over),
             Cell(numbers.length(one.error_m), one.error_m),
             *_named_cells(one.design),
         ]
         for one in front
     ]
-    heads = (f"{resource.capitalize()} #", "Largest error #", *_named_heads(front[:1]))
+    error = "Largest error #" if figure is None else "Largest Syncline error #"
+    heads = (f"{resource.capitalize()} #", *over, error, *_named_heads(front[:1]))
     return table("Exact front", heads, rows)
 
 
@@ -253,8 +259,12 @@ def _front(found: Optimised) -> list[Section]:
     resource, currency = found.settings.resource, found.case.spec.currency
     nodes: list[Node] = []
     if found.text is not None and found.result.front:
-        nodes += show(family_front_table(found.result.front, resource, currency), silent=True)
-        nodes += show(staircase_table(found.result.staircase or (), currency, resource))
+        words = found.result.front_figure
+        front = family_front_table(found.result.front, resource, currency, words)
+        nodes += show(front, silent=True)
+        steps = found.result.staircase or ()
+        nodes += show(staircase_table(steps, currency, resource, words))
+        nodes += [] if words is None else [Text(f"{OVER_FIGURE} {OF_MISSIONS}")]
     if found.points:
         words = found.result.front_figure
         drawn = front_table(found.problem, found.points, resource, currency, words)
@@ -276,6 +286,7 @@ OVER_FIGURE = (
     "Every point keeps all requirements but accuracy and those on this figure; each figure is the "
     "largest that a search over the situations found, and gains below 0.1 % are no points."
 )
+OF_MISSIONS = "Of several missions the largest figure counts."
 
 
 def figure_front(found: Optimised) -> list[Section]:

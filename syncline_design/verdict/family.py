@@ -252,11 +252,12 @@ def passing(
         return None
 
     def passes(design: FamilyDesign) -> bool:
-        designs = work.family.designs(design)
-        found = [judgement(p, d) for p, d in zip(work.family.problems, designs, strict=True)]
-        if any(one.failed for one in found):
-            return False
-        undecided = any(one.undecided for one in found)
+        designs, undecided = work.family.designs(design), False
+        for problem, own in zip(work.family.problems, designs, strict=True):
+            found = judgement(problem, own)
+            if found.failed:  # one mission is enough; the others would be simulated in vain
+                return False
+            undecided |= bool(found.undecided)
         if likely is not None:
             status = likely.of(work.family.problems, designs).status
             if status == "fail":

@@ -57,7 +57,7 @@ def choice_of_family(work: Work, chosen: Chosen, pieces: Pieces) -> ChoiceResult
     """The proof, the front, what comes next and what else could be bought, what was ruled out."""
 
     def listed(name: str, source: Callable[[], Iterable[T]]) -> list[T]:
-        return pieces.listed(name, lambda: _as_far(name, source, pieces))
+        return pieces.listed(name, lambda: as_far(name, source, pieces))
 
     points = listed("front", lambda: front_of(work))
     excluded, count = ruled_out_of(work)
@@ -81,7 +81,7 @@ def choice_of_family(work: Work, chosen: Chosen, pieces: Pieces) -> ChoiceResult
     )
 
 
-def _as_far(name: str, source: Callable[[], Iterable[T]], pieces: Pieces) -> Iterator[T]:
+def as_far(name: str, source: Callable[[], Iterable[T]], pieces: Pieces) -> Iterator[T]:
     """What a source finds until its search gives up; the choice itself stands without it."""
     try:
         yield from source()

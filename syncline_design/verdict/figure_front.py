@@ -67,11 +67,7 @@ def figure_front(
 
     They keep every requirement of the spec but accuracy and those on this very figure.
     """
-    rest = (one for one in case.spec.requirements if one.kind != "accuracy")
-    others = [one for one in rest if not _is_same(one, requirement)]
-    spec = case.spec.model_copy(update={"requirements": (*others, requirement)})
-    asked = replace(case, spec=spec)
-    problem = Simulations(seed).problem_of(asked)
+    problem = Simulations(seed).problem_of(without_figure(case, requirement))
     priced = stated(problem, resource)
     judge = problem.judge
     if priced.is_empty or judge is None:
@@ -84,6 +80,14 @@ def figure_front(
         if found is None or found.undecided or found.figure_m is None:
             return
         least = found.figure_m * LESS
+
+
+def without_figure(case: Case, requirement: Requirement) -> Case:
+    """The case with a figure's requirement in place of accuracy and all on that figure."""
+    rest = (one for one in case.spec.requirements if one.kind != "accuracy")
+    others = [one for one in rest if not _is_same(one, requirement)]
+    spec = case.spec.model_copy(update={"requirements": (*others, requirement)})
+    return replace(case, spec=spec)
 
 
 def _next(

@@ -55,7 +55,7 @@ from syncline_design.verdict.optimisation import (
     OptimizeSettings,
 )
 from syncline_design.verdict.optimise_family import optimize_family
-from syncline_design.verdict.scenarios import is_family, refuse_missions
+from syncline_design.verdict.scenarios import is_family
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import Caution, Word
 from syncline_design.verdict.verified import Verified, error_figures
@@ -65,8 +65,6 @@ from syncline_design.verdict.why_not import Asked, questions_of, why_not
 
 def optimize(case: Case, settings: OptimizeSettings) -> Optimised:
     """The best designs of a spec; pinned roles stay as they are."""
-    if settings.figure is not None:
-        refuse_missions(case)
     if is_family(case):
         return optimize_family(case, settings)
     questions = questions_of(case, settings.why_not)

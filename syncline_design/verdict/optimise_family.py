@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from syncline_design import __version__
@@ -19,6 +20,8 @@ from syncline_design.spec.edit_missions import pinned_missions_text
 from syncline_design.spec.load import BadInput, Flaw
 from syncline_design.verdict.acceptance import Simulations
 from syncline_design.verdict.family import MERGED, Build, Chosen, Work, choose_family, front_of
+from syncline_design.verdict.family_choice import as_far
+from syncline_design.verdict.family_figure_front import family_figure_front
 from syncline_design.verdict.family_measure import measure_next
 from syncline_design.verdict.family_named import (
     as_point,
@@ -30,6 +33,7 @@ from syncline_design.verdict.family_named import (
 from syncline_design.verdict.family_others import next_best, with_stampings
 from syncline_design.verdict.family_slack import family_slack
 from syncline_design.verdict.family_why_not import Question, why_not_in_family
+from syncline_design.verdict.figure_front import drawn_requirement, figure_words
 from syncline_design.verdict.missions import Found as Judged
 from syncline_design.verdict.missions import judged_family
 from syncline_design.verdict.named import FrontDesign, RankedDesign
@@ -74,7 +78,10 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
     if found is not None and found.found is not None:
         designs = _designs(work, found, settings, pieces)
         if settings.pareto:
-            front = pieces.made("front", lambda: _front(work, settings), front)
+            if settings.figure is not None:
+                front = _figure_front(work, settings, pieces)
+            else:
+                front = pieces.made("front", lambda: _front(work, settings), front)
     answers: tuple[Answer, ...] | None = None
     if kinds:
         asked = Question(work, found, lambda: Simulations(settings.seed).problem_of, settings.seed)
@@ -99,6 +106,9 @@ def optimize_family(case: Case, settings: OptimizeSettings) -> Optimised:
         alternatives=choice.alternatives if has_design and choice is not None else None,
         bargains=choice.bargains if has_design and choice is not None else None,
         front=front and front[0],
+        front_figure=None
+        if settings.figure is None or front is None
+        else figure_words(drawn_requirement(case, settings.figure)),
         front_left_out=front and front_left_out(work, settings.resource),
         staircase=front and front[1],
         why_not=answers,
@@ -186,11 +196,11 @@ def _unfinished(case: Case, settings: OptimizeSettings, verdict: Verdict) -> Opt
 
 
 def _refuse_unanswered(case: Case, settings: OptimizeSettings) -> None:
-    """What `optimize` answers for one mission only."""
-    if settings.figure is not None:
-        key = "missions" if case.missions else "choose_for"
-        message = "--against a figure of the error is drawn for one mission chosen at given figures"
-        hint = "ask it of a spec with one mission's overrides in its stages"
+    """What `optimize` answers at given figures only."""
+    if settings.figure is not None and case.spec.choose_for != "nominal":
+        key = "choose_for"
+        message = "--against a figure of the error is drawn for designs chosen at given figures"
+        hint = "ask it of the spec with choose_for: nominal"
         place = case.position((key,))
         raise BadInput((Flaw(str(case.path), *place, key, message, hint=hint),))
 
@@ -208,6 +218,20 @@ def _designs(
         lambda: next_best(work, chosen, every=settings.every, count=more),
     )
     return [first, *following]
+
+
+def _figure_front(work: Work, settings: OptimizeSettings, pieces: Pieces) -> Front:
+    """The front over a figure of the error, as far as time and the search go."""
+    assert settings.figure is not None
+    asked = drawn_requirement(work.case, settings.figure)
+    made = family_figure_front(work.case, asked, settings.resource, settings.seed)
+    points = pieces.listed("front", lambda: as_far("front", lambda: made, pieces))
+    drawn = [
+        replace(front_design(work, one.point, settings.resource), figure_m=one.figure_m)
+        for one in points
+    ]
+    steps = [replace(as_point(work, one.point), figure_m=one.figure_m) for one in points]
+    return tuple(drawn), staircase(steps)
 
 
 def _front(work: Work, settings: OptimizeSettings) -> Front:
