@@ -22,8 +22,15 @@ from syncline_design.verdict.family_named import ruled_out_of
 from syncline_design.verdict.named import ChoiceResult
 from syncline_design.verdict.no_design import LATE, infeasible_verdict, unmet
 from syncline_design.verdict.settings import CheckSettings
-from syncline_design.verdict.tree import MissionVerdict, RequirementResult, Verdict
+from syncline_design.verdict.tree import Caution, MissionVerdict, RequirementResult, Verdict
 from syncline_design.verdict.verified import framed
+
+NOT_TRIED = Caution(
+    "missions",
+    "what would help the whole family is looked for among its limits, sensors of its own for each "
+    "mission and missions left out; other platform figures, several changes together and the "
+    "nearest payload are looked for in one mission at a time",
+)
 
 
 def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], Build]) -> Verdict:
@@ -42,6 +49,7 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
                 infeasibility=why,
                 requirements=_rows_without_design(mission, found),
                 missions=_without_design(work, mission.name),
+                warnings=(*found.warnings, *([] if mission.name == ALL else [NOT_TRIED])),
             )  # fmt: skip
     why = _explained(work, settings, build)
     first = work.missions[0].case
@@ -53,7 +61,7 @@ def infeasible_family(work: Work, settings: CheckSettings, build: Callable[[], B
             replace(unmet(first, one, one.id in ids, why.conflict.minimal), line=None, column=None)
             for one in first.spec.requirements
         ),
-        warnings=(LATE,) if why.cut_short else (),
+        warnings=(*((LATE,) if why.cut_short else ()), NOT_TRIED),
         infeasibility=why,
         choice=ChoiceResult(excluded=excluded, excluded_count=count),
         missions=_without_design(work, None),
