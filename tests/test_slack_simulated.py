@@ -14,6 +14,8 @@ import pytest
 from scipy.optimize import brentq
 from scipy.stats import ncx2
 
+from syncline_design.choice.problem import sole_design
+from syncline_design.choice.slack import slack_ledger
 from syncline_design.model.timing import Uniform
 from syncline_design.spec.load import load_text
 from syncline_design.verdict import acceptance
@@ -112,3 +114,19 @@ def test_what_ifs_are_left_open_after_as_many_samples_as_stated(
     what_ifs = [samples for own, samples in found[1] if not own]
     assert len(what_ifs) > 20
     assert max(what_ifs) <= acceptance.WHAT_IF_CAP
+
+
+def test_what_breaks_is_named_by_its_kind(tmp_path: Path) -> None:
+    """A limit of the vertical: straight up, true stamps, 1.96 sigma reaches it."""
+    (tmp_path / "alone.yaml").write_text(CATALOG.replace(f"{LATE} s", "0 s"))
+    own = f"kind: tvu, limit: {LIMIT} m"
+    text = SPEC.replace(f"kind: monte_carlo, quantile: {SHARE}, limit: {LIMIT} m", own)
+    case = load_text(text.replace("[cheap, dear]", "[cheap]"), tmp_path / "spec.yaml")
+    build = acceptance.Simulations().problem_of
+    problem = build(case)
+    sole = sole_design(problem)
+    assert sole is not None
+    rows = slack_ledger(case, *sole, build)
+    (row,) = [one for one in rows if one.term == "position sensor error"]
+    assert row.limited_by == "tvu"
+    assert row.fails_at == pytest.approx(np.sqrt(3.0) * LIMIT / 1.959964, rel=0.015)

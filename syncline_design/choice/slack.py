@@ -8,7 +8,7 @@ The payload changes when the choice, made anew, names another sensor or method.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 
@@ -21,6 +21,7 @@ from syncline_design.choice.judged import judgement
 from syncline_design.choice.narrowed import kept
 from syncline_design.choice.options import Bools, Options
 from syncline_design.choice.outcome import Choice, NoVerdict, OutOfTime, Unfinished
+from syncline_design.choice.parts import SIMULATED
 from syncline_design.choice.problem import build_problem
 from syncline_design.choice.ranked import iter_best
 from syncline_design.choice.table import NOTHING, Design, Problem
@@ -82,7 +83,8 @@ def slack_ledger(
     A sensor whose noise enters no error (the attitude of a stage without ranging) has no such row.
     """
     rows: list[Slack] = []
-    asked = _Asked(problem, design, Beside(problem))
+    kinds = {one.id: one.kind for one in case.spec.requirements}
+    asked = _Asked(problem, design, Beside(problem), kinds)
     for index, stage in enumerate(case.spec.stages):
         for r, table in enumerate(problem.roles):
             if table.stage == index:
@@ -100,11 +102,12 @@ def slack_ledger(
 
 @dataclass(frozen=True, slots=True)
 class _Asked:
-    """What a ledger is of."""
+    """What a ledger is of; kinds: of requirements by their ids."""
 
     problem: Problem
     design: Design
     beside: Beside
+    kinds: Mapping[str, str]
 
     def alone(self) -> tuple[Problem, Design]:
         """The problem with the design's options alone, whatever else there is to choose."""
@@ -272,7 +275,7 @@ def _with_payload(
     a worse sensor can make a cheaper design keep its sync limit.
     """
     problem, design = asked.problem, asked.design
-    row = _simulated(row, problem, design, changed)
+    row = _simulated(row, problem, design, changed, asked.kinds)
     never = ("verdict",) if fails_never else ()
     if fails_never and _is_sole(problem):
         return replace(row, never=(*never, "payload"))
@@ -301,16 +304,26 @@ def _with_payload(
 
 
 def _simulated(
-    row: Slack, problem: Problem, design: Design, changed: Callable[[float], Problem]
+    row: Slack,
+    problem: Problem,
+    design: Design,
+    changed: Callable[[float], Problem],
+    kinds: Mapping[str, str],
 ) -> Slack:
-    """The row with the value at which the design fails in simulation, where that comes first."""
+    """The row with the value at which the design fails what is judged design by design, where that
+    comes first, and of which kind that is; kinds: of requirements by their ids."""
     if problem.judge is None or not row.value > 0.0:
         return row
 
+    breaks = ""
+
     def holds(at: float) -> bool:
+        nonlocal breaks
         other = changed(at)
         same = same_design(problem, design, other)
-        return same is None or not judgement(other, same).failed
+        failed = () if same is None else judgement(other, same).failed
+        breaks = failed[0] if failed else breaks
+        return not failed
 
     works, fails = row.value, row.fails_at or row.value * COARSE[-1]
     try:
@@ -319,7 +332,7 @@ def _simulated(
         at = _edge(holds, works, fails, SIMULATED_CLOSE)
     except Unfinished:
         return row
-    return replace(row, fails_at=at, limited_by="monte_carlo")
+    return replace(row, fails_at=at, limited_by=kinds.get(breaks, SIMULATED))
 
 
 def _chosen(problem: Problem, at_hand: Design | None, beside: Beside) -> Design | None:
