@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from typing import TypeVar
 
@@ -33,6 +33,7 @@ from syncline_design.model.figure_text import to_digits
 from syncline_design.spec.case import Case
 
 Found = TypeVar("Found")
+MOST_A_QUESTION = 100  # designs simulated for one of the questions of an explanation
 
 
 def told(found: Explanation) -> Explanation:
@@ -81,8 +82,10 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
     """
     gaps = tuple(_gap(table, problem.limits.sync) for table in problem.roles if not table.options)
     gaps += tuple(_clock_gap(vehicle) for vehicle in problem.vehicles if not vehicle.clocks)
-    conflict, minimal = conflict_of(problem)
-    further = _further(problem, conflict)
+    with _spending(problem):
+        conflict, minimal = conflict_of(problem)
+    with _spending(problem):
+        further = _further(problem, conflict)
     moves = _proven(lambda: requirement_fixes(case, problem, build))
     fixes = [fix for together in moves if len(together) == 1 for fix in together]
     joint = tuple(together for together in moves if len(together) > 1)
@@ -90,10 +93,12 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
         joint = joint_fixes(case, problem, build)
     fixes += _proven(lambda: method_fixes(case, build, problem))
     fixes += _proven(lambda: fact_fixes(case, problem, build))
-    fixes += _proven(lambda: platform_fixes(case, build))
+    with _spending(problem):
+        fixes += _proven(lambda: platform_fixes(case, build))
     fixes = by_size(fixes)
     joint = tuple(sorted((tuple(map(_measured, some)) for some in joint), key=_largest))
-    each_suffices = _each_suffices(case, problem, build, conflict) or None
+    with _spending(problem):
+        each_suffices = _each_suffices(case, problem, build, conflict) or None
     found = Explanation(
         gaps,
         Conflict(_members(case, conflict), minimal, each_suffices),
@@ -103,6 +108,11 @@ def explain(case: Case, problem: Problem, build: Build = build_problem) -> Expla
         cut_short=in_force().is_over,  # once over, every search after it ended without an answer
     )
     return told(found)
+
+
+def _spending(problem: Problem) -> AbstractContextManager[None]:
+    """So that what one question simulates leaves something to the others."""
+    return nullcontext() if problem.judge is None else problem.judge.spending(MOST_A_QUESTION)
 
 
 def _measured(fix: Fix) -> Fix:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import field, replace
 from fractions import Fraction
 from typing import Literal, Protocol
@@ -246,6 +247,10 @@ class Judge(Protocol):
 
     def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
         """The same with other limits; a requirement that is not named is lifted."""
+        ...
+
+    def spending(self, most: int) -> AbstractContextManager[None]:
+        """A question that may simulate so many more designs, and leaves the rest to the next."""
         ...
 
 

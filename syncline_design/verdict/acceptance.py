@@ -7,7 +7,8 @@ a what-if (another distance, another limit) meets the same random numbers as the
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import field, replace
 from datetime import date
 from fractions import Fraction
@@ -312,6 +313,17 @@ class _SpecJudge:
     def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
         """The same at other limits."""
         return replace(self, limits=limits)
+
+    @contextmanager
+    def spending(self, most: int) -> Iterator[None]:
+        """See `Judge`."""
+        simulations = self.simulations
+        before = simulations.most
+        simulations.most = min(before, len(simulations.systems) + most)
+        try:
+            yield
+        finally:
+            simulations.most = before
 
 
 def _grown(system: System, stage: int, role: RoleName, noise: float, shift: float) -> System:
