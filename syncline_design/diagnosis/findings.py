@@ -23,12 +23,12 @@ from syncline_design.diagnosis.noise import (
     marginal_variance,
     precision,
 )
-from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch
+from syncline_design.diagnosis.result import Estimate, Finding, Rival, Stretch, readings_words
 from syncline_design.diagnosis.scene import Scene
 from syncline_design.diagnosis.sensor_tails import sensor_tails
 from syncline_design.diagnosis.settling import Settled
 from syncline_design.diagnosis.spans import span_of
-from syncline_design.effects import registry
+from syncline_design.diagnosis.unlike_readings import Unlike, factor_effect
 from syncline_design.effects.acting import Acting
 from syncline_design.effects.record import Effect
 from syncline_design.logs.stream_times import ASSUMED_GPS, GPS_MINUS_UTC_S, TELL_CLOCK
@@ -333,7 +333,7 @@ def _tails(final: Settled, opened: Opened, weights: Weights) -> list[Finding]:
     size_m = _noise_size(data, model, opened)
     if not tails.scale > 1.0:
         return [_finding(final, effect, label, shown, size_m, weights)]
-    wider = next(one for one in registry().values() if one.opens == "factor")
+    wider = factor_effect()
     part = next(w for w in data.structure.white if w.sensor == (stage, label[1]))
     visible = np.isfinite(data.view.log.truth_m)
     own = float(np.mean(np.sum(np.einsum("nii->ni", part.covariance) * visible, axis=1)))
@@ -372,6 +372,35 @@ def episode_finding(data: Data, one: Episode, weights: Weights) -> Finding:
     found = finding(effect, sensor, stage, shown, words, one.gain, None,
                     material=material, size_m=size_m)  # fmt: skip
     return replace(found, from_s=one.from_s, to_s=one.to_s)
+
+
+def with_unlike_readings(
+    named: Sequence[Finding], final: Settled, found: Sequence[Unlike], weights: Weights
+) -> tuple[Finding, ...]:
+    """The findings, each sensor of unlike readings with the factor of its loudest, said once."""
+    effect = factor_effect()
+    known = {(effect.name, *one.sensor) for one in found}
+    rest = [one for one in named if (one.effect, one.stage, one.sensor) not in known]
+    return (*rest, *(_unlike_finding(effect, final, one, weights) for one in found))
+
+
+def _unlike_finding(effect: Effect, final: Settled, one: Unlike, weights: Weights) -> Finding:
+    data, level = final.data, final.model.level
+    index = [w.sensor for w in data.structure.white].index(one.sensor)
+    part, name = data.structure.white[index], effect.parameters[0].name
+    factor = level.factor[index] * max(one.growth)
+    shown = {name: estimate(factor, factor * one.spread)}
+    visible = np.isfinite(data.view.log.truth_m)
+    grown = level.factor[index] ** 2 * part.grown(level).covariance - part.covariance
+    more = float(np.mean(np.sum(np.einsum("nii->ni", grown) * visible, axis=1)))
+    size_m = math.sqrt(max(more, 0.0))
+    stage, sensor = one.sensor
+    entry = EffectEntry(effect.name, sensor, stage, ((name, factor),))
+    words = f"saves {one.gain:.1f} nat beside one size for all readings of the sensor"
+    told = finding(effect, sensor, stage, shown, words, one.gain, None,
+                   material=weights.material(size_m, entry), size_m=size_m)  # fmt: skip
+    times = {name: level.factor[index] * own for name, own in one.of_each.items()}
+    return replace(told, readings=times, sentence=f"{told.sentence}, {readings_words(times)}")
 
 
 def _noise_size(data: Data, model: Model, opened: Opened) -> float:

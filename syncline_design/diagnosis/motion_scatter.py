@@ -36,18 +36,18 @@ def grows_with_motion(data: Data, model: Model, directed: int) -> bool:
     variance = np.ones_like(squares)
     for _ in range(ROUNDS):
         cut = np.minimum(squares, FAR2 * variance) - known
-        found = _variances_of(*_normal(columns, cut, variance))
+        found = variances_of(*normal_equations(columns, cut, variance))
         variance = np.maximum(columns @ found + known, LEAST_VARIANCE)
     parts = [
-        _normal(columns[b], cut[b], variance[b])
+        normal_equations(columns[b], cut[b], variance[b])
         for b in np.array_split(np.arange(columns.shape[0]), BLOCKS)
     ]
     normal = np.sum([n for n, _ in parts], axis=0)
     right = np.sum([r for _, r in parts], axis=0)
-    if not _own_share(normal) > TOLD_APART:
+    if not own_share(normal) > TOLD_APART:
         return False
-    value = _variances_of(normal, right)[-1]
-    left = np.array([_variances_of(normal - n, right - r)[-1] for n, r in parts])
+    value = variances_of(normal, right)[-1]
+    left = np.array([variances_of(normal - n, right - r)[-1] for n, r in parts])
     spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((left - left.mean()) ** 2))
     return bool(value > t.isf(CHANCE, BLOCKS - 1) * spread)
 
@@ -110,7 +110,7 @@ def _along_and_across(direction: Array) -> Array:
     return basis
 
 
-def _normal(columns: Array, squares: Array, variance: Array) -> tuple[Array, Array]:
+def normal_equations(columns: Array, squares: Array, variance: Array) -> tuple[Array, Array]:
     """Normal matrix and right side of least squares; a square scatters as its variance squared."""
     weighted = columns / variance[:, None] ** 2
     return weighted.T @ columns, weighted.T @ squares
@@ -123,7 +123,7 @@ def _solved(normal: Array, right: Array) -> Array:
     return found
 
 
-def _variances_of(normal: Array, right: Array) -> Array:
+def variances_of(normal: Array, right: Array) -> Array:
     """Least squares with no variance below zero, which the normal equations are enough for.
 
     With N = F F', |A x - y|^2 is |F' x - F^-1 r|^2 but for a constant.
@@ -140,7 +140,7 @@ def _variances_of(normal: Array, right: Array) -> Array:
     return found
 
 
-def _own_share(normal: Array) -> float:
+def own_share(normal: Array) -> float:
     """Share of the last column's squares that the others cannot make up."""
     own = float(normal[-1, -1])
     if not own > 0.0:

@@ -43,26 +43,38 @@ class White:
     loading (n, 3, k) with loading loading' = covariance for a sensor that reads once a stamp: its
     noise is common to the rows of the stamp.  None where every row is a reading of its own.
     growth (n,): standard deviations over the spec's that the log's own episodes have; None: none.
+    unlike: the same of each reading, over the quietest, with slopes (n, 3, k), what one standard
+    deviation of every reading does; None: alike.
     """
 
     sensor: Sensor
     covariance: Array
     loading: Array | None = None
     growth: Array | None = None
+    unlike: tuple[float, ...] | None = None
+    slopes: Array | None = None
 
     def rows(self, index: Rows) -> White:
         """The same noise on some of the rows."""
         loading = None if self.loading is None else self.loading[index]
         growth = None if self.growth is None else self.growth[index]
-        return White(self.sensor, self.covariance[index], loading, growth)
+        slopes = None if self.slopes is None else self.slopes[index]
+        return White(self.sensor, self.covariance[index], loading, growth, self.unlike, slopes)
 
     def grown(self, level: NoiseLevel) -> White:
-        """The noise with its episodes, where the level has them."""
-        if self.growth is None or not level.episodes:
+        """The noise as the log has it, its readings unlike, with episodes, where the level says."""
+        if not level.episodes or (self.growth is None and self.slopes is None):
             return self
-        times = self.growth[:, None, None]
-        loading = None if self.loading is None else times * self.loading
-        return White(self.sensor, times**2 * self.covariance, loading)
+        loading, covariance = self.loading, self.covariance
+        if self.slopes is not None:
+            own = self.slopes * np.array(self.unlike)
+            covariance = own @ np.swapaxes(own, 1, 2)
+            loading = None if loading is None else own
+        if self.growth is not None:
+            times = self.growth[:, None, None]
+            covariance = times**2 * covariance
+            loading = None if loading is None else times * loading
+        return White(self.sensor, covariance, loading)
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +151,8 @@ class NoiseLevel:
 
     factor: per white part; slow: per slow part the variances over the spec's, per column;
     time_constant_s: per slow part, per column; size: per directed part [its unit].
-    episodes: whether white noise grows where the structure says that it does for a while.
+    episodes: whether white noise is as uneven as the structure says the log's is: larger for a
+    while, or in some readings of a sensor.
     """
 
     factor: tuple[float, ...]

@@ -20,6 +20,8 @@ Severity = Literal["contradiction", "caution"]
 Scope = Literal["build", "start", "log"]
 EXIT_CODES: Final[Mapping[LogOutcome, int]] = {"agrees": 0, "explained": 1, "unexplained": 1}
 NOT_SHOWN: Final = 3
+LOUD_SHARE = 0.7  # of the loudest reading's deviation: a reading that is loud as well
+MEANT = 1.1  # deviations over the spec's up to which a reading is as the spec says
 LEAST_SHARE = 0.02  # of the RMS: a gap of less is not worth a percentage of it
 
 
@@ -99,6 +101,14 @@ class PerLog(Record):
     parameters: Mapping[str, Estimate]
 
 
+def readings_words(times: Mapping[str, float]) -> str:
+    """`in down alone`: which readings of a sensor are the loud ones."""
+    most = max(times.values())
+    loud = [name for name, own in times.items() if own > LOUD_SHARE * most]
+    alone = all(own <= MEANT for name, own in times.items() if name not in loud)
+    return f"{'' if alone else 'most '}in {' and '.join(loud)}{' alone' if alone else ''}"
+
+
 @dataclass(frozen=True, slots=True)
 class Finding(Record):
     """One missing effect: what is wrong, with figures, and how sure this is.
@@ -112,6 +122,7 @@ class Finding(Record):
     varying: its one parameter in four quarters of the log, where it is not one value.
     also: other sensors that share it, of a delay of a whole system.
     from_s, to_s: the stamps between which it acts, where it does so in a part of the log alone.
+    readings: of a sensor's noise, deviations over the spec's by reading, where they are unlike.
     scope: of several logs together, whether it is one value in all (build), one a start of the
     system, or one a log; per_log: its values where it is not one.  one_value: chance by which the
     logs would differ so much if it were one.
@@ -142,6 +153,7 @@ class Finding(Record):
     scope: Scope | None = optional()
     per_log: tuple[PerLog, ...] | None = optional()
     one_value: float | None = optional()
+    readings: Mapping[str, float] | None = optional()
 
     @property
     def fits_a_spec(self) -> bool:

@@ -19,7 +19,12 @@ from syncline_design.diagnosis.candidates import (
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.consequence import Promise, promise_of, rms_m, weighed
 from syncline_design.diagnosis.expected_noise import structure_of
-from syncline_design.diagnosis.findings import entry_of, episode_finding, findings
+from syncline_design.diagnosis.findings import (
+    entry_of,
+    episode_finding,
+    findings,
+    with_unlike_readings,
+)
 from syncline_design.diagnosis.fitting import WINDOW, Data, Model, data_of, windows
 from syncline_design.diagnosis.gaps import gap_steps, whole_gap
 from syncline_design.diagnosis.gross import Gross, gross_faults, mended, usual_size, whole_seconds
@@ -256,6 +261,7 @@ def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
     left = rest.p < REMAINDER_SHARE * search.settings.false_alarm_rate
     weights = weighed(promise, data)
     named = findings(result.final, faults, weights, left)
+    named = with_unlike_readings(named, result.final, search.unlike or (), weights)
     named = (*named, *(episode_finding(data, one, weights) for one in search.episodes or ()))
     if untouched is not None:
         named = _with_sizes(named, faults, rms_m(data, untouched - data.error(())))

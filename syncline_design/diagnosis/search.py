@@ -40,6 +40,12 @@ from syncline_design.diagnosis.trials import (
     scatter_candidates,
     with_effect,
 )
+from syncline_design.diagnosis.unlike_readings import (
+    Unlike,
+    factor_effect,
+    unlike_readings,
+    with_unlike,
+)
 from syncline_design.effects.record import Effect
 from syncline_design.machine.deadline import in_force
 from syncline_design.machine.quick_dataclass import dataclass
@@ -122,6 +128,7 @@ class Search:
     states: States
     progress: Callable[[float], None]
     episodes: tuple[Episode, ...] | None = None  # None until they were looked for
+    unlike: tuple[Unlike, ...] | None = None  # the same
 
     def run(self) -> SearchResult:
         """Add effects while they beat chance; then take out what is no longer needed."""
@@ -148,7 +155,7 @@ class Search:
             scores = gram(self.data, model, self.free_signatures(model), model.level)
             threshold = self.threshold(scores)
             trial = self.moving(model, scores, threshold)
-            if trial is None and self.episodes is None and self.with_episodes(model):
+            if trial is None and self.episodes is None and self.with_uneven_noise(model):
                 base = fit(self.data)
                 model = fit(self.data, model.acting, model.opened, start=model.level)
                 continue
@@ -186,6 +193,17 @@ class Search:
     def free_signatures(self, model: Model) -> list[Signature]:
         """Signatures of what the model does not hold yet."""
         return [s for s in self.signatures if s.candidate.label not in model.labels]
+
+    def with_uneven_noise(self, model: Model) -> bool:
+        """Look once for noise that is larger in some readings, or for a while; whether it is."""
+        if self.unlike is None:
+            wanted = factor_effect().name not in self.settings.exclude_effects
+            self.unlike = unlike_readings(self.data, model) if wanted else ()
+            if self.unlike:
+                self.data = with_unlike(self.data, self.unlike)
+                self.states = slow_states(self.data)
+                return True
+        return self.with_episodes(model)
 
     def with_episodes(self, model: Model) -> bool:
         """Look for noise that is larger for a while, once; whether the data have it now."""

@@ -19,6 +19,7 @@ from syncline_design.diagnosis.result import (
     Remaining,
     Rival,
     Stretch,
+    readings_words,
 )
 from syncline_design.effects import registry
 from syncline_design.machine.records import with_texts
@@ -178,6 +179,8 @@ def _noise_words(one: Finding) -> str:
         named = [name for name in one.parameters if f"{{{name}}}" in part]
         if all(one.parameters[name].value for name in named):
             parts.append(part.format(**{name: _figure_words(one, name) for name in named}))
+    if one.readings:
+        parts.append(readings_words(one.readings))
     return ", ".join(parts) or _spaced(one.effect)
 
 
