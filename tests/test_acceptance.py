@@ -39,7 +39,8 @@ from syncline_design.diagnosis.result import (
     Smallest,
 )
 from syncline_design.diagnosis.run import diagnose
-from syncline_design.diagnosis.sight import _both
+from syncline_design.diagnosis.sight import _both, left_within
+from syncline_design.diagnosis.slow_states import Judged
 from syncline_design.effects import registry
 from syncline_design.model.known import EffectEntry
 from syncline_design.report.on_acceptance import render_acceptance
@@ -261,6 +262,34 @@ def test_nearly_all_logs_show_what_is_said_to_be_sure() -> None:
             drawn = rng.multivariate_normal(true, covariance, size=20_000)
             statistic = np.einsum("ni,ij,nj->n", drawn, np.linalg.inv(covariance), drawn)
             assert least - 0.01 < np.mean(statistic > limit) < most
+
+
+@pytest.mark.parametrize("scatter", [1.0, 2.0])
+def test_what_is_there_is_left_open_in_19_of_20_logs(scatter: float) -> None:
+    """Means of 16 blocks of a log whose departure is +-1; the states know half of their scatter."""
+    rng, blocks, logs = np.random.default_rng(4), 16, 4000
+    kept = np.zeros(2)
+    for k in range(logs):
+        truth = np.array([1.0, -1.0]) * (-1) ** k
+        means = truth + scatter * rng.standard_normal((blocks, 2))
+        mean = means.mean(0)
+        less = (blocks * mean - means) / (blocks - 1)
+        spread = (blocks - 1) / blocks * (less - less.mean(0)).T @ (less - less.mean(0))
+        judged = Judged(mean, np.eye(2) * (0.5 * scatter) ** 2 / blocks, ((spread, blocks),))
+        kept += left_within(judged) >= 1.0
+    assert (kept / logs > 0.94).all()
+    assert (kept / logs < 0.98).all()  # the larger of two spreads
+    known = Judged(np.array([0.2, 0.0]), np.diag([0.01, 0.0]))
+    assert left_within(known) == pytest.approx([0.2 + 1.645 * 0.1, math.inf], rel=1e-4)
+
+
+def test_what_a_log_excludes_need_not_stand_out() -> None:
+    """The lesser of what would have shown and of what is left open is held against the verdict."""
+    paper = OnPaper(load(EXAMPLE), ())
+    shown = Smallest("latency", "position", "multirotor", "latency_s", 0.02, 0.03)
+    assert paper.hides(shown)
+    assert not paper.hides(replace(shown, within=1e-4))
+    assert paper.hides(replace(shown, within=0.02))
 
 
 def test_one_that_breaks_beats_one_that_holds_and_both_beat_silence() -> None:

@@ -273,7 +273,7 @@ def _hidden_words(shown: Smallest, log: LogEvidence) -> str:
     words += f"{'and shows ' if at else ''}from {amount(shown.sure, unit)} on"
     if registry()[shown.effect].grows and at is not None:
         # what drifts shows with the log's length to the power 3/2
-        longer_s = log.found.log.duration_s * (shown.sure / at) ** (2.0 / 3.0)
+        longer_s = log.found.log.duration_s * (size_of(shown) / at) ** (2.0 / 3.0)
         words += (f" (over the spec's horizon; a log of {format_duration(_rounded_up(longer_s))} "
                   "would show it)")  # fmt: skip
     return words

@@ -79,7 +79,7 @@ class OnPaper:
         return self.sound and factor > 1.0 and not self.meets([one])
 
     def hides(self, shown: Smallest) -> bool:
-        """Whether what 19 of 20 such logs would have shown is still too large for the verdict."""
+        """Whether what may be there, one log in 20 apart, is still too large for the verdict."""
         return self.sound and not self.meets([self._added(shown, size_of(shown))])
 
     def turns_at(self, shown: Smallest) -> float | None:
@@ -102,9 +102,11 @@ class OnPaper:
 
 
 def size_of(shown: Smallest) -> float:
-    """What nearly all such logs would have shown; else the largest that the effect can have."""
-    if shown.sure is not None:
-        return shown.sure
+    """What nearly all such logs would have shown, or what this log does not exclude at 19 of 20,
+    where that is less; else the largest that the effect can have."""
+    known = [size for size in (shown.sure, shown.within) if size is not None]
+    if known:
+        return min(known)
     return next(p.high for p in registry()[shown.effect].parameters if p.name == shown.parameter)
 
 

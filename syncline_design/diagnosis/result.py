@@ -313,6 +313,7 @@ class Smallest(Record):
     """The SI value of a parameter at which half of such logs would have shown the effect.
 
     None: no value that the effect can have.  sure: the value at which 19 of 20 would have.
+    within: the size that this log does not exclude at 19 of 20.
     """
 
     effect: str
@@ -321,6 +322,7 @@ class Smallest(Record):
     parameter: str
     value: float | None
     sure: float | None = optional()
+    within: float | None = optional()
 
 
 @dataclass(frozen=True, slots=True)

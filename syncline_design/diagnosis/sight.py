@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from scipy.stats import chi2, f
+from scipy.stats import chi2, f, t
 
 from syncline_design.diagnosis.candidates import Candidate, Signature, hidden_by_noise, zero_values
 from syncline_design.diagnosis.consequence import Promise, blind_spots
@@ -23,20 +23,22 @@ from syncline_design.model.normal import NEARLY_ALL
 @dataclass(frozen=True, slots=True)
 class Seen:
     """The smallest value of one parameter that is seen in half of such logs, and the one that is
-    in nearly all of them, at most `most`; entry: all at zero."""
+    in nearly all of them, at most `most`; entry: all at zero; within: what this log leaves open."""
 
     entry: EffectEntry
     parameter: str
     smallest: float
     most: float
     sure: float = math.inf
+    within: float = math.inf
 
     @property
     def record(self) -> Smallest:
         """As it is written; no value where even the largest would not be seen."""
         e, value = self.entry, self.smallest if self.smallest <= self.most else None
         sure = self.sure if self.sure <= self.most else None
-        return Smallest(e.effect, e.sensor, e.stage, self.parameter, value, sure)
+        within = self.within if self.within <= self.most else None
+        return Smallest(e.effect, e.sensor, e.stage, self.parameter, value, sure, within)
 
 
 def smallest_seen(search: Search, result: SearchResult) -> tuple[Seen, ...]:
@@ -84,9 +86,22 @@ def _of(search: Search, s: Signature, one: Judged, log_p: float) -> list[Seen]:
     values = [[float(v) if ok else math.inf for v, ok in zip(row, seen, strict=True)]
               for row in size]  # fmt: skip
     return [
-        Seen(entry, p.name, half, p.high, sure)
-        for p, half, sure in zip(effect.slopes(), *values, strict=True)
+        Seen(entry, p.name, half, p.high, sure, float(within))
+        for p, half, sure, within in zip(effect.slopes(), *values, left_within(one), strict=True)
     ]
+
+
+def left_within(one: Judged) -> Array:
+    """Of every parameter the size |b| + t s that is not excluded at 19 of 20, (p,).
+
+    s: its standard uncertainty, the effect's others free; t: of as many parts as it was found from.
+    A departure as large as T, of either sign, leaves less than T in one log of 20: that is the
+    test of equivalence (Schuirmann, J. Pharmacokinet. Biopharm. 15 (1987)).
+    """
+    counts = [count for _, count in one.jackknives]
+    times = float(t.isf(0.05, min(counts) - 1)) if counts else NEARLY_ALL
+    found: Array = np.abs(one.values) + times * one.spread
+    return np.where(one.spread > 0.0, found, math.inf)
 
 
 def alone(covariance: Array, log_p: float, count: int = 0) -> Array:
