@@ -41,6 +41,7 @@ from syncline_design.diagnosis.result import (
 from syncline_design.diagnosis.run import diagnose
 from syncline_design.diagnosis.sight import _both, left_within
 from syncline_design.diagnosis.slow_states import Judged
+from syncline_design.diagnosis.undone import LeftOpen
 from syncline_design.effects import registry
 from syncline_design.model.known import EffectEntry
 from syncline_design.report.on_acceptance import render_acceptance
@@ -196,6 +197,26 @@ def test_what_a_finding_may_be_instead_is_not_shown(found: Diagnosis) -> None:
     small = {"latency_s": replace(finding.parameters["latency_s"], value=3.2e-3)}  # turns SYNC
     turning = replace(slight, findings=(replace(kept, parameters=small),))
     assert dict(judged(case, turning))["position", "latency"].status == "broken"
+
+
+@pytest.mark.parametrize(("size_s", "open_too"), [(0.02, True), (1e-5, False)])
+def test_what_is_broken_has_no_interval_where_more_of_it_may_be_undone(
+    found: Diagnosis, size_s: float, open_too: bool
+) -> None:
+    """A lever arm that hides 20 ms of delay leaves the delay's own interval without meaning."""
+    case = load(EXAMPLE)
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    name = found.findings[0].stage
+    position, arm = ("latency", "position", 0), ("lever_arm", "position", 0)
+    more = LeftOpen(position, name, "latency_s", "s", size_s, 1e-4, arm)
+    log = LogEvidence(found, OnPaper(case, ()), name, sight=Sighted(found, open=(more,)))
+    [one] = [a for a in assumptions(case, verdict) if (a.role, a.name) == ("position", "latency")]
+    row = by_log(one, log)
+    assert row.status == "broken"
+    assert row.measured is not None
+    assert row.measured.value == pytest.approx(0.087, abs=0.003)
+    assert (row.measured.low is None) == open_too
+    assert ("undoes it on this log" in row.words) == open_too
 
 
 def test_a_delay_that_several_sensors_share_breaks_each(found: Diagnosis) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Final
 
 import numpy as np
@@ -85,7 +85,8 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
         return unsure
     standing = log.parts.standing(one)
     if breaking or (standing is not None and standing.status == "broken"):
-        return _broken(one, breaking, standing, _noise_figure(one, log))
+        said = _broken(one, breaking, standing, _noise_figure(one, log))
+        return _but_for(said, list(log.parts.undone(one)))
     shifted = by_shifts(one, shifts(one, log.found), log.paper)
     if shifted is not None and shifted.status == "broken":
         return shifted
@@ -100,6 +101,16 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     if own:
         return _immaterial(one, own, log.paper)
     return _nothing_found(one, log)
+
+
+def _but_for(said: Judgement, undone: Sequence[str]) -> Judgement:
+    """What is broken, without an interval where more of it may be there and be undone."""
+    if not undone:
+        return said
+    value = None if said.measured is None else said.measured.value
+    words = f"{said.words}; more of it may be there: {'; '.join(undone)}"
+    figure = None if value is None else MeasuredFigure(value)
+    return replace(said, words=words, measured=figure)
 
 
 def _sensors(finding: Finding) -> tuple[str, ...]:
