@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
+from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.readers.stream import StaticPose
+from syncline_design.logs.reading import read_log
 from syncline_design.logs.static_arms import arms_beside
+from syncline_design.spec.log_block import LogChoice
+from tests import flight_logs
 
 STRAIGHT = (0.0, 0.0, 0.0, 1.0)
 LEFT = (0.0, 0.0, math.sin(math.pi / 4), math.cos(math.pi / 4))  # a quarter turn to the left
@@ -49,3 +54,41 @@ def test_a_turn_of_zeros_turns_nothing_and_nothing_gives_nothing() -> None:
     one = StaticPose("imu", "base_link", (0.1, 0.2, 0.3), (0.0, 0.0, 0.0, 0.0))
     assert arms_beside((one,), {})[0].log_m == pytest.approx((0.1, -0.2, -0.3))
     assert arms_beside((), {"usv.position": (0.0, 0.0, 0.0)}) == ()
+
+
+def _with_static(messages, place):  # type: ignore[no-untyped-def]
+    """The flight's messages behind one of the vehicle's still frames: x forward, y left, z up."""
+
+    def written(store, made, seq, fixes=None):  # type: ignore[no-untyped-def]
+        kinds = store.types
+        first = messages(store, made, seq, fixes)
+        head = kinds["std_msgs/msg/Header"](
+            stamp=kinds["builtin_interfaces/msg/Time"](sec=1, nanosec=0), frame_id="base_link"
+        )
+        still = kinds["geometry_msgs/msg/TransformStamped"](
+            header=head, child_frame_id="gps_link", transform=kinds["geometry_msgs/msg/Transform"](
+                translation=kinds["geometry_msgs/msg/Vector3"](*place),
+                rotation=kinds["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)),
+        )  # fmt: skip
+        tf = kinds["tf2_msgs/msg/TFMessage"](transforms=[still])
+        return [("/tf_static", "tf2_msgs/msg/TFMessage", first[0][2], tf), *first]
+
+    return written
+
+
+@pytest.mark.parametrize(
+    ("place", "words"),
+    [((0.4, 0.1, 1.2), "gps_link: the log's own lever arm of uav.position is 0.400, -0.100, "
+      "-1.200 m (forward, right, down from base_link), as the spec has it"),
+     ((0.4, -0.2, 1.2), "0.400, 0.200, -1.200 m (forward, right, down from base_link), 0.300 m "
+      "from the spec's, which was used")],
+)  # fmt: skip
+def test_a_diagnosis_says_where_the_log_states_another_lever_arm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, place: tuple[float, ...], words: str
+) -> None:
+    monkeypatch.setattr(flight_logs, "ros_messages", _with_static(flight_logs.ros_messages, place))
+    bag = flight_logs.write_mcap(tmp_path / "a.mcap", flight_logs.flight(4.0))
+    arms = {"uav.position": (0.4, -0.1, -1.2)}
+    sources = row_sources([bag], LogChoice(), ["uav"], poses=False, arms=arms)
+    log = read_log(sources, ["uav"], needs_ranging=False)
+    assert any(note.endswith(words) for note in log.notes)

@@ -20,7 +20,6 @@ from syncline_design.cli.shared import (
     watched,
 )
 from syncline_design.machine.streams import say
-from syncline_design.model.roles import ROLES
 
 if TYPE_CHECKING:
     from syncline_design.logs.inspection import LogInspection
@@ -46,6 +45,7 @@ def inspect(
     """List the streams of logs, and propose how `diagnose` should read them."""
     deadline = deadline_of(time_limit)
     from syncline_design.logs.inspection import inspect_logs
+    from syncline_design.logs.static_arms import spec_arms
     from syncline_design.report.formats import LOG_FORMATS
     from syncline_design.report.on_log import on_log, render_log
     from syncline_design.report.render_console import console
@@ -57,7 +57,9 @@ def inspect(
     with watched(deadline, targets, quiet=quiet):
         case = None if spec is None else load(spec)
         choice = None if case is None else case.spec.log
-        found = inspect_logs(file, choice, _has_attitude(case), _arms(case))
+        found = inspect_logs(
+            file, choice, _has_attitude(case), None if case is None else spec_arms(case.spec)
+        )
     say_unreadable(found.unreadable)
     if write_spec is not None and case is not None:
         _write(found, case, write_spec)
@@ -68,18 +70,6 @@ def inspect(
 def _has_attitude(case: Case | None) -> bool:
     """Whether attitudes would be compared: a spec of one stage that has a sensor of them."""
     return case is None or (len(case.spec.stages) == 1 and case.spec.stages[0].attitude is not None)
-
-
-def _arms(case: Case | None) -> dict[str, tuple[float, float, float]]:
-    """The spec's lever arms by `stage.role`, to be held against those of the log."""
-    found = {}
-    for stage in () if case is None else case.spec.stages:
-        for name in ROLES:
-            role = stage.role(name)
-            if role is not None and role.lever_arm is not None:
-                x, y, z = (float(v) for v in role.lever_arm)
-                found[f"{stage.name}.{name}"] = x, y, z
-    return found
 
 
 def _write(found: LogInspection, case: Case, path: Path) -> None:

@@ -15,6 +15,7 @@ from syncline_design.logs.log import Log
 from syncline_design.logs.log_files import row_sources
 from syncline_design.logs.pose_pairs import lever_m
 from syncline_design.logs.reading import read_log
+from syncline_design.logs.static_arms import spec_arms
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.quantity import si_name
 from syncline_design.model.system import System
@@ -46,7 +47,8 @@ def measured(case: Case, paths: Sequence[Path]) -> Measured:
     files = list(paths) or own_files(case)
     first = system.stages[0]
     lever = lever_m(first.position, first.attitude) if len(names) == 1 else None
-    sources = row_sources(files, choice, names, poses=lever is not None)
+    poses = lever is not None
+    sources = row_sources(files, choice, names, poses, spec_arms(case.spec))
 
     def read(slip_s: float) -> Log:
         return read_log(sources, names, choice.columns, ranges, slip_s, choice.origin, lever)

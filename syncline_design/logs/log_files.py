@@ -23,6 +23,7 @@ from syncline_design.logs.readers.reader import head_of
 from syncline_design.logs.roles import Role, offers_of
 from syncline_design.logs.run_parts import one_run
 from syncline_design.logs.sources import RowSource, demand_plain_file, opened
+from syncline_design.logs.static_arms import arm_notes, arms_beside
 from syncline_design.logs.stream_sources import sources_of
 from syncline_design.spec.load import BadInput
 from syncline_design.spec.log_block import LogChoice
@@ -32,9 +33,13 @@ TEXT_TABLE = "csv_text"  # the reader of delimited text, whose files `sources` r
 
 
 def row_sources(
-    paths: Sequence[Path], choice: LogChoice, stages: Sequence[str], poses: bool
-) -> list[RowSource]:
-    """Every file opened; raises BadInput.  Recordings are read as one, whatever their number."""
+    paths: Sequence[Path], choice: LogChoice, stages: Sequence[str], poses: bool,
+    arms: Mapping[str, tuple[float, float, float]] | None = None,
+) -> list[RowSource]:  # fmt: skip
+    """Every file opened; raises BadInput.  Recordings are read as one, whatever their number.
+
+    arms: the spec's lever arms by `stage.role`, to be held against those that a log states.
+    """
     found = {path: _table(path, choice.columns, stages) for path in paths}
     tables = [table for table in found.values() if table is not None]
     if len(tables) == len(found):
@@ -44,7 +49,12 @@ def row_sources(
     recordings = [open_recording(path) for path in paths if path not in read]
     prefix = f"{stages[0]}_" if len(stages) > 1 else ""
     held = _held(tables, choice.columns, stages)
-    return [*tables, *sources_of(offers_of(one_run(recordings)), choice, prefix, poses, held)]
+    run = one_run(recordings)
+    sources = sources_of(offers_of(run), choice, prefix, poses, held)
+    static = [pose for one in run for stream in one.streams() for pose in stream.static]
+    for source in sources[:1]:
+        source.notes += arm_notes(arms_beside(static, arms or {}))
+    return [*tables, *sources]
 
 
 def _held(

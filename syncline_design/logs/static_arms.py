@@ -11,6 +11,9 @@ from syncline_design.effects.record import Array
 from syncline_design.logs.readers.stream import StaticPose
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Record
+from syncline_design.model.figure_text import to_places
+from syncline_design.model.roles import ROLES
+from syncline_design.spec.spec import Spec
 
 BODIES: Final = ("base_link", "base", "body", "vehicle", "base_footprint")  # ROS REP 105
 # parts of a frame's name that tell which role stands there
@@ -59,6 +62,35 @@ def arms_beside(
         apart = None if spec_m is None else float(np.linalg.norm(np.subtract(log_m, spec_m)))
         found.append(ArmBeside(name, body, log_m, role, spec_m, apart))  # type: ignore[arg-type]
     return tuple(found)
+
+
+def spec_arms(spec: Spec) -> dict[str, tuple[float, float, float]]:
+    """The spec's lever arms by `stage.role`."""
+    found = {}
+    for stage in spec.stages:
+        for name in ROLES:
+            role = stage.role(name)
+            if role is not None and role.lever_arm is not None:
+                x, y, z = (float(v) for v in role.lever_arm)
+                found[f"{stage.name}.{name}"] = x, y, z
+    return found
+
+
+def arm_notes(beside: Sequence[ArmBeside]) -> tuple[str, ...]:
+    """What a diagnosis says of arms that the log states for a role of the spec: where the two are
+    apart, a lever arm that is found beside the spec's may be no more than that."""
+    notes = []
+    for one in beside:
+        if one.role is None or one.apart_m is None:
+            continue
+        place = ", ".join(to_places(v, 3) for v in one.log_m)
+        said = f"{one.frame}: the log's own lever arm of {one.role} is {place} m (forward, right, "
+        if one.agrees:
+            notes.append(f"{said}down from {one.body}), as the spec has it")
+        else:
+            notes.append(f"{said}down from {one.body}), {to_places(one.apart_m, 3)} m from the "
+                         "spec's, which was used")  # fmt: skip
+    return tuple(notes)
 
 
 def _body(poses: Sequence[StaticPose]) -> str:
