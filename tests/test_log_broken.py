@@ -7,10 +7,12 @@ import zlib
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from syncline_design.cli.app import app
+from syncline_design.logs.readers import open_recording
 from tests.flight_logs import (
     flight,
     ulog_bytes,
@@ -217,3 +219,35 @@ def test_a_bag_compressed_as_a_whole_says_what_to_do(tmp_path: Path) -> None:
     code, _, said = inspected(bag)
     assert code == 2
     assert f"zstd -d {own.name}" in said
+
+
+@pytest.mark.parametrize("packing", ["", "lz4", "zstd"])
+def test_a_chunk_that_ends_with_the_file_is_read_as_far_as_it_unpacks(
+    tmp_path: Path, packing: str
+) -> None:
+    """One chunk of 3000 noisy messages, cut in the middle: those before the cut are read."""
+    from mcap.writer import CompressionType, Writer
+
+    kinds = {"": CompressionType.NONE, "lz4": CompressionType.LZ4, "zstd": CompressionType.ZSTD}
+    noise = np.random.default_rng(1).bytes(3000 * 200)
+    path = tmp_path / "one.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, compression=kinds[packing], chunk_size=1 << 24)
+        writer.start()
+        channel = writer.register_channel("/a", "raw", 0)
+        for k in range(3000):
+            writer.add_message(
+                channel, 10**9 + 1000 * k, noise[200 * k : 200 * (k + 1)], 10**9 + 1000 * k
+            )
+        writer.finish()
+    path.write_bytes(path.read_bytes()[:300_000])
+    recording = open_recording(path)
+    (stream,) = recording.streams()
+    assert stream.partial
+    # a message takes 31 bytes more than its data; blocks of up to 128 KB may be lost
+    assert stream.messages == 1298 if not packing else 500 < stream.messages < 1500
+    assert stream.stamps is not None
+    logged = stream.stamps.primary_ns
+    np.testing.assert_array_equal(logged, 10**9 + 1000 * np.arange(stream.messages))
+    assert recording.incomplete is not None
+    assert "within a chunk" in recording.incomplete.reason

@@ -13,6 +13,7 @@ import numpy as np
 
 from syncline_design.auditing.result import StampFault
 from syncline_design.auditing.series import NS, Array, Mask, Series, scatter, seconds, spread
+from syncline_design.logs.readers.stream import UNSET
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.model.figure_text import percent, to_digits
 
@@ -168,7 +169,7 @@ def _as_ever(series: Series, pace: Cadence, lost: Array) -> Mask:
     they were stamped when they came at last."""
     assert series.receive is not None
     receive = series.receive[pace.places]
-    when = np.sort(receive)
+    when = np.sort(series.receive[series.receive != UNSET])  # of messages left out as well
     out = np.zeros(lost.size, bool)
     for k in np.flatnonzero(lost >= LONG_GAP):
         beside = round(lost[k] * pace.period_s * NS)

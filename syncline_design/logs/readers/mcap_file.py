@@ -22,15 +22,22 @@ from syncline_design.logs.readers.ros_types import Channel, Encoding, modern
 MAGIC = b"\x89MCAP0\r\n"
 FORMAT = "MCAP file"
 MOST_RECORD = 1 << 28
-MESSAGE = 5  # the kind of record
+MESSAGE, CHUNK = 5, 6  # the kind of record
 _RECORD = struct.Struct("<BQ")  # kind, length
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+_CHUNK = struct.Struct(
+    "<QQQII"
+)  # first and last time, size, checksum, length of the packing's name
 ENCODINGS: dict[tuple[str, str], Encoding] = {
     ("cdr", "ros2msg"): "cdr",
     ("cdr", "ros2idl"): "cdr",
     ("cdr", ""): "cdr",
     ("ros1", "ros1msg"): "ros1",
 }
+
+
+class _CutShortError(DamagedError):
+    """The file ends within a record."""
 
 
 class McapFile(Container):
@@ -48,15 +55,18 @@ class McapFile(Container):
         budget = UnpackBudget(self.path, self._size)
         ended = False
         with self.path.open("rb") as file:
-            for record in self._of(file, whole=True):
-                if isinstance(record, self._records.Chunk):
-                    data = self._unpacked(record, budget)
-                    yield from self._of_chunk(data)
-                elif isinstance(record, self._records.DataEnd):
-                    ended = True
-                    break
-                else:
-                    yield from self._one(record)
+            try:
+                for record in self._of(file, whole=True):
+                    if isinstance(record, self._records.Chunk):
+                        yield from self._of_chunk(self._unpacked(record, budget))
+                    elif isinstance(record, self._records.DataEnd):
+                        ended = True
+                        break
+                    else:
+                        yield from self._one(record)
+            except _CutShortError:
+                yield from self._of_cut(file, budget)
+                raise
             file.seek(0, 2)
             file.seek(max(file.tell() - len(MAGIC), 0))
             whole = file.read() == MAGIC
@@ -64,6 +74,30 @@ class McapFile(Container):
             raise DamagedError("cut off behind its data; no message is missing")
         if not ended:
             raise DamagedError("the file was not closed: its data have no end")
+
+    def _of_cut(self, file: Any, budget: UnpackBudget) -> Iterator[RawMessage]:
+        """What the beginning of a chunk holds that ends with the file; no checksum covers it."""
+        at = len(MAGIC)
+        file.seek(at)
+        while len(head := file.read(_RECORD.size)) == _RECORD.size:
+            kind, length = _RECORD.unpack(head)
+            if at + _RECORD.size + length > self._size:
+                break
+            at += _RECORD.size + length
+            file.seek(at)
+        else:
+            return
+        body = file.read(min(length, MOST_RECORD)) if kind == CHUNK else b""
+        if len(body) < _CHUNK.size:
+            return
+        *_, due, _, named = _CHUNK.unpack_from(body)
+        begins = _CHUNK.size + named + 8
+        packing = body[_CHUNK.size : _CHUNK.size + named].decode("ascii", "replace")
+        budget.spend(due, MOST_RECORD)
+        try:
+            yield from self._of_chunk(self._plain(packing, body[begins:], due)[:due])
+        except DamagedError:
+            raise _CutShortError("cut off within a chunk, whose checksum is lost") from None
 
     def _of_chunk(self, data: bytes) -> Iterator[RawMessage]:
         """The records of an unpacked chunk; messages are taken apart here, which is quicker."""
@@ -98,7 +132,7 @@ class McapFile(Container):
             yield from reader.records
         except exceptions.EndOfFile:
             if whole:
-                raise DamagedError("cut off within a record") from None
+                raise _CutShortError("cut off within a record") from None
         except exceptions.McapError as error:
             raise DamagedError(str(error)[:160] or type(error).__name__) from None
         except (ValueError, struct.error, UnicodeDecodeError, OverflowError, MemoryError) as error:
@@ -127,18 +161,21 @@ class McapFile(Container):
     def _unpacked(self, chunk: Any, budget: UnpackBudget) -> bytes:
         due = int(chunk.uncompressed_size)
         budget.spend(due, MOST_RECORD)
-        if chunk.compression == "zstd":
-            plain = _from_zstd(chunk.data, due, self.path)
-        elif chunk.compression == "lz4":
-            plain = from_lz4(chunk.data, due, self.path, FORMAT)
-        elif chunk.compression == "":
-            plain = bytes(chunk.data)
-        else:
-            raise DamagedError(f"a chunk packed as {str(chunk.compression)[:20]!r}")
+        plain = self._plain(str(chunk.compression), bytes(chunk.data), due)
         if len(plain) != due:
             raise DamagedError("a chunk does not unpack to its size")
         self._demand_sum(chunk, plain)
         return plain
+
+    def _plain(self, packing: str, data: bytes, due: int) -> bytes:
+        """As much as the data unpack to, one byte above what is due at most."""
+        if packing == "zstd":
+            return _from_zstd(data, due, self.path)
+        if packing == "lz4":
+            return from_lz4(data, due, self.path, FORMAT)
+        if packing == "":
+            return data
+        raise DamagedError(f"a chunk packed as {packing[:20]!r}")
 
     def _demand_sum(self, chunk: Any, plain: bytes) -> None:
         import zlib
