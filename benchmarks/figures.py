@@ -10,7 +10,8 @@ that deviations are shown in standard errors of the sample too.
 true quantile and the true share within a limit, of a closed form (chi) and of a lidar whose truth
 comes from many more samples.
 
-`published`: a maker's table of lateral offsets by heading error, cell by cell.
+`published`: a maker's table of lateral offsets by heading error, cell by cell; another maker's
+budget of a USBL, line by line and in all.
 
     python benchmarks/figures.py propagation [SYSTEMS] [DRAWS] [SEED]
     python benchmarks/figures.py coverage [REPETITIONS] [SAMPLES] [SEED]
@@ -53,6 +54,37 @@ LATERAL = {
     1000: (8.7, 17.5, 34.9, 52.3, 87.2), 1500: (13.1, 26.2, 52.3, 78.5, 130.7),
     2000: (17.5, 34.9, 69.8, 104.7, 174.3),
 }  # fmt: skip
+
+
+# https://docs.ceruleansonar.com/c/ethernet-rov-locator/accuracy-expectations, read 2026-11-23: what
+# a USBL below a vessel errs level: receiver 5 m, compass 5 deg, array 2 deg, range next to nothing,
+# in all root(5^2 + (sin 5.2 deg * slant range)^2), printed of the root of 5^2 + 2^2, which is 5.39
+RECEIVER_M, COMPASS_DEG, ARRAY_DEG, PRINTED_DEG = 5.0, 5.0, 2.0, 5.2
+
+
+def published_budget() -> None:
+    """Each line alone, then all of them: the level RMS of an object at a slant range."""
+    side = RECEIVER_M / math.sqrt(2.0)
+    lines = {
+        "receiver": ((side, side, 0.0), 0.0, 0.0, lambda d: RECEIVER_M),
+        "compass": ((0.0,) * 3, COMPASS_DEG, 0.0, lambda d: d * math.sin(math.radians(5.0))),
+        "array": ((0.0,) * 3, 0.0, ARRAY_DEG, lambda d: d * math.sin(math.radians(2.0))),
+        "all": (
+            (side, side, 0.0), COMPASS_DEG, ARRAY_DEG,
+            lambda d: math.hypot(RECEIVER_M, d * math.sin(math.radians(PRINTED_DEG))),
+        ),
+    }  # fmt: skip
+    for name, (position, yaw, azimuth, printed) in lines.items():
+        told = []
+        for distance in (20.0, 100.0, 300.0):
+            one = lidar(position=position, attitude=(0.0, 0.0, math.radians(yaw)),
+                        ranging=(0.0, math.radians(azimuth), 0.0))  # fmt: skip
+            stage = one.stages[0]
+            platform = replace(stage.platform, distance_m=distance)
+            system = replace(one, stages=(replace(stage, platform=platform),))
+            (found,) = statistical_figures(system, (Wanted("horizontal"),), seed=0)
+            told.append(f"{distance:g} m: {found.value_m:.3f} m ({printed(distance):.3f} m)")
+        print(f"USBL, {name}, figure (printed): {'; '.join(told)}")
 
 
 def published() -> None:
@@ -179,6 +211,7 @@ if __name__ == "__main__":
     numbers = [int(one) for one in sys.argv[2:]]
     if sys.argv[1:2] == ["published"]:
         published()
+        published_budget()
     elif sys.argv[1:2] == ["coverage"]:
         coverage(*(*numbers, *(500, 20000, 0)[len(numbers) :]))
     else:
