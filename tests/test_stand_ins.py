@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from syncline_design.diagnosis import DiagnosisSettings, diagnose
-from syncline_design.diagnosis.result import Diagnosis
+from syncline_design.diagnosis.findings import finding
+from syncline_design.diagnosis.fitting import fit
+from syncline_design.diagnosis.result import Diagnosis, Estimate
+from syncline_design.diagnosis.run import prepared, stand_ins
+from syncline_design.diagnosis.system import measured
+from syncline_design.effects import registry
+from syncline_design.spec.load import load
+from tests.test_long_memories import SPEC
+from tests.test_unlike_axes import wandering
 from tests.world import hidden, make_log, scenario
 
 Columns = dict[str, np.ndarray]
@@ -117,3 +125,22 @@ def test_a_step_of_the_clock_keeps_its_name(tmp_path: Path) -> None:
     assert one.parameters["time_s"].value == pytest.approx(
         33.0, abs=2.0
     )  # it stands still around then
+
+
+@pytest.mark.parametrize(("left_m", "kind"), [(22.0, "stand_in"), (2.0, "cause")])
+def test_a_slip_that_leaves_most_of_the_error_is_no_cause(
+    left_m: float, kind: str, tmp_path: Path
+) -> None:
+    """It made 8 m of the error: an eighth of 8^2 + 22^2, all but a sixteenth of 8^2 + 2^2."""
+    draws = np.random.default_rng(1).standard_normal((60, 3))
+    columns = wandering((1.0, 1.0, 1.0), draws)
+    (tmp_path / "spec.yaml").write_text(SPEC.replace("ARM", "0"))
+    table = np.stack(list(columns.values()), axis=1)
+    np.savetxt(tmp_path / "log.csv", table, "%.7f", ",", header=",".join(columns), comments="")
+    inputs = measured(load(tmp_path / "spec.yaml"), [tmp_path / "log.csv"])
+    data = prepared(inputs, inputs.log)
+    slip = finding(registry()["integer_second_slip"], "position", "boat",
+                   {"seconds": Estimate(-2.0, None, "s", True, "-2")}, "", 9.0)  # fmt: skip
+    off = data.error(()) + np.array([8.0, 0.0, 0.0])
+    (told,) = stand_ins([slip], data, fit(data), left_m, off)
+    assert told.kind == kind

@@ -269,7 +269,7 @@ def weigh(one: Examined, promise: Promise | None) -> WeighedUp:
     waves = [one for one in named if one.kind == "stand_in" and one.material]
     material = bool(waves) or (left and weights.left(rest.size_m, causes))
     if material:
-        named = stand_ins(named, data, result.model, rest.size_m)
+        named = stand_ins(named, data, result.model, rest.size_m, untouched)
     errors = (result.base.error, result.model.error)
     before, after = where_maps(data.view, errors, result.model.precision)
     remaining = Remaining(
@@ -303,19 +303,28 @@ def outcome(named: Sequence[Finding], settled: bool) -> LogOutcome:
 
 
 def stand_ins(
-    named: Sequence[Finding], data: Data, model: Model, left_m: float
+    named: Sequence[Finding],
+    data: Data,
+    model: Model,
+    left_m: float,
+    untouched: Array | None = None,
 ) -> tuple[Finding, ...]:
     """Causes that leave too much are words for something else, not causes.
 
     The named set has to make up nine tenths of what it and the rest make up together, in squares.
+    untouched: the error before gross faults were undone, of which these make up their part.
     """
-    made_m = rms_m(data, data.error(()) - model.error)
-    if made_m**2 >= NAMED_SHARE * (made_m**2 + left_m**2):
-        return tuple(named)
+
+    def enough(before: Array) -> bool:
+        made_m = rms_m(data, before - model.error)
+        return made_m**2 >= NAMED_SHARE * (made_m**2 + left_m**2)
+
+    subtle = enough(data.error(()))
+    gross = untouched is None or enough(untouched)
     return tuple(
-        replace(one, kind="stand_in")
-        if one.kind == "cause" and registry()[one.effect].undoing is None
-        else one
+        one
+        if one.kind != "cause" or (subtle if registry()[one.effect].undoing is None else gross)
+        else replace(one, kind="stand_in")
         for one in named
     )
 
