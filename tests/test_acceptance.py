@@ -175,9 +175,12 @@ def test_a_blind_log_shows_only_what_it_is_not_blind_to(known: tuple[Case, Diagn
     case, found = known
     assert not any(spot.effect == "latency" for spot in found.informative.blind_to)
     hidden = BlindSpot("latency", "ranging", "multirotor", "latency_s", 1.0, 0.5)
-    rows = dict(judged(case, replace(found, informative=Informative(False, (hidden,)))))
+    blind = replace(found, informative=Informative(False, (hidden,)))
+    open_too = tuple(replace(one, within=None) for one in found.smallest_seen)
+    rows = dict(judged(case, replace(blind, smallest_seen=open_too)))
     assert rows["ranging", "latency"].status == "not_shown"
     assert rows["position", "latency"].status == "holds"
+    assert dict(judged(case, blind))["ranging", "latency"].status == "holds"  # it is excluded
 
 
 def test_what_a_finding_may_be_instead_is_not_shown(found: Diagnosis) -> None:

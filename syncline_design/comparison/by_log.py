@@ -86,7 +86,7 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     standing = log.parts.standing(one)
     if breaking or (standing is not None and standing.status == "broken"):
         said = _broken(one, breaking, standing, _noise_figure(one, log))
-        return _but_for(said, list(log.parts.undone(one)))
+        return _but_for(said, list(log.parts.undone(one, _width(said.measured))))
     shifted = by_shifts(one, shifts(one, log.found), log.paper)
     if shifted is not None and shifted.status == "broken":
         return shifted
@@ -101,6 +101,13 @@ def by_log(one: Assumed, log: LogEvidence) -> Judgement:
     if own:
         return _immaterial(one, own, log.paper)
     return _nothing_found(one, log)
+
+
+def _width(figure: MeasuredFigure | None) -> float:
+    """Of an interval: what is undone counts where it is more than that; 0 of none."""
+    if figure is None or figure.low is None or figure.high is None:
+        return 0.0
+    return figure.high - figure.low
 
 
 def _but_for(said: Judgement, undone: Sequence[str]) -> Judgement:
@@ -259,14 +266,18 @@ def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
 def _hidden(one: Assumed, log: LogEvidence) -> Iterator[str]:
     """Effects that would turn the verdict before nearly all such logs would show them."""
     told: set[str] = set()
+    excluded: set[tuple[str, str, str, str]] = set()
     for shown in log.found.smallest_seen:
         if shown.effect in told or not log.is_of(shown.effect, (shown.sensor,), shown.stage, one):
             continue
         if log.paper.hides(shown):
             told.add(shown.effect)
             yield _hidden_words(shown, log)
+        elif shown.within is not None and shown.within == size_of(shown):
+            excluded.add((shown.effect, shown.sensor, shown.stage, shown.parameter))
     for spot in log.found.informative.blind_to:
         own = log.is_of(spot.effect, (spot.sensor,), spot.stage, one)
+        own = own and (spot.effect, spot.sensor, spot.stage, spot.parameter) not in excluded
         if own and spot.effect not in told:
             told.add(spot.effect)
             yield spot.effect

@@ -97,14 +97,19 @@ class InStretches:
         least = lengths[low] if low < len(lengths) else math.inf
         return least, "; ".join(_sizes(lengths, worst, low))
 
-    def undone(self, one: Assumed) -> Iterator[str]:
-        """Departures that another one undoes on this log, so far that the verdict would turn."""
+    def undone(self, one: Assumed, least: float | None = None) -> Iterator[str]:
+        """Departures that another one undoes on this log, so far that the verdict would turn.
+
+        least: the size from which on they count instead.
+        """
         told: set[tuple[str, str, int]] = set()
         for each in self.open:
             name, sensor, _ = each.label
             if each.label in told or not self.is_of(name, (sensor,), each.stage, one):
                 continue
-            if self.paper.turned(name, sensor, each.stage, {each.parameter: each.size}):
+            values = {each.parameter: each.size}
+            turns = least is None and self.paper.turned(name, sensor, each.stage, values)
+            if turns or (least is not None and each.size > least):
                 told.add(each.label)
                 by, whose, _ = each.by
                 yield (f"{name} may be as large as {amount(each.size, each.unit)} where {by} "
