@@ -2,8 +2,9 @@
 
 Its figures, each as half of log N (Schwarz 1978), of all subsets of them the cheapest, charged for
 having been chosen (Chen and Chen, Biometrika 95 (2008)): an arm of which only the height is seen
-has one figure, as has a height of the target.  Less the noise that it borrows from the columns of
-motion, which is known up to its own chance.
+has one figure, as has a height of the target.  The place from which a step acts is charged log n,
+as there is one at every row (Zhang and Siegmund, Biometrics 63 (2007)).  Less the noise that it
+borrows from the columns of motion, which is known up to its own chance.
 """
 
 from __future__ import annotations
@@ -61,7 +62,9 @@ def charge(data: Data, model: Model, label: Label, named: Model) -> Charge:
 
 def _figures(data: Data, model: Model, label: Label) -> float:
     each = 0.5 * math.log(max(len(data.view) * len(data.axes), 2))
-    whole = each * freedom_of(effect_of(model, label))
+    effect = effect_of(model, label)
+    places = sum(p.located for p in effect.parameters)
+    whole = each * (freedom_of(effect) - places) + math.log(max(len(data.view), 2)) * places
     values, covariance = _fitted(model, label)
     size, cheapest = len(values), whole
     for count in range(1, size):

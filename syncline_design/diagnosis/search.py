@@ -28,10 +28,11 @@ from syncline_design.diagnosis.episodes import Episode, episode_effect, episodes
 from syncline_design.diagnosis.fitting import Data, Model, Opened, finely, fit
 from syncline_design.diagnosis.lines import LINE, best_wave
 from syncline_design.diagnosis.noise import NoiseLevel, as_specified
-from syncline_design.diagnosis.parts import cut_down, in_a_part, refined
+from syncline_design.diagnosis.parts import NATS, STRETCHES, cut_down, in_a_part, refined
 from syncline_design.diagnosis.scores import Gram, clean_threshold, gram, possible
 from syncline_design.diagnosis.settling import Settled, borne_out, settle
 from syncline_design.diagnosis.slow_states import Judged, States, fitted_of, slow_states
+from syncline_design.diagnosis.spans import span_of
 from syncline_design.diagnosis.tails import tails_in
 from syncline_design.diagnosis.trials import (
     freedom_of,
@@ -223,9 +224,24 @@ class Search:
         """
         moving = [self.trial(model, s, level) for s, level in self.screened(model, scores)]
         kept = [t for t in moving if t.log_p <= threshold and plausible(self.data, t.model)]
-        if not kept and (part := self.part_trial(model)) is not None:
-            return part
-        return preferred(kept) if kept else self.wave_trial(model)
+        best = preferred(kept)
+        if best is None:
+            return self.part_trial(model) or self.wave_trial(model)
+        return self.not_for_good(model, best)
+
+    def not_for_good(self, model: Model, found: Trial) -> Trial:
+        """A trial, or what goes back after a while in the place of a step that does not.
+
+        The other end is one more place to look for, and has to pay for it.
+        """
+        if not any(p.located for p in found.candidate.effect.parameters):
+            return found
+        part = self.part_trial(model)
+        if part is None or part.gain - found.gain < NATS + math.log(STRETCHES):
+            return found
+        span = span_of(part.model.acting[-1].effect)
+        ends = span is not None and span.to_s < self.data.view.log.time_s[-1]
+        return part if ends else found
 
     def noise(self, model: Model, threshold: float) -> Trial | None:
         """The noise that best explains how what is left scatters; none beats chance."""

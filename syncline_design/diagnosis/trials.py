@@ -12,8 +12,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from syncline_design.diagnosis.candidates import EDGE, STEP_TIMES, Candidate, Signature, zero_values
-from syncline_design.diagnosis.fitting import Data, Model, Opened, adjusted, fit
+from syncline_design.diagnosis.candidates import (
+    EDGE,
+    STEP_TIMES,
+    Candidate,
+    Signature,
+    slopes,
+    zero_values,
+)
+from syncline_design.diagnosis.fitting import (
+    Data,
+    Model,
+    Opened,
+    adjusted,
+    fit,
+    inner,
+    inverse_scaled,
+)
 from syncline_design.diagnosis.motion_scatter import grows_with_motion
 from syncline_design.diagnosis.noise import (
     TIME_LEAST_S,
@@ -24,8 +39,10 @@ from syncline_design.diagnosis.noise import (
 )
 from syncline_design.diagnosis.scores import log_p_of
 from syncline_design.effects.acting import Acting
-from syncline_design.effects.record import Effect
+from syncline_design.effects.kinematics import elapsed
+from syncline_design.effects.record import Array, Effect
 
+ROUNDS, PLACES = 4, 7  # in which the place of a step is refined; places tried in each
 QUICK = 1.25  # times the least time constant, up to which noise is as good as white
 AGREE = 0.3  # how far a scatter may be from what the mean says, as a share of it
 
@@ -56,7 +73,10 @@ def with_effect(data: Data, model: Model, found: Signature, level: NoiseLevel) -
         opened = (*opened, Opened(found.candidate, "size", directed))
         level = with_size(level, directed, 0.3 * usual_noise_size(data, directed))
     fitted = fit(data, (*model.acting, start), opened, start=level)
-    return located(data, fitted) if found.at else fitted
+    if not found.at:
+        return fitted
+    placed = located(data, fitted)  # in the noise that a step at the wrong place leaves
+    return fit(data, placed.acting, opened, start=placed.level)
 
 
 def plausible(data: Data, model: Model) -> bool:
@@ -113,15 +133,34 @@ def located(data: Data, model: Model) -> Model:
     first, last_time = np.quantile(since, [EDGE, 1.0 - EDGE])
     reach = (last_time - first) / STEP_TIMES
     best = model
-    for _ in range(4):
+    for _ in range(ROUNDS):
         centre = best.acting[-1].values[name]
         low, high = max(centre - reach, first), min(centre + reach, last_time)
-        for t in np.linspace(low, high, 7):
-            moved = replace(best.acting[-1], values={**best.acting[-1].values, name: float(t)})
-            trial = refitted(data, (*best.acting[:-1], moved), best)
-            best = trial if trial.nll < best.nll else best
+        place = _best_place(data, best, name, np.linspace(low, high, PLACES))
+        moved = replace(best.acting[-1], values={**best.acting[-1].values, name: place})
+        trial = refitted(data, (*best.acting[:-1], moved), best)
+        best = trial if trial.nll < best.nll else best
         reach /= 3.5
     return best
+
+
+def _best_place(data: Data, model: Model, name: str, places: Array) -> float:
+    """Where the newest effect saves most to first order, the others fitted again beside it."""
+    one = model.acting[-1]
+    always = replace(one, values={**one.values, name: -math.inf})
+    values = [one.values[p.name] for p in one.effect.slopes()]
+    shape = np.nan_to_num(slopes(data.view, (always,))) @ np.array(values)
+    since = elapsed(data.view.rows[one.stage])
+    error = model.error + shape * (since >= one.values[name])[:, None]
+    moved = shape[:, :, None] * (since[:, None] >= places)[:, None, :]
+    others = np.nan_to_num(slopes(data.view, model.acting))[:, :, : -len(values)]
+    columns = np.concatenate([others, moved, error[:, :, None]], axis=2)
+    normal = inner(columns, model.precision.solve(columns))
+    width, count = others.shape[2], len(places)
+    held, cross = normal[:width, :width], normal[:width, width:]
+    left = normal[width:, width:] - cross.T @ inverse_scaled(held) @ cross
+    gains = left[:count, count] ** 2 / np.maximum(np.diag(left)[:count], 1e-300)
+    return float(places[int(np.argmax(gains))])
 
 
 def refitted(data: Data, acting: tuple[Acting, ...], like: Model) -> Model:
