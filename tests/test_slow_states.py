@@ -4,21 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.spatial.transform import Rotation
 
 from diagnosis_samples import LATENCY
 from syncline_design.diagnosis import diagnose
-from syncline_design.diagnosis.candidates import candidates, directed_parts
+from syncline_design.diagnosis.candidates import candidates, directed_parts, signatures
 from syncline_design.diagnosis.expected_noise import structure_of
 from syncline_design.diagnosis.fitting import Data, data_of, fit
 from syncline_design.diagnosis.noise import (
     _Packing,
     as_specified,
     first_guess,
+    mean_share,
+    mean_share_slope,
     precision,
     spec_bounds,
 )
@@ -51,6 +55,74 @@ def data_from(log: WorldLog, folder: Path) -> Data:
     return data_of(view, structure_of(view, directed_parts(view, candidates(view))))
 
 
+@pytest.mark.parametrize("time_constant_s", [0.02, 3.0, 40.0, 2e6])
+def test_the_mean_of_slow_noise_is_its_double_integral(time_constant_s: float) -> None:
+    """Var of the mean over a span L: (2 / L^2) int (L - u) exp(-u / T) du, by quadrature."""
+    span = 30.0
+
+    def integrated(constant: float) -> float:
+        ends = [0.0, *(span * k for k in (0.001, 0.01, 0.1, 1.0))]
+        parts = [
+            quad(lambda u: (span - u) * np.exp(-u / constant), a, b)[0] for a, b in pairwise(ends)
+        ]
+        return 2.0 * float(np.sum(parts)) / span**2
+
+    assert mean_share(time_constant_s, span) == pytest.approx(integrated(time_constant_s), rel=1e-6)
+    apart = 1e-3
+    higher, lower = (integrated(time_constant_s * np.exp(h)) for h in (apart, -apart))
+    slope = (np.log(higher) - np.log(lower)) / (2.0 * apart)
+    assert mean_share_slope(time_constant_s, span) == pytest.approx(slope, rel=1e-4, abs=1e-7)
+
+
+def test_what_an_effect_can_make_is_no_slow_noise(tmp_path: Path) -> None:
+    """A drift of the yaw leaves all sizes as they are where it may be one, and not otherwise."""
+    data = data_from(make_log(scenario("car_stops", 3, 60.0, 5.0)), tmp_path)
+    found = [s for s in signatures(data.view, candidates(data.view)) if s.plain]
+    drift = next(s.columns for s in found if s.candidate.label[0] == "heading_drift")
+    free = replace(data, explained=np.concatenate([s.columns for s in found], axis=2))
+    level, error = as_specified(data.structure), data.error(())
+    turned = error + 5e-5 * drift[:, :, 0]
+
+    def largest_change(one: Data) -> float:
+        sizes, other = (slow_states(one).sizes(level, e) for e in (error, turned))
+        return max(abs(np.log(other[c] / sizes[c])) for c in sizes)
+
+    assert largest_change(free) < 0.2
+    assert largest_change(data) > 2.0
+
+
+def test_an_axis_that_effects_take_up_wanders_as_its_kin(tmp_path: Path) -> None:
+    """North is all in what effects could make; east and down wander by 0.6 sigma at k = 1."""
+    data = data_from(make_log(scenario("car_stops", 3, 60.0, 5.0)), tmp_path)
+    states, rng = slow_states(data), np.random.default_rng(8)
+    place = [c for c, (sensor, _) in enumerate(states.roles) if sensor[1] == "position"]
+    own = np.isin(states.channel, place) & (states.wave > 0)
+    drawn = 0.6 * rng.standard_normal(int(own.sum())) / np.sqrt(states.wave[own])
+    error = data.error(()) + states.courses[:, :, own] @ drawn
+    north = states.courses[:, :, states.channel == place[0]]
+    level = as_specified(data.structure)
+    alone = slow_states(data).sizes(level, error)
+    beside = slow_states(replace(data, explained=north)).sizes(level, error)
+    kin = [alone[states.roles[c]] for c in place[1:]]
+    assert min(kin) > 0.05
+    assert beside[states.roles[place[0]]] == pytest.approx(float(np.mean(kin)), rel=0.35)
+
+
+def test_an_axis_that_wanders_alone_does_not_make_its_kin_wander(tmp_path: Path) -> None:
+    """North wanders by a whole sigma: east and down tell by themselves that they do not."""
+    data = data_from(make_log(scenario("car_stops", 3, 60.0, 5.0)), tmp_path)
+    found = [s for s in signatures(data.view, candidates(data.view)) if s.plain]
+    late = next(s.columns for s in found if s.candidate.label[:2] == ("latency", "position"))
+    states = slow_states(replace(data, explained=late))
+    place = [c for c, (sensor, _) in enumerate(states.roles) if sensor[1] == "position"]
+    own = (states.channel == place[0]) & (states.wave > 0)
+    error = data.error(()) + states.courses[:, :, own] @ (1.0 / np.sqrt(states.wave[own]))
+    sizes = states.sizes(as_specified(data.structure), error)
+    north, east, down = (sizes[states.roles[c]] for c in place)
+    assert north > 0.5
+    assert max(east, down) < 0.05
+
+
 @pytest.mark.parametrize("shared", [False, True])
 def test_slopes_of_the_noise_are_those_of_differences(shared: bool, tmp_path: Path) -> None:
     data = data_from(make_log(scenario("car_stops", 3, 30.0, 5.0)), tmp_path)
@@ -59,6 +131,8 @@ def test_slopes_of_the_noise_are_those_of_differences(shared: bool, tmp_path: Pa
         time_s = structure.time_s.copy()
         time_s[1::2] = time_s[0::2]
         structure = replace(structure, time_s=time_s)
+        tight = tuple(replace(s, means=(1e-3, 2e-3, 1e9)) for s in structure.slow)
+        structure = replace(structure, slow=tight)
     sizes = tuple(range(len(structure.directed)))[:2]
     bounds = replace(spec_bounds(structure), factor=(9.0,) * len(structure.white))
     packing = _Packing(structure, bounds, sizes)

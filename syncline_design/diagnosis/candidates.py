@@ -137,6 +137,15 @@ def signatures(view: Scene, found: Sequence[Candidate]) -> tuple[Signature, ...]
     return (*located, *(s for candidate in moving for s in _remembered(view, candidate)))
 
 
+def plain_signatures(view: Scene, found: Sequence[Candidate]) -> tuple[Signature, ...]:
+    """Signatures of what acts all along: each one's slope at zero."""
+    return tuple(
+        Signature(one, {}, signature(view, one, {}))
+        for one in found
+        if one.effect.sensitivity is not None and not any(p.located for p in one.effect.parameters)
+    )
+
+
 def _remembered(view: Scene, candidate: Candidate) -> Iterator[Signature]:
     """What an effect with a memory does, over its time constant, for those that the log can tell.
 

@@ -49,6 +49,7 @@ class Data:
     noise_structure: Structure
     axes: Axes
     noisier: tuple[Noisier, ...] = ()  # once a search is on
+    explained: Array | None = None  # (n, 3, f) what effects could make of the error, once known
 
     def borrowed_nats(self, model: Model, known: Precision) -> float:
         """What noise of the columns of motion costs a model's effects [nat], at a covariance."""

@@ -7,6 +7,7 @@ is a finding.
 
 from __future__ import annotations
 
+import math
 from dataclasses import field, replace
 
 import numpy as np
@@ -34,6 +35,8 @@ TIME_USUAL_S = 25.0  # centre of the weak prior on time constants: minutes or fr
 FACTOR_SPREAD = 0.15  # of the prior on log factor, below the limit
 TIME_SPREAD = 1.0  # its standard deviation in log T
 KEPT = 3  # factored covariances of one structure
+LONG_SHARE = 1e3  # time constants over the span, from which a series is exact
+MEAN_SPREAD = 0.1  # in log variance, by which a mean over the log may exceed what courses show
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,13 +84,15 @@ class White:
 class Slow:
     """Gauss-Markov noise of one sensor: loading (n, 3, m) [m] per unit of the spec's std.
 
-    limits: most that each variance may be over the spec's without being a finding.
+    limits: most that each variance may be over the spec's without being a finding.  means: most
+    that the variance of its mean over the log may be, as far as the log's own courses show.
     """
 
     sensor: Sensor
     loading: Array
     shared_time: bool  # one time constant for all columns
     limits: tuple[float, ...] = (SLOW_LIMIT,) * 3
+    means: tuple[float, ...] = (math.inf,) * 3
 
     @property
     def columns(self) -> int:
@@ -333,6 +338,7 @@ class _Packing:
         between = np.diff(np.unique(structure.time_s))
         usual_s = float(np.median(between)) if between.size else 0.0
         self.least_s = float(np.clip(TIME_LEAST_STAMPS * usual_s, TIME_LEAST_S, TIME_USUAL_S))
+        self.span_s = max(float(structure.time_s[-1] - structure.time_s[0]), self.least_s)
 
     def pack(self, level: NoiseLevel) -> Array:
         values = [*level.factor]
@@ -417,7 +423,9 @@ class _Packing:
             for part, chosen in zip(structure.slow, level.time_constant_s, strict=True)
             for t in (chosen[:1] if part.shared_time else chosen)
         ]
-        return np.concatenate([factor, slow, np.array(constants) + usual, sizes])
+        excess, by_time = self._excess_slopes(level)
+        constants_by = np.array(constants) + usual + by_time
+        return np.concatenate([factor, np.array(slow) + excess, constants_by, sizes])
 
     def _shared(self, level: NoiseLevel, column: Array, factor: Array) -> list[float]:
         """Slopes by the columns that rows of a stamp share: added to the factors; by the sizes."""
@@ -446,7 +454,57 @@ class _Packing:
         for part, times in zip(self.structure.slow, level.time_constant_s, strict=True):
             used = times[:1] if part.shared_time else times
             total += sum(0.5 * (np.log(t / TIME_USUAL_S) / TIME_SPREAD) ** 2 for t in used)
-        return total
+        return total + sum(0.5 * x**2 for own in self._excess(level) for x in own)
+
+    def _excess(self, level: NoiseLevel) -> list[list[float]]:
+        """By how many deviations the means of the slow noise exceed what the log shows of them."""
+        found = []
+        for k, part in enumerate(self.structure.slow):
+            both = zip(level.slow[k], level.time_constant_s[k], part.means, strict=True)
+            most = self.bounds.slow[k]
+            found.append(
+                [
+                    max(math.log(v * mean_share(t, self.span_s) / limit) / MEAN_SPREAD, 0.0)
+                    if math.isfinite(limit) and open_to < OPEN
+                    else 0.0
+                    for (v, t, limit), open_to in zip(both, most, strict=True)
+                ]
+            )
+        return found
+
+    def _excess_slopes(self, level: NoiseLevel) -> tuple[Array, Array]:
+        """Slopes of their cost by the logarithms of the variances and of the time constants."""
+        by_slow: list[float] = []
+        by_time: list[float] = []
+        for k, own in enumerate(self._excess(level)):
+            cost = np.array(own) / MEAN_SPREAD
+            times = level.time_constant_s[k]
+            held = cost * [mean_share_slope(t, self.span_s) for t in times]
+            by_slow += cost.tolist()
+            by_time += (
+                [float(np.sum(held))] if self.structure.slow[k].shared_time else held.tolist()
+            )
+        return np.array(by_slow), np.array(by_time)
+
+
+def mean_share(time_constant_s: float, span_s: float) -> float:
+    """Variance that the mean over a span has of unit Gauss-Markov noise, 2r - 2r^2 (1 - e^(-1/r)).
+
+    r = T / span: the integral of exp(-|t - s| / T) over both, over the span squared.
+    """
+    r = time_constant_s / span_s
+    if r > LONG_SHARE:  # the difference below cancels
+        return 1.0 - 1.0 / (3.0 * r)
+    return 2.0 * r + 2.0 * r * r * math.expm1(-1.0 / r)
+
+
+def mean_share_slope(time_constant_s: float, span_s: float) -> float:
+    """d log mean_share / d log T."""
+    r = time_constant_s / span_s
+    if r > LONG_SHARE:
+        return 1.0 / (3.0 * r - 1.0)
+    slope = 2.0 + 4.0 * r * math.expm1(-1.0 / r) + 2.0 * math.exp(-1.0 / r)
+    return r * slope / mean_share(time_constant_s, span_s)
 
 
 def fit_noise(

@@ -14,7 +14,7 @@ from syncline_design.diagnosis.candidates import (
     candidates,
     directed_parts,
     hidden_by_noise,
-    signatures,
+    plain_signatures,
 )
 from syncline_design.diagnosis.checks import log_checks
 from syncline_design.diagnosis.consequence import Promise, promise_of, rms_m, weighed
@@ -36,7 +36,6 @@ from syncline_design.diagnosis.motion_columns import (
     merged_checks,
     with_slopes,
 )
-from syncline_design.diagnosis.noise import SLOW_LEAST, SLOW_LIMIT, as_specified
 from syncline_design.diagnosis.plots import plots
 from syncline_design.diagnosis.regimes import (
     covariates,
@@ -69,9 +68,9 @@ from syncline_design.diagnosis.search import (
     silent,
     start_search,
 )
+from syncline_design.diagnosis.shown_noise import with_shown_noise
 from syncline_design.diagnosis.sight import informative, smallest_seen
-from syncline_design.diagnosis.slow_states import slow_states
-from syncline_design.diagnosis.survey import survey_m, with_shown_survey
+from syncline_design.diagnosis.survey import survey_m
 from syncline_design.diagnosis.system import Measured, measured
 from syncline_design.diagnosis.system_delay import with_system_delay
 from syncline_design.diagnosis.unseen_block import unseen_block
@@ -87,7 +86,6 @@ from syncline_design.spec.case import Case
 from syncline_design.spec.load import load
 
 MOST_ROWS = 20_000  # of a longer log, windows spread over it are worked on
-COURSES = 4.0  # variance of all courses of a channel over that of its first
 NAMED_SHARE = 0.9
 REMAINDER_SHARE = 0.2  # of the false-alarm rate: for the test of what remains
 
@@ -360,23 +358,7 @@ def prepared(inputs: Measured, log: Log, exclude: Sequence[str] = ()) -> Data:
     parts = directed_parts(view, found)
     structure = structure_of(view, parts)
     structure = still_axes_apart(structure, varying_axes(view.error(), structure))
-    data = with_shown_ranging(data_of(view, structure))
-    return with_shown_survey(data, signatures(view, found))
-
-
-def with_shown_ranging(data: Data) -> Data:
-    """The data with slow ranging noise as far as the log's own slow courses show it, within sigma.
-
-    A sensor that shows none has none that could pass for a bias.
-    """
-    shown = slow_states(data).sizes(as_specified(data.structure), data.error(()))
-    found = []
-    for part in data.structure.slow:
-        own = [COURSES * shown.get((part.sensor, k), 0.0) for k in range(part.columns)]
-        limits = tuple(float(np.clip(v, 10.0 * SLOW_LEAST, SLOW_LIMIT)) for v in own)
-        found.append(replace(part, limits=limits) if part.sensor[1] == "ranging" else part)
-    slow = tuple(found)
-    return data_of(data.view, replace(data.structure, slow=slow))
+    return with_shown_noise(data_of(view, structure), plain_signatures(view, found))
 
 
 def _slip(result: SearchResult) -> Acting | None:

@@ -27,7 +27,7 @@ from scipy.stats import t
 
 from syncline_design.diagnosis.candidates import slopes
 from syncline_design.diagnosis.expected_noise import channels
-from syncline_design.diagnosis.fitting import Data, Model
+from syncline_design.diagnosis.fitting import Data, Model, inverse_scaled
 from syncline_design.diagnosis.noise import NoiseLevel, Sensor, white_covariance
 from syncline_design.diagnosis.positive import inverse as inverse_of
 from syncline_design.diagnosis.positive import pseudo_inverse, solution
@@ -49,6 +49,7 @@ LEAST_ROWS = 8  # of a block
 HUBER = 1.345  # standard deviations from where on a component counts less
 REWEIGHTED = 3
 STEPS = 15  # of expectation and maximisation
+STEADY_SIZE = 1e-3  # relative step of a size below which it has settled
 LEAST = 1e-2  # of the spec's sigma: slow courses smaller than this do not matter
 MATTERS = 1e-3  # of a row's white standard deviation: channels below have no say
 FLAT = 1e6  # prior variance of a constant while the sizes are found
@@ -58,6 +59,9 @@ LOST = 1e-7  # share of a column's information below which others hold it all
 RIDGE = 1e-9  # of scaled columns that hold one another
 SHOWN_NATS = 2.5  # of evidence, from which a channel has slow courses
 LEAST_LOG_P = -700.0
+# Readings of one sensor that wander apart: yaw beside roll and pitch, ranges beside bearings.
+KIN = {("attitude", 2): 1, ("ranging", 1): 1, ("ranging", 2): 1}
+KIN_SPREAD = 1.0  # standard deviation in log variance by which they differ
 
 
 @dataclass(frozen=True, slots=True)
@@ -175,6 +179,7 @@ class States:
     block: NDArray[np.int64]  # (n,) stretch of every row
     seen: NDArray[np.int64] | None  # (n,) group of targets of every row, where they are few
     roles: tuple[Channel, ...]  # sensor of every channel, and which of its readings
+    explained: Array | None = None  # (n, 3, f) what effects could make of the error
 
     @property
     def count(self) -> int:
@@ -284,7 +289,7 @@ class States:
         fixed = width + self.courses.shape[2]
         normal, score = total[:fixed, :fixed], total[:fixed, -1]
         start, limit = np.full(len(self.roles), 0.1), self._limits(level)
-        size2, _, _ = self._sized(normal, score, width, start, limit)
+        size2 = self._sized(normal, score, width, start, limit)
         evidence = self._evidence(normal, score, width, size2)
         while np.any(size2 > LEAST**2):
             less = []
@@ -323,12 +328,21 @@ class States:
         q = self.courses.shape[2]
         fixed = np.r_[np.arange(width), np.arange(white.shape[1] - q, white.shape[1])]
         part, weight, scale2 = white[:, fixed], known.ravel().astype(float), 1.0
+        free = part[:, :width]  # what is no slow course
+        if self.explained is not None:
+            free = np.column_stack([free, (root @ self.explained[:, axes]).reshape(len(part), -1)])
         size2 = np.full(len(self.roles), 0.1)
         limit = self._limits(level)
         for _ in range(REWEIGHTED):
             normal = part.T @ (weight[:, None] * part) / scale2
             score = part.T @ (weight * error) / scale2
-            size2, values, freedom = self._sized(normal, score, width, size2, limit)
+            if free.shape[1] > width:
+                sized = _beside(free, part[:, width:], weight / scale2, error)
+                size2 = self._pooled(sized[0], self._sized(*sized, 0, size2, limit))
+            else:
+                size2 = self._sized(normal, score, width, size2, limit)
+            values, inverse = self._values(normal, score, width, size2)
+            freedom = float(np.sum(inverse * normal))
             left = error - part @ values
             scale2 = _scale2(left[judged.ravel()], freedom)
             far = np.abs(left) / math.sqrt(scale2)
@@ -349,10 +363,8 @@ class States:
             most[part.sensor] *= max(1.0, *slow)
         return np.array([most[sensor] for sensor, _ in self.roles])
 
-    def _sized(
-        self, normal: Array, score: Array, width: int, size2: Array, limit: Array
-    ) -> tuple[Array, Array, float]:
-        """Variances of the channels, the states' values, and the freedom they take."""
+    def _sized(self, normal: Array, score: Array, width: int, size2: Array, limit: Array) -> Array:
+        """Variances of the channels by expectation and maximisation, from size2 on."""
         own = np.diag(normal).copy()
         share, moving = 1.0 / np.maximum(self.wave, 1), self.wave > 0
         channel, count = self.channel[moving], np.bincount(self.channel[moving])
@@ -360,15 +372,56 @@ class States:
         for _ in range(STEPS):
             information[width:] = 1.0 / np.where(moving, size2[self.channel] * share, FLAT)
             scale = 1.0 / np.sqrt(own + information)
-            scaled = normal * scale[:, None] * scale
-            whole = scaled.copy()
+            whole = normal * scale[:, None] * scale
             np.fill_diagonal(whole, (own + information) * scale**2)
             inverse = inverse_of(whole, 1e-12)
             values = scale * (inverse @ (scale * score))
             energy = (values**2 + scale**2 * np.diag(inverse))[width:] / share
-            mean = np.bincount(channel, weights=energy[moving]) / count
-            size2 = np.clip(mean, LEAST**2, limit)
-        return size2, values * (own > 0.0), float(np.sum(inverse * scaled))
+            sized = np.clip(np.bincount(channel, energy[moving]) / count, LEAST**2, limit)
+            if np.all(np.abs(sized - size2) < STEADY_SIZE * size2):
+                return sized
+            size2 = sized
+        return size2
+
+    def _pooled(self, normal: Array, size2: Array) -> Array:
+        """Variances of the channels, where one tells little of its own nearer to those of its kin.
+
+        Kin share what makes them wander; what effects can make of one of them may leave too little
+        there to tell by itself.  A logarithm that t waves tell varies by 2 / t, those of kin by
+        KIN_SPREAD^2, so kin count as 2 / KIN_SPREAD^2 waves.  None is taken to be quieter than it
+        looks.
+        """
+        names = [(sensor, KIN.get((sensor[1], k), 0)) for sensor, k in self.roles]
+        kin = np.array([names.index(one) for one in names])
+        common = np.array([np.mean(size2[kin == one]) for one in kin])
+        _, inverse = self._values(normal, np.zeros(len(normal)), 0, common)
+        prior = common[self.channel] / np.maximum(self.wave, 1)
+        seen = np.clip(1.0 - np.diag(inverse) / prior, LEAST, 1.0) * (self.wave > 0)
+        told = np.bincount(self.channel, seen, len(self.roles))
+        logs, shared = np.log(size2), 2.0 / KIN_SPREAD**2
+        means = np.array([np.average(logs[kin == k], weights=told[kin == k]) for k in kin])
+        pooled: Array = np.exp((told * logs + shared * means) / (told + shared))
+        return np.maximum(size2, pooled)
+
+    def _values(self, normal: Array, score: Array, width: int, size2: Array) -> tuple[Array, Array]:
+        """Free columns and states at these variances, constants free as well, and covariance."""
+        share = 1.0 / np.maximum(self.wave, 1)
+        variance = np.where(self.wave > 0, size2[self.channel] * share, FLAT)
+        prior = np.concatenate([np.full(width, 1e-12), 1.0 / variance])
+        scale = np.sqrt(np.diag(normal) + prior)
+        whole = (normal + np.diag(prior)) / scale[:, None] / scale
+        inverse = inverse_of(whole, 1e-12) / scale[:, None] / scale
+        return inverse @ score, inverse
+
+
+def _beside(free: Array, part: Array, weight: Array, error: Array) -> tuple[Array, Array]:
+    """Normal matrix and score of some columns, freed of others that are no slow course."""
+    root = np.sqrt(weight)[:, None]
+    both, taken = root * np.column_stack([part, error]), root * free
+    before = np.sum(both**2, axis=0)
+    both = both - taken @ (inverse_scaled(taken.T @ taken) @ (taken.T @ both))
+    both = both * (np.sum(both**2, axis=0) > LOST * before)
+    return both[:, :-1].T @ both[:, :-1], both[:, :-1].T @ both[:, -1]
 
 
 def _parted(part: NDArray[np.int64], columns: Array, weight: Array, error: Array) -> _Sums:
@@ -465,7 +518,9 @@ def slow_states(data: Data) -> States:
     block = np.minimum(np.arange(len(view)) * count // max(len(view), 1), count - 1)
     whole = np.concatenate(courses, axis=2) if courses else np.zeros((len(view), 3, 0))
     channels_of, waves_of = np.array(channel, int), np.array(wave, int)
-    return States(data, whole, channels_of, waves_of, block, _dealt(data), tuple(roles))
+    return States(
+        data, whole, channels_of, waves_of, block, _dealt(data), tuple(roles), data.explained
+    )
 
 
 def _scale2(left: Array, freedom: float) -> float:

@@ -60,7 +60,7 @@ def _size2(data: Data, found: Sequence[Signature]) -> float:
     """Variance of the survey's errors over the unit's, beside all effects and slow noise."""
     states, level = slow_states(data), as_specified(data.structure)
     known = precision(replace(data.structure, survey=None), level)
-    fixed = [np.nan_to_num(s.columns) for s in found if s.plain]
+    fixed = [np.nan_to_num(s.columns) for s in found]
     error = data.error(())
     if fixed:
         columns = np.concatenate(fixed, axis=2)
