@@ -213,17 +213,20 @@ class States:
         return [_one(place, whole, less, seen) for place in places]
 
     def own(self, model: Model) -> list[Judged]:
-        """The model's own effects, all together: one entry for each, marginal over the others."""
+        """The model's own effects, all together: one entry for each, marginal over the others.
+
+        Slow courses are sized beside these alone: what else effects could make is not there.
+        """
         columns = np.nan_to_num(slopes(self.data.view, model.acting))
-        none = np.zeros((*columns.shape[:2], 0))
-        [whole] = self.judged(model, [columns], none)
+        none, states = np.zeros((*columns.shape[:2], 0)), replace(self, explained=None)
+        [whole] = states.judged(model, [columns], none)
         at, result = 0, []
         for one in model.acting:
             part = slice(at, at + len(one.effect.slopes()))
             found, span = whole, span_of(one.effect)
             if span is not None:
                 inside = span.mask(self.data.view.log.time_s) > 0.0
-                [found] = self.within(inside, INSIDE).judged(model, [columns], none)
+                [found] = states.within(inside, INSIDE).judged(model, [columns], none)
             own = tuple((c[part, part], count) for c, count in found.jackknives)
             values = fitted_of(one) + found.values[part]
             result.append(Judged(values, found.model[part, part], own))
