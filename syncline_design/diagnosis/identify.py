@@ -17,7 +17,7 @@ from syncline_design.diagnosis.charges import Charge, charge
 from syncline_design.diagnosis.fitting import Data, Model, inner, inverse_scaled
 from syncline_design.diagnosis.identity import Label, effect_of, without
 from syncline_design.diagnosis.spans import cut_to, cuttable, span_of
-from syncline_design.diagnosis.trials import plausible, with_effect
+from syncline_design.diagnosis.trials import plausible, plausible_in_place, with_effect
 from syncline_design.effects.record import Array
 from syncline_design.machine.quick_dataclass import dataclass
 
@@ -103,9 +103,11 @@ def _best(
     """
     scores = {label: named.nll + charges[label].nats + charges[label].prior}
     for other, model in fits.items():
-        if plausible(data, model):
+        if plausible_in_place(data, model, named):
             scores[other] = model.nll + charges[other].nats + charges[other].prior
-    if len(scores) > 1 and not plausible(data, named):
+    if any(plausible(data, fits[one]) for one in scores if one != label) and not plausible(
+        data, named
+    ):
         del scores[label]
     least = min(scores, key=lambda one: (scores[one], one))
     close = [
@@ -138,7 +140,13 @@ def _sorted_out(
             doubt = own.doubt(other)
             loss = _beyond(worse + other.nats - own.nats, doubt) + other.prior - own.prior
             doubt += max(other.borrowed - own.borrowed, 0.0)
-            one = replace(one, fit=worse, loss=loss, possible=plausible(data, model), refitted=True)
+            one = replace(
+                one,
+                fit=worse,
+                loss=loss,
+                possible=plausible_in_place(data, model, named),
+                refitted=True,
+            )
         lists[_place(one, doubt)].append(one)
     aliases, lookalikes, excluded = lists
     return Comparison(tuple(aliases), tuple(lookalikes), tuple(excluded))

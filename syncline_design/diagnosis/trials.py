@@ -81,16 +81,29 @@ def with_effect(data: Data, model: Model, found: Signature, level: NoiseLevel) -
 
 def plausible(data: Data, model: Model) -> bool:
     """Whether every fitted parameter is of a size that its effect can have, and jitter is seen."""
+    return _possible_values(model) and _possible_noise(data, model)
+
+
+def plausible_in_place(data: Data, model: Model, of: Model) -> bool:
+    """The same of a rival; noise that speaks against the one whose place it takes has no say."""
+    return _possible_values(model) and (
+        _possible_noise(data, model) or not _possible_noise(data, of)
+    )
+
+
+def _possible_values(model: Model) -> bool:
     for one in model.acting:
         for p in one.effect.slopes():
             value = one.values[p.name]
             if abs(value) > p.high or (not p.signed and value < 0.0):
                 return False
-    if not all(_mean_and_scatter_agree(model, one) for one in model.opened):
-        return False
-    if not all(_lasts(data, model, one) for one in model.opened):
-        return False
-    return all(seen_in_motion(data, model, one) for one in model.opened)
+    return all(_mean_and_scatter_agree(model, one) for one in model.opened)
+
+
+def _possible_noise(data: Data, model: Model) -> bool:
+    return all(
+        _lasts(data, model, one) and seen_in_motion(data, model, one) for one in model.opened
+    )
 
 
 def _lasts(data: Data, model: Model, opened: Opened) -> bool:
