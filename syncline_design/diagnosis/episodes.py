@@ -71,7 +71,7 @@ def with_episodes(data: Data, found: tuple[Episode, ...]) -> Data:
         own = [one.growth(time_s) for one in found if one.sensor == part.sensor]
         white.append(replace(part, growth=np.prod(own, axis=0)) if own else part)
     structure = replace(data.structure, white=tuple(white))
-    return replace(data_of(data.view, structure), axes=data.axes)
+    return replace(data_of(data.view, structure), axes=data.axes, explained=data.explained)
 
 
 def episodes(data: Data, model: Model, rng: np.random.Generator) -> tuple[Episode, ...]:

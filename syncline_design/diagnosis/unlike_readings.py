@@ -78,7 +78,8 @@ def with_unlike(data: Data, found: tuple[Unlike, ...]) -> Data:
         for part in data.structure.white
     )
     structure = replace(data.structure, white=white)
-    return replace(data_of(data.view, structure), axes=data.axes, noisier=data.noisier)
+    uneven = data_of(data.view, structure)
+    return replace(uneven, axes=data.axes, noisier=data.noisier, explained=data.explained)
 
 
 def _slopes(data: Data) -> dict[Sensor, Array]:
