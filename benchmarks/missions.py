@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from checked import check_file
 from family_specs import Tried, drawn, is_tied
 from plain_enumeration import Enumeration, number, read_catalog
-from random_families import plain_front, plain_order, random_family
+from random_families import all_tried, plain_front, plain_order, random_family
 from syncline_design.choice.evaluate import error_key
 from syncline_design.choice.family import Family, family_of
 from syncline_design.choice.family_best import best_of_family, family_front, iter_family
@@ -48,9 +48,9 @@ def agree(first: int, count: int) -> int:
         family = random_family(rng, 30)
         resource = rng.choice(["cost", "mass", "power"])
         found = [(p.amount, error_key(p.error_m)) for p in front_by_road(family, resource)]
-        ranked = _first_two(family)
-        wanted = plain_order(family)[: len(ranked) or 1]
-        if found != plain_front(family, resource) or ranked != wanted:
+        ranked, tried = _first_two(family), list(all_tried(family))
+        wanted = plain_order(family, tried)[: len(ranked) or 1]
+        if found != plain_front(family, resource, tried) or ranked != wanted:
             wrong += 1
             print(f"family {seed} disagrees", flush=True)
         if time.monotonic() - last > 60.0:

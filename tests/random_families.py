@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 
@@ -190,21 +190,29 @@ def _amount(family: Family, chosen, clocks, name: str) -> Fraction:
     return total
 
 
-def plain_front(family: Family, resource: str) -> list[tuple[Fraction, float]]:
-    """Amounts and errors (12 figures) of the front, over designs that keep all but accuracy."""
+def plain_front(
+    family: Family, resource: str, tried: Sequence[Tried] | None = None
+) -> list[tuple[Fraction, float]]:
+    """Amounts and errors (12 figures) of the front, over designs that keep all but accuracy.
+
+    tried: every design, where they are there.
+    """
     out: list[tuple[Fraction, float]] = []
-    kept = [(t.amounts[resource], float(f"{t.error_m:.12g}")) for t in all_tried(family) if t.keeps]
+    every = all_tried(family) if tried is None else tried
+    kept = [(t.amounts[resource], float(f"{t.error_m:.12g}")) for t in every if t.keeps]
     for amount, error in sorted(kept):
         if not out or error < out[-1][1]:
             out.append((amount, error))
     return out
 
 
-def plain_order(family: Family) -> list[tuple[Fraction | float, float]]:
+def plain_order(
+    family: Family, tried: Sequence[Tried] | None = None
+) -> list[tuple[Fraction | float, float]]:
     """Objective and error of every design that meets all requirements, best first."""
     objective = family.objective
     rows = []
-    for one in all_tried(family):
+    for one in all_tried(family) if tried is None else tried:
         if one.keeps and one.accurate:
             error = float(f"{one.error_m:.12g}")
             rows.append((error if objective == "error" else one.amounts[objective], error))

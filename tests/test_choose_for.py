@@ -7,6 +7,7 @@ import json
 import math
 import random
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -92,22 +93,24 @@ stages:
 timestamping: {{candidates: [{", ".join(TAUS)}]}}
 """
 
+    def by_price(self) -> list[tuple[int, Any, tuple[str, ...]]]:
+        """Every design with its price, the cheapest first."""
+        return sorted(
+            (sum(price for _, price, _ in chosen) + sum(PRICES[m] for m in stamps), chosen, stamps)
+            for chosen in itertools.product(*self.sensors.values())
+            for stamps in itertools.product(TAUS, repeat=3)
+        )
+
     def cheapest(self, *, always: bool) -> float | None:
         """By trying every design at every corner of its intervals, or in their middle."""
-        best: float | None = None
-        methods = list(itertools.product(TAUS, repeat=3))
-        for chosen in itertools.product(*self.sensors.values()):
+        for cost, chosen, stamps in self.by_price():
             spans = [span for _, _, own in chosen for span in own]
             corners: list[tuple[float, ...]] = [tuple((low + high) / 2 for low, high in spans)]
             if always:
-                corners = list(itertools.product(*spans))
-            for stamps in methods:
-                cost = sum(price for _, price, _ in chosen) + sum(PRICES[m] for m in stamps)
-                if best is not None and cost >= best:
-                    continue
-                if all(self._holds(corner, [TAUS[m] for m in stamps]) for corner in corners):
-                    best = cost
-        return best
+                corners = list(itertools.product(*(dict.fromkeys(span) for span in spans)))
+            if all(self._holds(corner, [TAUS[m] for m in stamps]) for corner in corners):
+                return cost
+        return None
 
     def _holds(self, figures: tuple[float, ...], taus: list[float]) -> bool:
         position = math.sqrt(3) * figures[0]
