@@ -72,7 +72,9 @@ def test_a_table_of_reach_counts_with_its_smallest_row_unless_the_target_is_told
     dark = around("30 m", reflectivity=0.05)
     assert codes(sensor, dark) == []
     assert [one.key for one in not_told("it", sensor, dark)] == ["reach"]
-    assert codes(sensor, around("40.1 m", reflectivity=0.05)) == ["reach"]  # less than at 10 %
+    beyond = around("40.1 m", reflectivity=0.05)  # it reaches less far than at 10 %
+    assert codes(sensor, beyond) == ["reach"]
+    assert not list(not_told("it", sensor, beyond))  # so that there is nothing to look up
 
 
 def test_a_reach_that_names_its_target_is_that_of_brighter_ones_at_most() -> None:

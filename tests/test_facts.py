@@ -84,6 +84,7 @@ def test_a_table_of_reach_counts_with_its_smallest_row_unless_the_target_is_know
     [
         (18, "reach: {min: 80 m, max: 70 m}", "min above max"),
         (18, "reach: {min: 50 m, max: {10 %: 40 m, 80 %: 70 m}}", "found min 50 m, max 40 m"),
+        (37, "reach: {max: {10 %: 80 m, 80 %: 70 m}}", "a brighter target is seen less far"),
         (12, "reach: {at: here}", "missing; expected min, max or both"),
         (18, "reach: {max: 70 deg}", "wrong dimension"),
         (18, "reach: {max: -70 m}", "out of range"),

@@ -138,3 +138,23 @@ def test_shipped_specs_are_as_they_are_meant() -> None:
     assert {
         path.name: [str(one) for one in implausible_cautions(load(path))] for path in SPECS
     } == {path.name: [] for path in SPECS}
+
+
+@pytest.mark.parametrize(
+    ("given", "keys"),
+    [
+        ({"depth": "300 m", "medium": "air"}, ["medium"]),
+        ({"depth": "300 m", "gnss": True}, ["gnss"]),
+        ({"depth": "300 m", "medium": "water", "gnss": False}, []),
+        ({"depth": "2 m", "medium": "air", "gnss": True}, []),  # a mast stands out of the water
+        ({"medium": "air", "gnss": True}, []),
+    ],
+)
+def test_what_is_deep_under_water_has_no_air_and_no_satellites(
+    given: Raw, keys: list[str], tmp_path: Path
+) -> None:
+    spec = json.loads(spec_of(WING))
+    spec["stages"][0] |= given
+    found = asked(json.dumps(spec, indent=1), tmp_path)
+    assert [key for _, key, _ in found] == [f"stages[0].{key}" for key in keys]
+    assert all("at a depth of 300 m" in reason for _, _, reason in found)

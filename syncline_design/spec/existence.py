@@ -111,10 +111,7 @@ def not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterat
     if sensor.modality == "ranging":
         if around.medium is not None and sensor.medium is None:
             yield _unknown(identity, "medium", f"{around.stage} looks into {around.medium}")
-        far = None if sensor.reach is None else sensor.reach.farthest(around.reflectivity)
-        if far is None:
-            asked = f"{around.stage}.distance is {_length(around.farthest)}"
-            yield _unknown(identity, "reach", asked)
+        yield from _reach_not_told(identity, sensor, around)
         for axis, wanted in around.look or ():
             seen = sensor.field_of_view
             if wanted is not None and (seen is None or getattr(seen, axis) is None):
@@ -131,6 +128,19 @@ def not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterat
         yield _unknown(identity, "depth_rating", f"{around.stage} is at {_length(around.depth)}")
     if around.temperature is not None and sensor.temperature is None:
         yield _unknown(identity, "temperature", f"{around.stage} has {around.temperature.text}")
+
+
+def _reach_not_told(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[NotTold]:
+    """A far end that nothing says of this target; beyond that of brighter ones it is told."""
+    reach = sensor.reach
+    if reach is not None and reach.farthest(around.reflectivity) is not None:
+        return
+    ends = None if reach is None else reach.surely_ends(around.reflectivity)
+    if ends is None or around.farthest <= ends:
+        asked = f"{around.stage}.distance is {_length(around.farthest)}"
+        target = getattr(around.reflectivity, "text", "") if ends is not None else ""
+        figure = f"reach for a target of {target}" if target else "reach"
+        yield _unknown(identity, "reach", asked, figure)
 
 
 def is_acoustic(kind: str) -> bool:
@@ -174,8 +184,9 @@ def spacing_m(sensor: SensorEntry, around: Surroundings) -> float | None:
     return float(max(waits)) if waits else None
 
 
-def _unknown(identity: str, key: str, asked: str) -> NotTold:
-    return NotTold(identity, key, f"{identity} gives no {key}, {asked}: look this up first")
+def _unknown(identity: str, key: str, asked: str, figure: str = "") -> NotTold:
+    told = f"{identity} gives no {figure or key}, {asked}: look this up first"
+    return NotTold(identity, key, told)
 
 
 def _medium(identity: str, sensor: SensorEntry, around: Surroundings) -> Iterator[RuledOut]:

@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping
 from datetime import date
+from itertools import pairwise
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import Field, model_validator
@@ -128,6 +129,19 @@ class Reach(FileRecord):
         if self.min is not None and far is not None and self.min > far:
             shown = f"min {_text(self.min)}, max {_text(far)}"
             raise refusals([(("min",), refusal("min above max", "min <= max", shown))])
+        return self
+
+    @model_validator(mode="after")
+    def _brighter_is_no_nearer(self) -> Reach:
+        """What reflects more is seen from at least as far."""
+        named = {key: _ratio(key) for key in self._rows()} if self.max is not None else {}
+        rows = sorted((r, key) for key, r in named.items() if r is not None and r < math.inf)
+        for (_, darker), (_, brighter) in pairwise(rows):
+            far, near = self._rows()[darker], self._rows()[brighter]
+            if near < far:
+                shown = f"{brighter}: {_text(near)} beside {darker}: {_text(far)}"
+                told = refusal("a brighter target is seen less far", "at least as far", shown)
+                raise refusals([(("max", brighter), told)])
         return self
 
     def farthest(self, reflectivity: float | None = None) -> float | None:

@@ -23,6 +23,7 @@ from syncline_design.spec.facts import SIGMA_DIMENSIONS
 from syncline_design.spec.load import load_builtin
 
 LONG_ARM: Final = 3.0  # times the largest lever arm that the platform says it has
+MAST_M: Final = 5.0  # from so deep a mast or a float may still reach the air
 FIGURES: Final = {
     "v_max": Dimension.SPEED,
     "omega_max": Dimension.ANGULAR_RATE,
@@ -46,6 +47,7 @@ def implausible(case: Case, sensors: Iterable[Candidate[SensorEntry]]) -> Iterat
     for stage in case.stages:
         yield from _platform(case, stage)
         yield from _arms(stage)
+        yield from _under_water(stage)
     for one in {sensor.id: sensor for sensor in sensors}.values():
         if not one.origin.startswith(SHIPPED):
             yield from _noise(one.id, one.entry)
@@ -122,6 +124,21 @@ def _arms(stage: StageCase) -> Iterator[Implausible]:
                 f"{stage.choice.name}.{name}: a lever arm of {shown}, and the platform's baseline "
                 f"(its largest) is {most}",
             )  # fmt: skip
+
+
+def _under_water(stage: StageCase) -> Iterator[Implausible]:
+    """What a spec says of a stage at a depth that holds above the surface only."""
+    choice = stage.choice
+    if choice.depth is None or choice.depth <= MAST_M:
+        return
+    where, name = f"stages[{stage.index}]", choice.name
+    deep = getattr(choice.depth, "text", format_quantity(choice.depth, Dimension.LENGTH))
+    if choice.medium == "air":
+        reason = f"{name}: medium is air at a depth of {deep}: what it looks at lies under water"
+        yield Implausible(None, f"{where}.medium", reason)
+    if choice.gnss:
+        reason = f"{name}: gnss is yes at a depth of {deep}: no signal of a satellite gets there"
+        yield Implausible(None, f"{where}.gnss", reason)
 
 
 def _noise(name: str, entry: SensorEntry) -> Iterator[Implausible]:
