@@ -161,17 +161,13 @@ def test_a_stand_in_and_what_does_not_matter_call_for_nothing() -> None:
     )
 
 
-@pytest.mark.parametrize("in_place", [False, True])
-def test_one_role_is_not_put_right_in_two_ways_at_once(
-    monkeypatch: pytest.MonkeyPatch, *, in_place: bool
-) -> None:
-    """Who buys another sensor does not stamp the present one otherwise as well."""
+def test_one_role_is_not_put_right_in_two_ways_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who buys another sensor does not stamp the present one, given in place, otherwise as well."""
     monkeypatch.setattr(repair_options, "MOST_KEPT", 1)  # of each kind, for time's sake
     spec = spec_of(primitive="pps", timestamping="gpio")
-    if in_place:
-        entry = read_catalog(families=False)["sensors"]["sbg_ellipse"]
-        kept = ("modality", "type", "sigma_attitude", "primitives", "cost")
-        spec["stages"][0]["attitude"]["sensor"] = {key: entry[key] for key in kept}
+    entry = read_catalog(families=False)["sensors"]["sbg_ellipse"]
+    kept = ("modality", "type", "sigma_attitude", "primitives", "cost")
+    spec["stages"][0]["attitude"]["sensor"] = {key: entry[key] for key in kept}
     late = finding("latency", "attitude", "s", latency_s=(0.016, 1e-4))
     noisy = finding("timestamp_jitter", "attitude", "s", std_s=(0.01, 1e-4))
     found = by_kind(spec, late, noisy)
