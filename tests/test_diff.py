@@ -127,6 +127,26 @@ def test_several_changes_say_which_one_does_it(files: tuple[Path, Path]) -> None
     assert "alone: now has no design that meets its requirements" in console(on_difference(data))
 
 
+def test_a_simulated_limit_alone_does_what_checking_it_alone_says(files: tuple[Path, Path]) -> None:
+    """Its verdict alone is that of `check` on a spec with nothing but that change."""
+    old, new = files
+    text = (ROOT / "specs" / "usv_mapping.yaml").read_text("utf-8")
+    old.write_text(text, "utf-8")
+    new.write_text(text, "utf-8")
+    tighter = ("quantile: 0.95, limit: 0.25 m", "quantile: 0.95, limit: 20 cm")
+    change(new, tighter, ("limit: 36000 EUR", "limit: 35000 EUR"))
+    found = diff(old, new)
+    effects = {one.key: one.effect for one in found.causes}
+    alone = effects["requirements[MC-1].limit"]
+    assert alone is not None
+    change(old, tighter)
+    assert alone.verdict.new == check_file(old).verdict == "fails"
+    assert "MC-1" in [one.id for one in alone.requirements]
+    other = effects["requirements[COST-1].limit"]
+    assert other is not None
+    assert (other.verdict.old, other.verdict.new) == ("meets", "meets")
+
+
 def test_the_exit_code_is_that_of_the_new_one(files: tuple[Path, Path]) -> None:
     old, new = files
     change(new, ("limit: 0.30 m", "limit: 1 mm"))

@@ -15,14 +15,15 @@ from typing import Any
 from syncline_design.comparison.difference import Cause, Difference, changes, difference
 from syncline_design.comparison.limits import limit_texts
 from syncline_design.comparison.verdict_file import read_verdict, text_of
-from syncline_design.machine.deadline import in_force
+from syncline_design.machine.deadline import NoVerdict, in_force
 from syncline_design.machine.quick_dataclass import dataclass
 from syncline_design.machine.records import Json
 from syncline_design.spec.case import Case
 from syncline_design.spec.catalog import SECTIONS
 from syncline_design.spec.files import Collection
 from syncline_design.spec.keys import PLATFORM_KEYS, label, put
-from syncline_design.spec.load import BadInput, catalogs_of, load_document, without_simulated
+from syncline_design.spec.load import BadInput, catalogs_of, load_document
+from syncline_design.spec.spec import Requirement
 from syncline_design.spec.yaml_text import KeyPath, ParsedFile, parse
 from syncline_design.verdict.settings import CheckSettings
 from syncline_design.verdict.tree import RequirementResult, Verdict
@@ -276,7 +277,6 @@ def _tried(
     value = _value_there(there, place, original)
     if value is _ABSENT:
         return cause
-    plain = replace(settings, monte_carlo=False)
     try:
         in_force().check()
         data = put(original, place, value)
@@ -284,13 +284,24 @@ def _tried(
         path = before.case.path
         same = before.catalogs if place[0] != "catalogs" else None
         alone = load_document(document, path, same or catalogs_of(document, path))
-        verdict = check_loaded(without_simulated(alone), plain)
-        start = check_loaded(without_simulated(before.case), plain)
-    except Exception:  # a change that needs the others; the whole difference stands without it
+    except (BadInput, NoVerdict):  # a change that needs the others; the whole stands without it
         return cause
+    asked = any(
+        r.kind == "monte_carlo" for one in (before.case, alone) for r in _requirements_of(one)
+    )
+    wanted = replace(settings, monte_carlo=settings.monte_carlo and asked)  # else for a picture
+    start = before.verdict if asked else check_loaded(before.case, wanted)
+    verdict = check_loaded(alone, wanted)
     if in_force().is_over:
         return cause
     return replace(cause, effect=changes(start, verdict))
+
+
+def _requirements_of(case: Case) -> Iterator[Requirement]:
+    """Every requirement of a spec, those of its missions included."""
+    yield from case.spec.requirements
+    for mission in case.missions:
+        yield from mission.case.spec.requirements
 
 
 def _value_there(new: Any, path: KeyPath, old: Any) -> Any:
