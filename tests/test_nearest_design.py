@@ -106,3 +106,23 @@ def test_a_role_without_options_is_nearest_at_a_looser_sync_limit() -> None:
     kept = [o for o in Enumeration(spec) if not failed(spec, o)]
     assert near.cost == pytest.approx(min(o.cost for o in kept), abs=1e-6)
     assert near.front == ()  # no design keeps the sync limit at any price
+
+
+def test_a_simulated_limit_is_missed_by_what_is_simulated() -> None:
+    """The figure is that of the design's own verdict, not the limit that would let it pass."""
+    spec = yaml.safe_load((SPECS / "usv_mapping.yaml").read_text("utf-8"))
+    (simulated,) = [one for one in spec["requirements"] if one["kind"] == "monte_carlo"]
+    simulated["limit"] = "20 cm"
+    pinned = check_loaded(load_text(yaml.safe_dump(spec), "specs/pinned.yaml"), CheckSettings())
+    own = next(one for one in pinned.requirements if one.id == simulated["id"])
+    assert own.low is not None
+    assert own.high is not None
+    position = spec["stages"][0]["position"]
+    position["candidates"] = [position.pop("sensor")]
+    position.pop("primitive", None)
+    case = load_text(yaml.safe_dump(spec), "specs/open.yaml")
+    near = check_loaded(case, CheckSettings()).nearest
+    assert near is not None
+    (missed,) = near.misses
+    assert missed.requirement == simulated["id"]
+    assert own.low <= missed.value <= own.high

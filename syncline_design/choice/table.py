@@ -245,6 +245,10 @@ class Judge(Protocol):
         """A limit [m] that one design keeps, as near to its quantile as simulation tells."""
         ...
 
+    def estimate_m(self, problem: Problem, design: Design, requirement: str) -> float:
+        """The figure of one design [m] itself, as its verdict would show it."""
+        ...
+
     def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
         """The same with other limits; a requirement that is not named is lifted."""
         ...

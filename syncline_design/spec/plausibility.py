@@ -48,9 +48,10 @@ def implausible(case: Case, sensors: Iterable[Candidate[SensorEntry]]) -> Iterat
         yield from _platform(case, stage)
         yield from _arms(stage)
         yield from _under_water(stage)
-    for one in {sensor.id: sensor for sensor in sensors}.values():
-        if not one.origin.startswith(SHIPPED):
-            yield from _noise(one.id, one.entry)
+    own = {one.id: one.entry for one in sensors if not one.origin.startswith(SHIPPED)}
+    shipped = tuple(load_builtin().sensors.values()) if any(e.type for e in own.values()) else ()
+    for name, entry in own.items():
+        yield from _noise(name, entry, shipped)
 
 
 def _platform(case: Case, stage: StageCase) -> Iterator[Implausible]:
@@ -141,12 +142,14 @@ def _under_water(stage: StageCase) -> Iterator[Implausible]:
         yield Implausible(None, f"{where}.gnss", reason)
 
 
-def _noise(name: str, entry: SensorEntry) -> Iterator[Implausible]:
+def _noise(
+    name: str, entry: SensorEntry, shipped: Iterable[SensorEntry]
+) -> Iterator[Implausible]:
     """A sensor's sigmas against those of shipped sensors of its type."""
     siblings = [
         one
-        for one in (load_builtin().sensors.values() if entry.type else ())
-        if one.modality == entry.modality and one.type == entry.type
+        for one in shipped
+        if entry.type and one.modality == entry.modality and one.type == entry.type
     ]
     for key, dimension in SIGMA_DIMENSIONS.items():
         value = size_of(entry, key)

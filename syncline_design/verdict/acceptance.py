@@ -299,16 +299,26 @@ class _SpecJudge:
 
     def reached_m(self, problem: Problem, design: Design, requirement: str) -> float:
         """What the requirement limits [m], of a simulated quantile the interval's upper end."""
+        return self._figure(problem, design, requirement)[1]
+
+    def estimate_m(self, problem: Problem, design: Design, requirement: str) -> float:
+        """The same, of a simulated quantile its estimate."""
+        return self._figure(problem, design, requirement)[0]
+
+    def _figure(self, problem: Problem, design: Design, requirement: str) -> tuple[float, float]:
+        """What the requirement limits [m], and a limit that surely is above."""
         one = self._requirement(requirement)
         if one.kind in STATED_KINDS:
             system = _nameless(self._system(problem, design)[0])
             try:
-                return value_m(system, wanted_of(one), float(one.limit), self.simulations.seed)
+                found = value_m(system, wanted_of(one), float(one.limit), self.simulations.seed)
             except SimulationError as error:
                 raise Unfinished(str(error)) from None
+            return found, found
         limit = next(float(r.limit) for r in self.requirements if r.id == requirement)
         system, _ = self._system(problem, design)
-        return self._decision(system, requirement, limit).estimate.high_m
+        estimate = self._decision(system, requirement, limit).estimate
+        return estimate.value_m, estimate.high_m
 
     def with_limits(self, limits: tuple[tuple[str, float], ...]) -> Judge:
         """The same at other limits."""

@@ -13,7 +13,7 @@ from syncline_design.choice.front import front
 from syncline_design.choice.holding import best_design
 from syncline_design.choice.outcome import Explanation, Fix, NoVerdict
 from syncline_design.choice.parts import lifted, parts_of
-from syncline_design.choice.table import Problem
+from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import Build
 from syncline_design.model.quantity import Quantity
 from syncline_design.spec.case import Case
@@ -46,7 +46,10 @@ def _of(case: Case, problem: Problem, fixes: Sequence[Fix], build: Build) -> Nea
         None if a is None else float(a) for a in (sums.cost, sums.mass, sums.power)
     )
     written = {one.id: one.limit_written for one in case.spec.requirements}
-    misses = tuple(_missed(fix, sums, written.get(fix.requirement or "")) for fix in fixes)
+    misses = tuple(
+        _missed(fix, _reached(eased, design, sums, fix), written.get(fix.requirement or ""))
+        for fix in fixes
+    )
     shown = full_design(moved, eased, design)
     return Nearest(cost, mass, power, sums.error_m, misses, shown, _front(problem))
 
@@ -59,12 +62,21 @@ def _move(case: Case, fix: Fix) -> Move:
     return found, fix.from_ or 0.0, Quantity(to, "", None, currency)
 
 
-def _missed(fix: Fix, sums: Evaluation, written: str | None) -> MissedLimit:
-    """What the design reaches; of what is no sum, the limit that was shown to do."""
-    reached = {"accuracy": sums.error_m, "cost": sums.cost, "mass": sums.mass, "power": sums.power}
-    value = reached.get(fix.kind)
-    shown = (fix.to or 0.0) if value is None else float(value)
-    return MissedLimit(fix.requirement, fix.kind, shown, fix.from_ or 0.0, fix.unit or "", written)
+def _reached(problem: Problem, design: Design, sums: Evaluation, fix: Fix) -> float:
+    """What the design reaches; of its sync ratio the limit that was shown to do."""
+    summed = {"accuracy": sums.error_m, "cost": sums.cost, "mass": sums.mass, "power": sums.power}
+    value = summed.get(fix.kind)
+    if value is not None:
+        return float(value)
+    judge, name = problem.judge, fix.requirement
+    if judge is not None and name in dict(judge.limits):
+        return judge.estimate_m(problem, design, name)
+    return fix.to or 0.0
+
+
+def _missed(fix: Fix, reached: float, written: str | None) -> MissedLimit:
+    kind = fix.kind
+    return MissedLimit(fix.requirement, kind, reached, fix.from_ or 0.0, fix.unit or "", written)
 
 
 def _front(problem: Problem) -> tuple[PricedError, ...]:
