@@ -72,7 +72,7 @@ def test_a_verdict_is_drawn_without_a_script_and_with_every_figure() -> None:
     verdict = sd.check(ROOT / "specs" / "usv_wire_missing.yaml", monte_carlo=False)
     drawn = Words(verdict._repr_html_() or "")
     assert "Does not meet its requirements" in drawn.text
-    assert "447.4 mm" in drawn.text
+    assert "0.4474 m" in drawn.text
     assert drawn.tags >= {"table", "details", "svg"}
     assert not drawn.tags & {"script", "iframe", "link", "html", "body", "form"}
 

@@ -396,7 +396,7 @@ def _unlike_finding(effect: Effect, final: Settled, one: Unlike, weights: Weight
     size_m = math.sqrt(max(more, 0.0))
     stage, sensor = one.sensor
     entry = EffectEntry(effect.name, sensor, stage, ((name, factor),))
-    words = f"saves {one.gain:.1f} nat beside one size for all readings of the sensor"
+    words = f"saves {to_places(one.gain, 1)} nat beside one size for all readings of the sensor"
     told = finding(effect, sensor, stage, shown, words, one.gain, None,
                    material=weights.material(size_m, entry), size_m=size_m)  # fmt: skip
     times = {name: level.factor[index] * own for name, own in one.of_each.items()}

@@ -23,14 +23,16 @@ def explained(verdict: Verdict) -> list[Node]:
     nodes: list[Node] = [Text(LEAD)] if found else []
     for one in found:
         nodes.append(Heading(f"{one.id}, limit {numbers.limit(one)}"))
-        nodes.append(Items(tuple(_line(step) for step in one.steps)))
+        *before, last = one.steps
+        shown = numbers.held(last.value, one, 6)  # in the unit of the limit that it is held against
+        nodes.append(Items((*map(_line, before), _line(last, shown))))
         nodes += _sources(one)
     return nodes
 
 
-def _line(step: ExplainedStep) -> Inline:
+def _line(step: ExplainedStep, shown: str = "") -> Inline:
     """`sigma_p_uav = sqrt(0.01**2 + ...) = 17.32 mm: |(s_north, s_east, s_down)|`."""
-    value = numbers.in_unit(step.value, step.unit, 6)
+    value = shown or numbers.in_unit(step.value, step.unit, 6)
     put_in = (code(step.numbers), " = ") if step.numbers != repr(step.value) else ()
     return (code(step.name), " = ", *put_in, strong(value), ": ", given(step.formula))
 

@@ -148,8 +148,21 @@ def _payload(data: Difference) -> Table | None:
 
 
 def _sums(data: Difference) -> Table:
-    rows = [_sum_row(figure) for figure in (*data.sums, data.error)]
-    return table("Sums, before and now", ("Sum", "Before #", "Now #", "Change #"), rows)
+    rows = [_sum_row(figure) for figure in data.sums]
+    heads = ("Sum", "Before #", "Now #", "Change #")
+    return table("Sums, before and now", heads, [*rows, _error_row(data)])
+
+
+def _error_row(data: Difference) -> tuple[Cell | str, ...]:
+    """The Syncline error on either side, in the unit of the tightest limit that it has there."""
+    asked = [entry for entry in data.requirements if entry.kind == "accuracy"]
+    old, new = (
+        min((row for row in rows if row is not None), key=lambda row: row.limit, default=None)
+        for rows in ([entry.old for entry in asked], [entry.new for entry in asked])
+    )
+    name, *_, change = _sum_row(data.error)
+    before = Cell(numbers.error(data.error.old, old), data.error.old)
+    return name, before, Cell(numbers.error(data.error.new, new), data.error.new), change
 
 
 def _sum_row(figure: FigureChange) -> tuple[Cell | str, ...]:

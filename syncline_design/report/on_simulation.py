@@ -92,11 +92,12 @@ def _own_tau(system: System | None) -> str:
 
 
 def _grid(result: Simulation, system: System | None) -> list[Node]:
-    worst = result.monte_carlo.worst_case
+    worst, within = result.monte_carlo.worst_case, result.monte_carlo.probability_within_target
+    share = numbers.percent(worst.ratio_to_syncline, 4)
     said = (
         f"{_own_tau(system)}, {numbers.time(worst.tau_s)}: "
-        f"{numbers.length(worst.value_m)}, {numbers.percent(worst.ratio_to_syncline, 4)} of the "
-        f"Syncline's {numbers.length(worst.syncline_m)}. " + certificate(result.monte_carlo)
+        f"{numbers.error(worst.value_m, within)}, {share} of the "
+        f"Syncline's {numbers.error(worst.syncline_m, within)}. " + certificate(result.monte_carlo)
     )
     return [
         Text("Every magnitude is held to its Syncline term and the directions are free: the "

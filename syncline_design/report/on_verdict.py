@@ -220,6 +220,7 @@ def _syncline(verdict: Verdict) -> list[Node]:
     syncline, chart = verdict.syncline, verdict_charts.syncline_chart(verdict)
     if syncline is None or not chart:
         return []
+    limit = verdict_charts.tightest_limit(verdict, "accuracy")
     tau, crit = syncline.tau_s, syncline.tau_crit_s
     bound = "synchronisation" if crit is not None and tau >= crit else "sensor noise"
     facts = [
@@ -229,7 +230,7 @@ def _syncline(verdict: Verdict) -> list[Node]:
         ("\u03c4_crit of the system", numbers.time_limit(crit)),
         ("Bound by", bound),
         ("Synchronisation error", numbers.length(syncline.sync_error_m)),
-        ("Total error", numbers.length(syncline.total_m)),
+        ("Total error", numbers.error(syncline.total_m, limit)),
         ("Drifts, grids, heave charged for", numbers.horizon(verdict.horizon)),
     ]
     for kind, label in (("systematic", "Known effects"), ("underway", "Between samples")):
@@ -237,7 +238,7 @@ def _syncline(verdict: Verdict) -> list[Node]:
         if beside:
             facts.insert(-2, (label, numbers.length(math.fsum(beside))))
     column = Group((Facts(tuple(facts)), *verdict_charts.explorer(verdict)))
-    return [Group((*chart, column), "split"), *show(verdict_tables.models(syncline))]
+    return [Group((*chart, column), "split"), *show(verdict_tables.models(syncline, limit))]
 
 
 def _ledger(verdict: Verdict) -> list[Node]:

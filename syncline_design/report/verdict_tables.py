@@ -218,14 +218,14 @@ def _too_small(syncline: SynclineFigures) -> str:
     return f"{words} below 0.1 % of the total and have no row; together {numbers.length(rest)}."
 
 
-def models(syncline: SynclineFigures) -> Table:
-    """Both synchronisation models and the lever-arm variant, side by side."""
+def models(syncline: SynclineFigures, limit: RequirementResult | None) -> Table:
+    """Both synchronisation models and the lever-arm variant; limit: of their total."""
     found = (("syncline", syncline.models.syncline), ("per_sensor", syncline.models.per_sensor))
     rows = [
         (
             SYNC_MODELS[key] + (" \u2014 decides" if key == syncline.model else ""),
             Cell(numbers.length(entry.sync_error_m), entry.sync_error_m),
-            Cell(numbers.length(entry.total_m), entry.total_m),
+            Cell(numbers.error(entry.total_m, limit), entry.total_m),
         )
         for key, entry in found
     ]
@@ -235,7 +235,7 @@ def models(syncline: SynclineFigures) -> Table:
         (
             "Syncline with the lever arm's rotation",
             Cell(numbers.length(error), error),
-            Cell(numbers.length(lever.total_m), lever.total_m),
+            Cell(numbers.error(lever.total_m, limit), lever.total_m),
         )
     )
     heads = ("Model", "Synchronisation error #", "Total error #")

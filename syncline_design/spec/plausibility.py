@@ -142,9 +142,7 @@ def _under_water(stage: StageCase) -> Iterator[Implausible]:
         yield Implausible(None, f"{where}.gnss", reason)
 
 
-def _noise(
-    name: str, entry: SensorEntry, shipped: Iterable[SensorEntry]
-) -> Iterator[Implausible]:
+def _noise(name: str, entry: SensorEntry, shipped: Iterable[SensorEntry]) -> Iterator[Implausible]:
     """A sensor's sigmas against those of shipped sensors of its type."""
     siblings = [
         one
