@@ -17,7 +17,7 @@ from syncline_design.choice.missed import nearest_miss
 from syncline_design.choice.options import Options
 from syncline_design.choice.table import Design, Problem, with_limits
 
-CASE = SimpleNamespace(spec=SimpleNamespace(currency="EUR"))
+CASE = SimpleNamespace(spec=SimpleNamespace(currency="EUR", requirements=()))
 
 
 def drawn(seed: int) -> Problem:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from syncline_design.diagnosis.scene import Scene
-from syncline_design.effects.flexure import GRAVITY_MPS2, specific_force
+from syncline_design.effects.kinematics import GRAVITY_MPS2, specific_force
 from syncline_design.effects.record import Array, Effect
 
 HEADING_NATS = 0.5  # that the noise of a heading may be worth: it is nearly all of its error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from syncline_design.effects.kinematics import antenna_to_object, rotate
+from syncline_design.effects.kinematics import GRAVITY_MPS2, antenna_to_object, rotate
 from syncline_design.effects.record import (
     Array,
     Basis,
@@ -18,8 +18,6 @@ from syncline_design.effects.record import (
     Values,
 )
 from syncline_design.model.system import Stage
-
-GRAVITY_MPS2 = 9.80665
 
 
 def _tilt(rows: StageRows) -> Array:

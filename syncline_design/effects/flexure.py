@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from syncline_design.effects.kinematics import GRAVITY_MPS2, specific_force
 from syncline_design.effects.record import (
     Array,
     Basis,
@@ -20,23 +21,11 @@ from syncline_design.effects.record import (
 )
 from syncline_design.model.system import Stage
 
-GRAVITY_MPS2 = 9.80665
-
 
 def _depart(rows: StageRows, values: Values, sensor: Target, _: Rng) -> Departures:
     """true lever arm = spec + (x f_x, y f_y, z f_z) [m], body, f the specific force."""
     bend = np.array([values["x"], values["y"], values["z"]])
     return Departures(ranging_m=bend * specific_force(rows))
-
-
-def specific_force(rows: StageRows) -> Array:
-    """f = a - g [m/s2], body, (n, 3): what an accelerometer feels and what loads the mount.
-
-    At rest and level f = (0, 0, -9.81): the spec's arm is that of the unloaded mount.
-    """
-    down = GRAVITY_MPS2 * rows.rotation[:, 2, :]  # R' (0, 0, g)
-    force: Array = rows.acceleration_mps2 - down
-    return force
 
 
 def _sensitivity(rows: StageRows, values: Values, sensor: Target) -> Array:

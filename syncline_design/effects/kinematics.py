@@ -6,6 +6,8 @@ import numpy as np
 
 from syncline_design.effects.record import Array, Departures, StageRows, Target, Values
 
+GRAVITY_MPS2 = 9.80665
+
 
 def bearing(azimuth_rad: Array, elevation_rad: Array) -> Array:
     """Unit vectors n = [cos az cos el, sin az cos el, -sin el], shape (n, 3).
@@ -161,3 +163,13 @@ def heading_slope(rows: StageRows, turns: int) -> Array:
     wave = np.stack([np.sin(angle), np.cos(angle)], axis=-1)
     slope: Array = down_axis_sweep(rows)[:, :, None] * wave[:, None, :]
     return slope
+
+
+def specific_force(rows: StageRows) -> Array:
+    """f = a - g [m/s2], body, (n, 3): what an accelerometer feels and what loads the mount.
+
+    At rest and level f = (0, 0, -9.81): the spec's arm is that of the unloaded mount.
+    """
+    down = GRAVITY_MPS2 * rows.rotation[:, 2, :]  # R' (0, 0, g)
+    force: Array = rows.acceleration_mps2 - down
+    return force
