@@ -222,6 +222,30 @@ def test_what_is_broken_has_no_interval_where_more_of_it_may_be_undone(
     assert ("undoes it on this log" in row.words) == open_too
 
 
+def test_what_holds_has_an_interval_that_what_is_undone_lies_in(
+    known: tuple[Case, Diagnosis],
+) -> None:
+    """A delay that an arm of 6 cm undoes: the arm's row does not say that it is known to mm."""
+    case, found = known
+    verdict = check_loaded(case, CheckSettings(monte_carlo=False))
+    name = case.stages[-1].choice.name
+    more = LeftOpen(("lever_arm", "position", 0), name, "x_m", "m", 0.06, 1e-3,
+                    ("latency", "position", 0))  # fmt: skip
+    log = LogEvidence(found, OnPaper(case, ()), name, sight=Sighted(found, open=(more,)))
+    [one] = [a for a in assumptions(case, verdict) if (a.role, a.name) == ("position", "lever_arm")]
+    row = by_log(one, log)
+    assert row.status == "holds", row
+    assert row.measured is not None
+    assert (row.measured.low, row.measured.high) == (-0.06, 0.06)
+
+
+def test_a_wave_that_is_no_effect_leaves_the_rows_open(found: Diagnosis) -> None:
+    """A stand-in has no entry among the effects: it was an internal error."""
+    wave = replace(found.findings[0], effect="spectral_line", kind="stand_in", aliases=())
+    rows = dict(judged(load(EXAMPLE), replace(found, findings=(wave,))))
+    assert {one.status for key, one in rows.items() if key[0] != "platform"} == {"not_shown"}
+
+
 def test_a_delay_that_several_sensors_share_breaks_each(found: Diagnosis) -> None:
     (finding,) = [f for f in found.findings if f.effect == "latency"]
     shared = replace(found, findings=(replace(finding, also=("attitude",)),))

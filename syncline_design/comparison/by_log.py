@@ -67,6 +67,8 @@ class LogEvidence:
 
     def is_of(self, effect: str, sensors: Collection[str], stage: str, one: Assumed) -> bool:
         """Whether an effect of a stage's sensors would break this assumption."""
+        if effect not in registry():  # a stand-in that is no effect, such as a wave
+            return False
         breaks: str = registry()[effect].breaks
         if breaks == "clock" and stage in self.clocks:
             return (one.name, one.stage) == ("clock", self.clocks[stage])
@@ -219,6 +221,8 @@ def _doubt(one: Assumed, log: LogEvidence) -> str:
     if found.verdict == "unexplained":
         return "the log disagrees with the spec and the cause has no name: nothing is shown"
     for finding in found.findings:
+        if finding.material and finding.effect not in registry():
+            return f"the log holds what has no cause by name: {finding.sentence}"
         rivals = [a for a in finding.aliases if log.is_of(a.effect, (a.sensor,), a.stage, one)]
         if finding.material and rivals:
             return f"this log cannot tell it from what was found: {finding.sentence}"
@@ -246,6 +250,7 @@ def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
     alone = _ALONE[one.name]
     if moved := shifts(one, log.found):
         figure = widened(figure, moved)
+    figure = _with_undone(figure, log.parts.largest_undone(one))
     least = log.parts.least_s(one)
     if least is None:
         words = f"not found, and this log would have shown what turns the verdict{alone}"
@@ -261,6 +266,13 @@ def _shown(one: Assumed, log: LogEvidence, figure: MeasuredFigure) -> Judgement:
     words = (f"not found, and what turns the verdict would have shown wherever it had acted for "
              f"{stretch} or longer ({sizes}){alone}")  # fmt: skip
     return Judgement("holds", words, figure, least_stretch_s=length_s)
+
+
+def _with_undone(figure: MeasuredFigure, size: float) -> MeasuredFigure:
+    """An interval that holds what another departure undoes on this log as well."""
+    return MeasuredFigure(
+        figure.value, min(figure.low or 0.0, -size), max(figure.high or 0.0, size)
+    )
 
 
 def _hidden(one: Assumed, log: LogEvidence) -> Iterator[str]:

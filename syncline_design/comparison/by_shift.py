@@ -1,8 +1,8 @@
 """What stamps that run away or step make of a sensor's delay.
 
-A clock that stamps a sensor's data and drifts by r makes them seem younger by r (t - t0), a step of
-s by s from then on: as long as it acts that is a delay, though the assumption it breaks first is
-that of the stamps or of the clock.
+A clock that stamps a sensor's data and drifts by r puts their stamps r (t - t0) ahead, a step of s
+by s from then on: the data are older than their stamps by as much, which is a delay as long as it
+acts, though the assumption it breaks first is that of the stamps or of the clock.
 """
 
 from __future__ import annotations
@@ -41,17 +41,18 @@ def shifts(one: Assumed, found: Diagnosis) -> list[Shift]:
 
 
 def _moves(finding: Finding) -> bool:
+    if finding.kind == "stand_in":
+        return False
     effect = registry()[finding.effect]
-    moves = effect.breaks in OF_STAMPS and effect.sensitivity is not None  # not jitter: mean zero
-    return moves and finding.kind != "stand_in"
+    return effect.breaks in OF_STAMPS and effect.sensitivity is not None  # not jitter: mean zero
 
 
 def _delay(finding: Finding, duration_s: float) -> MeasuredFigure | None:
-    """stamp = true + rate (t - t0), or + step: the delay is less than none by as much."""
+    """stamp = true + rate (t - t0), or + step: the data are as much older than their stamps."""
     for name, lasts in (("rate", duration_s), ("step_s", 1.0)):
         part = finding.parameters.get(name)
         if part is not None:
-            return _scaled(part, -lasts)
+            return _scaled(part, lasts)
     return None
 
 

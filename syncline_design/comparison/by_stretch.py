@@ -116,6 +116,16 @@ class InStretches:
                        f"({whose}) undoes it on this log; alone it would be known to "
                        f"{amount(each.alone, each.unit)}")  # fmt: skip
 
+    def largest_undone(self, one: Assumed) -> float:
+        """The largest size, in the assumption's unit, that others undo on this log; else 0."""
+        sizes = (
+            each.size
+            for each in self.open
+            if each.unit == one.unit
+            and self.is_of(each.label[0], (each.label[1],), each.stage, one)
+        )
+        return max(sizes, default=0.0)
+
 
 def _sizes(lengths: Sequence[float], worst: Sequence[ShownSize], at: int) -> Iterator[str]:
     """What shows in the least stretch, and in one of about a second."""
