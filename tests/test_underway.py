@@ -346,3 +346,45 @@ def test_wrong_accelerations_are_refused_where_they_stand(tmp_path: Path) -> Non
     )
     with pytest.raises(BadInput, match=r"s\.yaml:6:48: .*angular_acceleration: wrong dimension"):
         load_text(text, tmp_path / "s.yaml")
+
+
+@pytest.mark.parametrize("kind", ["rmse, axis: vertical", "tvu", "worst_case"])
+@pytest.mark.parametrize("why", ["echo", "bend"])
+def test_one_that_moves_between_its_samples_rules_out_no_other(
+    kind: str, why: str, tmp_path: Path
+) -> None:
+    """The cheap candidate fails by what moves while its sound is under way, or between samples; the
+    dear one stands as it does alone (the rest was held against the cheap one's term: infeasible).
+    """
+    told: dict[str, Raw] = {
+        "echo": {"cheap": {"corrects": []}, "dear": {"corrects": ["travel_time"]}},
+        "bend": {"cheap": {"rate": "1 Hz"}, "dear": {"rate": "20 Hz"}},
+    }
+    role = {"echo": "ranging", "bend": "position"}[why]
+    noise = {"sigma_position": "1 cm"} if role == "position" else {"sigma_range": "2 cm"}
+    beam = {} if role == "position" else {"sigma_bearing": "0.02 deg", "type": "usbl"}
+    catalog = {
+        name: {"modality": role, "primitives": [], "mass": "1 kg", "power": "1 W", "source": "x",
+               "cost": cost, **noise, **beam, **told[why][name]}
+        for name, cost in (("cheap", "100 EUR"), ("dear", "900 EUR"))
+    }  # fmt: skip
+    (tmp_path / "c.yaml").write_text(json.dumps({"sensors": catalog}), "utf-8")
+    moving = {"v_max": "8 m/s", "acceleration": "9 m/s^2"}
+    limit = {"id": "F", "kind": kind.partition(",")[0], "limit": "0.5 m"}
+    limit |= {"axis": "vertical"} if "axis" in kind else {}
+    free = {"cost": "0 EUR", "mass": "0 kg", "power": "0 W", "source": "x"}
+    whole = json.loads(spec(platform=moving, position=free, attitude=free, ranging=free))
+    whole |= {"catalogs": ["c.yaml"], "requirements": [*whole["requirements"], limit]}
+
+    def with_candidates(*names: str) -> Any:
+        held = {"candidates": list(names)} if len(names) > 1 else {"sensor": names[0]}
+        whole["stages"][0][role] = {**held, **STILL}
+        case = load_text(json.dumps(whole), tmp_path / "s.yaml")
+        return check_loaded(case, CheckSettings(monte_carlo=False))
+
+    assert with_candidates("cheap").verdict == "fails"
+    alone, both = with_candidates("dear"), with_candidates("cheap", "dear")
+    assert alone.verdict == both.verdict == "meets"
+    assert alone.design is not None
+    assert both.design is not None
+    assert both.design.cost == alone.design.cost == 900.0

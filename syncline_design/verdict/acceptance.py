@@ -369,17 +369,23 @@ def _stretched(error: TimingError, factor: float) -> TimingError:
 
 
 def _noise_alone(system: System, stage: int, role: RoleName) -> System:
-    """A system whose only error is the noise of one sensor; speeds then matter to nothing."""
+    """A system whose only error is the noise of one sensor; speeds then matter to nothing, and
+    nothing moves while sound is under way or between samples."""
     stages = []
+    perfect_stamps = {"timing": NO_ERROR, "timeline": UTC}
+    at_once = {"rate_hz": None, "sound_mps": None, "travels": False}
     for index, one in enumerate(system.stages):
         perfect = {
-            name: replace(sensor, timing=NO_ERROR, timeline=UTC)
+            name: replace(sensor, **perfect_stamps, **at_once)
             if (index, name) == (stage, role)
-            else replace(sensor, sigma=(0.0, 0.0, 0.0), timing=NO_ERROR, timeline=UTC)
+            else replace(sensor, sigma=(0.0, 0.0, 0.0), **perfect_stamps, **at_once)
             for name in ROLES
             if (sensor := getattr(one, name)) is not None
         }
-        platform = replace(one.platform, v_max_mps=1.0, omega_max_radps=1.0)
+        platform = replace(
+            one.platform, v_max_mps=1.0, omega_max_radps=1.0,
+            acceleration_mps2=0.0, angular_acceleration_radps2=0.0,
+        )  # fmt: skip
         if role == "position":
             platform = replace(platform, distance_m=1.0)
         stages.append(replace(one, platform=platform, **perfect))
