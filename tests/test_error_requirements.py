@@ -12,7 +12,9 @@ import pytest
 from scipy.stats import chi2
 
 from syncline_design.report.schema import json_schema
+from syncline_design.report.verdict_words import kind_text
 from syncline_design.spec.load import BadInput, load_text
+from syncline_design.verdict.no_design import unmet
 from syncline_design.verdict.tree import RequirementResult, Verdict
 from syncline_design.verdict.verify import CheckSettings, check_loaded
 
@@ -213,3 +215,11 @@ def test_effects_that_scatter_count(kind: str) -> None:
     assert verdict.figures is not None
     assert verdict.figures.rmse_m is not None
     assert verdict.figures.rmse_m["3d"] > 0.1
+
+
+def test_a_requirement_without_a_design_names_its_own_axis() -> None:
+    """It read "RMS of 3D errors" where a vertical one was asked for."""
+    text = boat("{id: R, kind: rmse, axis: vertical, limit: 1 cm}")
+    case = load_text(text, "boat.yaml")
+    (asked,) = case.spec.requirements
+    assert kind_text(unmet(case, asked, in_conflict=True)) == "RMS of vertical errors"

@@ -84,5 +84,5 @@ def unmet(
         limit = float(case.spec.in_currency(limit))
     return decided(
         id=one.id, kind=one.kind, status=status, value=None, limit=float(limit), unit=unit,
-        quantile=quantile, note=note,
+        quantile=quantile, note=note, axis=one.axis or one.of,
     )  # fmt: skip
