@@ -289,11 +289,26 @@ def _with_payload(
         found = _chosen(other, own, asked.beside)
         return found is not None and payload(other, found) == now
 
-    values = tried(row.value, GROWTHS if problem.judge is None else COARSE, row.fails_at)
+    if problem.judge is None:
+        return with_change(row, same, GROWTHS, never)
+    return with_change(row, same, COARSE, never, SIMULATED_CLOSE)
+
+
+def with_change(
+    row: Slack,
+    same: Callable[[float], bool],
+    growths: Sequence[float],
+    never: tuple[str, ...],
+    close: float = CLOSE,
+) -> Slack:
+    """The row with the figure's value from which on another payload is chosen.
+
+    same: whether the payload stays at a value; growths: at which multiples that is asked first;
+    never: which of verdict and payload the figure is proven never to change.
+    """
+    values = tried(row.value, growths, row.fails_at)
     try:
-        at = first_failing(
-            same, values, row.value, CLOSE if problem.judge is None else SIMULATED_CLOSE
-        )
+        at = first_failing(same, values, row.value, close)
     except OutOfTime:
         raise
     except NoVerdict:  # what cannot be proven is not claimed

@@ -28,11 +28,14 @@ MANY_STAMPS = 20.0
 CHANCE = 1e-3  # that scatter without jitter passes
 
 
-def grows_with_motion(data: Data, model: Model, directed: int) -> bool:
-    """Whether the error scatters more the faster the motion is, as one directed part says."""
-    from scipy.stats import t
+def in_blocks(
+    columns: Array, squares: Array, known: Array
+) -> tuple[Array, Array, list[tuple[Array, Array]]]:
+    """Normal equations of the variances of parts: the whole of them, and those of each block.
 
-    columns, squares, known = _variances(data, model, directed)
+    squares: of the error over its white noise, (n,); columns: what a unit of each part's variance
+    adds to them, (n, parts); known: what does so beside them, (n,).
+    """
     variance = np.ones_like(squares)
     for _ in range(ROUNDS):
         cut = np.minimum(squares, FAR2 * variance) - known
@@ -42,8 +45,15 @@ def grows_with_motion(data: Data, model: Model, directed: int) -> bool:
         normal_equations(columns[b], cut[b], variance[b])
         for b in np.array_split(np.arange(columns.shape[0]), BLOCKS)
     ]
-    normal = np.sum([n for n, _ in parts], axis=0)
-    right = np.sum([r for _, r in parts], axis=0)
+    return np.sum([n for n, _ in parts], axis=0), np.sum([r for _, r in parts], axis=0), parts
+
+
+def grows_with_motion(data: Data, model: Model, directed: int) -> bool:
+    """Whether the error scatters more the faster the motion is, as one directed part says."""
+    from scipy.stats import t
+
+    columns, squares, known = _variances(data, model, directed)
+    normal, right, parts = in_blocks(columns, squares, known)
     if not own_share(normal) > TOLD_APART:
         return False
     value = variances_of(normal, right)[-1]

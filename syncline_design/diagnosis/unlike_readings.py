@@ -17,12 +17,9 @@ from syncline_design.diagnosis.expected_noise import channels
 from syncline_design.diagnosis.fitting import Data, Model, data_of
 from syncline_design.diagnosis.motion_scatter import (
     BLOCKS,
-    FAR2,
-    LEAST_VARIANCE,
-    ROUNDS,
     TOLD_APART,
+    in_blocks,
     lasting,
-    normal_equations,
     own_share,
     variances_of,
 )
@@ -119,18 +116,7 @@ def _variances(data: Data, model: Model, slopes: list[Array]) -> tuple[Array, Ar
     if data.structure.stamped is not None:
         known = np.sum(np.linalg.solve(lower, data.structure.stamped[:, axes]) ** 2, axis=2)
     columns, squares = columns.reshape(known.size, -1), (error**2).ravel()
-    known = known.ravel()
-    variance = np.ones_like(squares)
-    for _ in range(ROUNDS):
-        cut = np.minimum(squares, FAR2 * variance) - known
-        found = variances_of(*normal_equations(columns, cut, variance))
-        variance = np.maximum(columns @ found + known, LEAST_VARIANCE)
-    parts = [
-        normal_equations(columns[b], cut[b], variance[b])
-        for b in np.array_split(np.arange(columns.shape[0]), BLOCKS)
-    ]
-    normal = np.sum([n for n, _ in parts], axis=0)
-    right = np.sum([r for _, r in parts], axis=0)
+    normal, right, parts = in_blocks(columns, squares, known.ravel())
     left = np.array([variances_of(normal - n, right - r) for n, r in parts])
     order = [[i for i in range(len(normal)) if i != k] + [k] for k in range(len(normal))]
     seen = np.array([own_share(normal[np.ix_(o, o)]) > TOLD_APART for o in order])

@@ -19,9 +19,8 @@ from syncline_design.choice.family_core import core_names, of_names, unguarded
 from syncline_design.choice.family_roads import choose_by_road
 from syncline_design.choice.narrowed import kept
 from syncline_design.choice.options import RESOURCES, Bools, Option, Options, ResourceName
-from syncline_design.choice.outcome import NoVerdict, OutOfTime, TooLarge
+from syncline_design.choice.outcome import TooLarge
 from syncline_design.choice.slack import (
-    CLOSE,
     GROWTHS,
     Slack,
     error_limit,
@@ -31,6 +30,7 @@ from syncline_design.choice.slack import (
     platform_what_if,
     tau_limits,
     tried,
+    with_change,
 )
 from syncline_design.choice.table import Design, Problem
 from syncline_design.choice.variations import PLATFORM_FIGURES, PlatformFigure, platform_figure
@@ -253,16 +253,7 @@ def _with_payload(
         problems = ledger.core if stands else ledger.whole()
         return _named(ledger, changed(at, problems)) == now
 
-    values = tried(row.value, FEW_GROWTHS, row.fails_at)
-    try:
-        at = first_failing(same, values, row.value, CLOSE)
-    except OutOfTime:
-        raise
-    except NoVerdict:  # what cannot be proven is not claimed
-        return replace(row, searched_to=row.value, never=never)
-    if at is not None and row.fails_at is not None and abs(at - row.fails_at) <= 1e-6 * at:
-        at = row.fails_at
-    return replace(row, payload_changes_at=at, searched_to=values[-1], never=never)
+    return with_change(row, same, FEW_GROWTHS, never)
 
 
 def _payload(problems: Sequence[Problem], designs: Sequence[Design]) -> Payload:
